@@ -1,0 +1,42 @@
+# Each target sets up .venv by itself and does nothing where nothing changed. PYTHON picks the interpreter (3.11 or newer).
+PYTHON ?= python3
+BIN := .venv/bin
+SOURCES := $(shell git ls-files '*.py' '*.toml' '*.urdf' '*.csv' 2>/dev/null | grep -v -e '^tests/' -e '^bench/')
+STUDIES := emps
+
+.PHONY: help demo test check bench clean $(STUDIES:%=study-%)
+
+help:            ## what can be made
+	@sed -n 's/^\([a-z%-]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
+
+demo: study-emps ## set up, then the main job: name the physics that a viscous model of EMPS leaves out
+
+study-%: .venv/installed ## run one study: report and numbers in build/studies/NAME
+	$(BIN)/python -m snarelab.studies.$(subst -,_,$*)
+
+test: .venv/installed ## set up, then the tests
+	$(BIN)/python -m pytest -n 2
+
+check: .venv/installed ## formatting, lint and types
+	$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/pyright
+
+bench: .venv/bench ## ratios against named rivals, measured in one run
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/torque.py
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/friction_fit.py
+
+clean:           ## remove what was built; the environment too
+	rm -rf .venv build *.egg-info
+
+.venv/tools: constraints.txt pyproject.toml
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "snarelab needs Python 3.11 or newer: make PYTHON=...")'
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt '.[dev]'
+	touch $@
+
+.venv/installed: .venv/tools $(SOURCES)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --force-reinstall .
+	touch $@
+
+.venv/bench: .venv/installed
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt '.[bench]'
+	touch $@

@@ -1,0 +1,74 @@
+"""What a plant can be made of besides its arm. T is N·m or N, S is rad or m, by the kind of joint."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class SolverFriction:
+    """MuJoCo's own: ``frictionloss`` as a (slightly soft) constraint of ``level`` [T], ``viscous`` damping [T·s/S]."""
+
+    level: float = 0.0
+    viscous: float = 0.0
+
+
+@dataclass(frozen=True)
+class Elasticity:
+    """A spring and damper between motor and link [T/S, T·s/S]; with ``gap`` [S], only outside that backlash."""
+
+    stiffness: float
+    damping: float = 0.0
+    gap: float = 0.0
+
+
+@dataclass(frozen=True)
+class Harness:
+    """A spring across a joint [T/S], relaxed at ``rest`` [S]."""
+
+    stiffness: float
+    rest: float = 0.0
+
+
+@dataclass(frozen=True)
+class Ripple:
+    """A motor torque ``amplitude`` [T] · sin(``cycles`` [1/S] · q + ``phase``) that the drive does not know of."""
+
+    amplitude: float
+    cycles: float
+    phase: float = 0.0
+
+
+@dataclass(frozen=True)
+class Payload:
+    """A point mass [kg] on the last link at ``point`` [m, link frame]."""
+
+    mass: float
+    point: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Drift:
+    """A zero that creeps: ``final`` [T] · (1 − exp(−t / ``time_constant`` [s]))."""
+
+    final: float
+    time_constant: float = 20.0
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """Gaussian process torque of a given ``rms`` [T] in the band ``low``..``high`` [Hz]; nothing measures it."""
+
+    rms: float
+    low: float = 0.3
+    high: float = 15.0
+
+
+@dataclass(frozen=True)
+class Servo:
+    """PD control at ``bandwidth`` [Hz] on the encoder, plus the nominal arm's inverse dynamics along the motion.
+
+    Speed is the difference of readings behind a first-order low-pass at ``speed_filter`` [Hz].
+    """
+
+    bandwidth: float = 4.0
+    damping_ratio: float = 0.8
+    speed_filter: float = 60.0

@@ -1,0 +1,173 @@
+"""The command line: ``snarelab identify | diagnose | simulate``.
+
+Exit status 0: it ran, whatever the verdict. 2: unusable input, one line on standard error, nothing written.
+1: a fault of the program.
+"""
+
+import argparse
+import json
+import os
+import sys
+import time
+import warnings
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from . import __version__
+from .errors import InputError
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command; see the module's text for the exit status."""
+    parser = _parser()
+    given = parser.parse_args(arguments)
+    warnings.showwarning = _notice
+    try:
+        given.run(given)
+    except InputError as error:
+        print(f"snarelab: {' '.join(str(error).split())}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("snarelab: interrupted; nothing was written", file=sys.stderr)
+        return 130
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="snarelab", description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--version", action="version", version=__version__)
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    p = commands.add_parser("identify", help="fit every parameter of a model to recordings")
+    p.add_argument("model", metavar="MODEL.toml")
+    p.add_argument("recordings", nargs="+", metavar="RECORDING")
+    p.add_argument("--holdout", metavar="RECORDING", help="recording on which the fit is only evaluated")
+    p.add_argument("--json", metavar="OUT.json", help="where to write the result; - for standard output")
+    p.add_argument("--save-model", metavar="NEW.toml", help="where to write the model with its values")
+    p.set_defaults(run=_identify)
+
+    p = commands.add_parser("diagnose", help="find, name and add the physics that a model leaves out")
+    p.add_argument("model", metavar="MODEL.toml")
+    p.add_argument("recordings", nargs="+", metavar="RECORDING")
+    p.add_argument("--holdout", required=True, metavar="RECORDING", help="locked away for the proof")
+    p.add_argument("--json", metavar="OUT.json", help="where to write the result; - for standard output")
+    p.add_argument("--report", metavar="OUT.html", help="where to write the report, one self-contained page")
+    p.add_argument("--save-model", metavar="NEW.toml", help="where to write the model with what was found")
+    p.set_defaults(run=_diagnose)
+
+    p = commands.add_parser("simulate", help="torque of a model along a recorded motion")
+    p.add_argument("model", metavar="MODEL.toml")
+    p.add_argument("--motion", required=True, metavar="RECORDING", help="recording whose motion is followed")
+    p.add_argument("--out", required=True, metavar="RECORDING", help="where to write it (.csv or .parquet)")
+    p.set_defaults(run=_simulate)
+    return parser
+
+
+def _identify(given: argparse.Namespace) -> None:
+    from .identification.identify import identify  # engines load only for a command that needs them
+    from .models.model_file import load_model, save_model
+
+    _writable(given.json, given.save_model)
+    model = load_model(given.model)
+    with _Progress() as progress:
+        found = identify(model, given.recordings, [given.holdout] if given.holdout else (), progress=progress)
+    result = found.to_json()
+    if given.save_model:
+        save_model(found.model, given.save_model, f"{model.name}: values from snarelab identify {__version__}")
+    if given.json:
+        _write_json(result, given.json)
+    if given.json != "-":
+        print(_parameter_table(result))
+
+
+def _diagnose(given: argparse.Namespace) -> None:
+    from .identification.diagnose import diagnose
+    from .identification.report import write_report
+    from .models.model_file import load_model, save_model
+
+    _writable(given.json, given.report, given.save_model)
+    model = load_model(given.model)
+    with _Progress() as progress:
+        answer = diagnose(model, given.recordings, given.holdout, progress=progress)
+    found = answer.diagnosis
+    if given.report:
+        write_report(found, given.report)
+    if given.save_model:
+        save_model(answer.model, given.save_model, f"{found.sentence}\nsnarelab diagnose {__version__}")
+    if given.json:
+        _write_json(found.to_json(), given.json)
+    if given.json != "-":
+        print(found.sentence)
+        for step in found.steps:
+            print(f"  {step.label:<60} fitted {100 * step.train:6.2f} %   held out {100 * step.holdout:6.2f} %")
+        if given.report:
+            print(f"Report: {given.report}")
+
+
+def _simulate(given: argparse.Namespace) -> None:
+    from .identification.simulate import simulate
+    from .models.model_file import load_model
+    from .recordings import write_recording
+
+    _writable(given.out)
+    write_recording(simulate(load_model(given.model), given.motion), given.out)
+
+
+def _writable(*paths: str | None) -> None:
+    """Refuse a place that cannot be written before any long work starts."""
+    for path in paths:
+        if path and path != "-" and not (Path(path).absolute().parent.is_dir() and os.access(Path(path).absolute().parent, os.W_OK)):
+            raise InputError(f"{path}: its folder does not exist or cannot be written; make it first")
+
+
+def _write_json(result: dict[str, Any], path: str) -> None:
+    text = json.dumps(result, indent=1, allow_nan=False) + "\n"
+    if path == "-":
+        sys.stdout.write(text)
+        return
+    scratch = Path(path + ".part")
+    try:
+        scratch.write_text(text, encoding="utf-8")
+        scratch.replace(path)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror}") from None
+
+
+def _parameter_table(result: dict[str, Any]) -> str:
+    lines = [f"{'effect':<26}{'at':<16}{'parameter':<24}{'value':>12}{'std':>11}  unit"]
+    for p in result["parameters"]:
+        flag = "  (at its bound)" if p["at_bound"] else ""
+        lines.append(f"{p['effect']:<26}{p['at']:<16}{p['name']:<24}{p['value']:>12.5g}{p['std']:>11.2g}  {p['unit']}{flag}")
+    for channel, fit in result["fit"].items():
+        for role in ("train", "holdout"):
+            if role in fit:
+                f = fit[role]
+                lines.append(f"{channel} {role}: RMS residual {f['rms']:.4g} {fit['unit']}, {100 * f['relative']:.2f} % of the measured")
+    lines.append(f"condition number {result['condition']:.3g}")
+    return "\n".join(lines)
+
+
+def _notice(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
+    if issubclass(category, UserWarning):
+        print(f"snarelab: {message}", file=sys.stderr)
+
+
+class _Progress:
+    """One line on a terminal, rewritten; nothing in a pipe."""
+
+    def __enter__(self) -> Callable[[str], None]:
+        self._shown, self._start = sys.stderr.isatty(), time.monotonic()
+        return self._show
+
+    def _show(self, text: str) -> None:
+        if self._shown:
+            print(f"\r\x1b[2K[{time.monotonic() - self._start:5.1f} s] {text[:100]}", end="", file=sys.stderr, flush=True)
+
+    def __exit__(self, *_: object) -> None:
+        if self._shown:
+            print("\r\x1b[2K", end="", file=sys.stderr, flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

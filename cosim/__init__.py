@@ -1,0 +1,1 @@
+"""Co-simulation in FMI's terms. Empty until the master lands; nothing imports it."""

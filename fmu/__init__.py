@@ -1,0 +1,1 @@
+"""Export of participants as FMUs. Empty until the exporter lands; nothing imports it."""

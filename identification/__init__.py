@@ -1,0 +1,1 @@
+"""Parameters from recordings, and the name of the physics that the model leaves out."""

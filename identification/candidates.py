@@ -1,0 +1,146 @@
+"""Which effects could be missing, at which places, and the columns each would add to the torque."""
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..models.effects import effects
+from ..models.model_file import Model, Placed, places
+from .assembly import Assembly, Evaluation
+from .effect_terms import contributions
+from .experiment import Experiment
+
+Array = NDArray[np.float64]
+
+MOST_VARIANTS = 36
+"""Grid points of one effect at one place; a finer grid is thinned evenly."""
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One effect at one place with its shape parameters set.
+
+    ``amplitudes`` are the parameters the law is linear in, whose columns are tried, between ``low`` and ``high``; where
+    there is none (a delay, a spring), the law's whole contribution is the one column.
+    """
+
+    placed: Placed
+    parameters: Array
+    amplitudes: NDArray[np.int_]
+    low: Array
+    high: Array
+
+    def subsets(self) -> list[NDArray[np.int_]]:
+        """Positions of the columns to try together: each amplitude alone, and all of them."""
+        every = np.arange(max(len(self.amplitudes), 1))
+        return [every] if len(every) == 1 else [every, *(every[k : k + 1] for k in every)]
+
+
+def library(model: Model) -> list[Placed]:
+    """Every effect at every place that the model does not have yet and its kind of inertia leaves room for."""
+    have = {p.key for p in model.effects}
+    found = []
+    for effect in effects().values():
+        if effect.at == "link" and model.inertia == "free":
+            continue  # the identified inertia already holds whatever a link effect could add
+        spots = places(effect, model.tree)
+        if effect.name == "sensor_delay":
+            spots += tuple(f"q.{joint}" for joint in model.joints)
+        found += [Placed(effect, at) for at in spots if f"{effect.name}.{at}" not in have]
+    return found
+
+
+def variants(assembly: Assembly, placed: Placed) -> list[Variant]:
+    """The grid over an effect's shape parameters at a place, amplitudes at zero."""
+    axes, amplitudes = [], []
+    for i, p in enumerate(placed.effect.parameters):
+        scale = assembly.scale(placed, p)
+        axes.append([g * scale for g in p.grid] or [p.zero * scale])
+        if not p.grid:
+            amplitudes.append(i)
+    index = np.array(amplitudes if not placed.effect.states else [], int)
+    bounds = [assembly.bounds(placed, placed.effect.parameters[i]) for i in index] or [(0.0, np.inf)]
+    low, high = (np.array(x, float) for x in zip(*bounds, strict=True))
+    grid = list(product(*axes))
+    step = -(-len(grid) // MOST_VARIANTS)
+    return [Variant(placed, np.array(g, float), index, low, high) for g in grid[::step]]
+
+
+def candidate_columns(
+    assembly: Assembly, experiment: Experiment, state: Evaluation, variant: Variant
+) -> list[tuple[int, Array]]:
+    """What a variant adds to each channel it reaches, in the analysis band: (channel, (n_band, k))."""
+    placed = variant.placed
+    joint = assembly.joint_of(placed)
+    effect = placed.effect
+    key = None
+    if effect.at == "joint" and not effect.states and not state.passed.get(joint):
+        key = ("candidate", placed.key, variant.parameters.tobytes())
+        if key in experiment.store:
+            return [(joint, experiment.store[key])]
+    terms, by_load, _ = contributions(
+        experiment,
+        assembly.tree,
+        placed,
+        joint,
+        state.load[:, joint],
+        state.tau[:, joint],
+        assembly.speed_scales[joint],
+        variant.parameters,
+    )
+    found = []
+    for channel, values, columns in terms:
+        own = columns[:, variant.amplitudes] if len(variant.amplitudes) else values[:, None]
+        if effect.at != "sensor":
+            for passed in state.passed.get(channel, ()):
+                own = passed(own)
+        found.append((channel, experiment.motion.to_band(own)))
+    if key is not None and by_load is None:
+        experiment.store[key] = found[0][1]
+    return found
+
+
+def free_parameters(assembly: Assembly, experiment: Experiment, state: Evaluation, variant: Variant) -> tuple[str, ...]:
+    """Names of the parameters that matter once the variant's amplitudes in ``low`` are switched on.
+
+    A shape that only acts through an amplitude left at zero has no derivative, and is not counted.
+    """
+    placed = variant.placed
+    joint = assembly.joint_of(placed)
+    parameters = variant.parameters.copy()
+    parameters[variant.amplitudes] = 1.0
+    terms, _, _ = contributions(
+        experiment,
+        assembly.tree,
+        placed,
+        joint,
+        state.load[:, joint],
+        state.tau[:, joint],
+        assembly.speed_scales[joint],
+        parameters,
+    )
+    moves = np.sum([np.sum(columns**2, axis=0) for _, _, columns in terms], axis=0) > 0
+    amplitudes = {
+        p.name for i, p in enumerate(placed.effect.parameters) if not p.grid and len(variant.amplitudes)
+    }
+    on = {placed.effect.parameters[i].name for i in variant.amplitudes}
+    return tuple(
+        p.name
+        for p, moving in zip(placed.effect.parameters, moves, strict=True)
+        if moving and (p.name in on or p.name not in amplitudes)
+    )
+
+
+def smooth_columns(experiment: Experiment, state: Evaluation, joint: int, pieces: int = 8) -> Array:
+    """Smooth nameless curves on one channel (n_band, k): over position, speed, load and time, as hat functions."""
+    motion = experiment.motion
+    coordinates = (motion.q[:, joint], motion.qd[:, joint], state.load[:, joint], experiment.elapsed)
+    return motion.to_band(np.concatenate([_hats(x, pieces) for x in coordinates], axis=1))
+
+
+def _hats(x: Array, pieces: int) -> Array:
+    """Piecewise linear basis (n, k) over a coordinate, knots at its range's even steps."""
+    at = np.linspace(np.min(x), np.max(x), pieces) if np.ptp(x) > 0 else np.zeros(0)
+    return np.stack([np.interp(x, at, row) for row in np.eye(len(at))], axis=1) if len(at) else np.zeros((len(x), 0))

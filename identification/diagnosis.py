@@ -1,0 +1,213 @@
+"""What a diagnosis says: verdict, effects, places, fit; one frozen value for JSON, report and tests."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A parameter's value, its standard deviation and its unit."""
+
+    value: float
+    std: float
+    unit: str
+    at_bound: bool = False
+
+
+@dataclass(frozen=True)
+class Rival:
+    """Another explanation: how likely, whether these recordings can tell it apart, and the experiment that would."""
+
+    name: str
+    at: str
+    probability: float
+    separable: bool
+    experiment: str
+
+
+@dataclass(frozen=True)
+class Finding:
+    """An effect that the model left out, in the field's words."""
+
+    name: str
+    at: str
+    probability: float
+    parameters: Mapping[str, Estimate]
+    evidence: str
+    rivals: tuple[Rival, ...]
+
+
+@dataclass(frozen=True)
+class Location:
+    """Where in a recording the misfit stands: its share of all, when, and in which state."""
+
+    channel: str
+    share: float
+    time_windows: tuple[tuple[float, float], ...]
+    where: str
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """RMS residual of a channel before and after [channel's unit], and relative to the measurement's RMS."""
+
+    rms_before: float
+    rms_after: float
+    relative_before: float
+    relative_after: float
+
+
+@dataclass(frozen=True)
+class ChannelFit:
+    """A channel's misfit on the recordings fitted and on the one locked away, and the noise floor."""
+
+    channel: str
+    unit: str
+    train: Misfit
+    holdout: Misfit
+    noise_floor: float
+
+
+@dataclass(frozen=True)
+class Step:
+    """One line of the table: model so far, and relative RMS misfit over all channels on both sets (0 to 1)."""
+
+    label: str
+    train: float
+    holdout: float
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """What one effect at one place explains by itself on top of the baseline: share of the residual energy, 0 to 1."""
+
+    name: str
+    at: str
+    explained: float
+    score: float
+    named: bool
+
+
+@dataclass(frozen=True)
+class Moved:
+    """A baseline parameter before and after the missing physics was added."""
+
+    name: str
+    unit: str
+    before: float
+    after: float
+    std: float
+
+
+@dataclass(frozen=True)
+class Trace:
+    """A channel of one recording in the analysis band, for pictures; all arrays (n_samples,)."""
+
+    recording: str
+    role: Literal["train", "holdout"]
+    channel: str
+    unit: str
+    time: Array
+    position: Array
+    speed: Array
+    measured: Array
+    before: Array
+    after: Array
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The whole answer.
+
+    Parameters
+    ----------
+    verdict : "missing_physics", "adequate" or "unknown_effect"
+    sentence : str
+        The verdict in one or two sentences, with names, places and numbers.
+    description : str
+        For what has no name: all that the data supports. Empty otherwise.
+    model : str
+        Model's name.
+    effects : tuple of Finding
+        Ordered by how much each explains.
+    location : tuple of Location
+    fit : tuple of ChannelFit
+    steps : tuple of Step
+        Baseline first, then one line an effect added.
+    candidates : tuple of Candidate
+        First screening, best first.
+    moved : tuple of Moved
+    traces : tuple of Trace
+    limits : mapping of str to float
+        Smallest share of a channel's residual energy that an effect must explain to be named on it.
+    notes : tuple of str
+        Conditioning and excitation, in words.
+    band : float
+        Analysis band's edge [Hz].
+    """
+
+    verdict: Literal["missing_physics", "adequate", "unknown_effect"]
+    sentence: str
+    description: str
+    model: str
+    effects: tuple[Finding, ...]
+    location: tuple[Location, ...]
+    fit: tuple[ChannelFit, ...]
+    steps: tuple[Step, ...]
+    candidates: tuple[Candidate, ...]
+    moved: tuple[Moved, ...]
+    traces: tuple[Trace, ...]
+    limits: Mapping[str, float]
+    notes: tuple[str, ...]
+    band: float
+
+    def to_json(self) -> dict[str, Any]:
+        """The published form: plain dicts, lists, numbers and text."""
+        return {
+            "verdict": self.verdict,
+            "sentence": self.sentence,
+            "description": self.description,
+            "model": self.model,
+            "effects": [_finding(e) for e in self.effects],
+            "location": [
+                {
+                    "channel": p.channel,
+                    "share": p.share,
+                    "time_windows": [list(w) for w in p.time_windows],
+                    "where": p.where,
+                }
+                for p in self.location
+            ],
+            "fit": {
+                f.channel: {
+                    "train": vars(f.train),
+                    "holdout": vars(f.holdout),
+                    "noise_floor": f.noise_floor,
+                    "unit": f.unit,
+                }
+                for f in self.fit
+            },
+            "steps": [vars(s) for s in self.steps],
+            "candidates": [vars(c) for c in self.candidates],
+            "moved": [vars(m) for m in self.moved],
+            "limits": dict(self.limits),
+            "notes": list(self.notes),
+            "band": {"value": self.band, "unit": "Hz"},
+        }
+
+
+def _finding(finding: Finding) -> dict[str, Any]:
+    return {
+        "name": finding.name,
+        "at": finding.at,
+        "probability": finding.probability,
+        "parameters": {name: vars(p) for name, p in finding.parameters.items()},
+        "evidence": finding.evidence,
+        "rivals": [vars(r) for r in finding.rivals],
+    }

@@ -1,0 +1,214 @@
+"""How much a candidate explains when the whole baseline is fitted again beside it, and whether that is chance.
+
+All in whitened samples, where the log-likelihood gained by adding columns C to a baseline X is ½ sᵀS⁻¹s with
+s = Cᵀ(y − X g), S = CᵀC − CᵀX (XᵀX)⁻¹ XᵀC (the Schur complement; Frisch & Waugh 1933). Products are kept per time block, so
+that leaving a block out, a block bootstrap, and nulls with signs flipped per block (wild bootstrap: Liu 1988) cost nothing.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+
+Array = NDArray[np.float64]
+
+ABSORBED = 1e-3
+"""A column of which the baseline can mimic all but this share is no candidate."""
+
+ABSORBED_PART = 0.02
+"""The same for every column of a candidate that has several: an alias must not ride along."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One whitened channel: baseline columns (n, k) for the parameters ``index``, residual (n,), noise (n,), block (n,)."""
+
+    index: NDArray[np.int_]
+    columns: Array
+    residual: Array
+    noise: Array
+    block: NDArray[np.int_]
+
+
+@dataclass(frozen=True)
+class Products:
+    """Sums over the samples of each block, B blocks, P baseline parameters, k candidate columns."""
+
+    own: Array
+    """(B, k, k): CᵀC."""
+    cross: Array
+    """(B, P, k): XᵀC."""
+    right: Array
+    """(B, k): Cᵀy."""
+    nulls: Array
+    """(k, R): Cᵀ of R sign-flipped noises."""
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Of one candidate: log-likelihood gained, its amplitudes (k,), and the least share of a column that the
+    baseline cannot mimic: 0 gain where that is too little."""
+
+    total: float
+    amplitudes: Array
+    unabsorbed: float
+
+
+class Evidence:
+    """Baseline sums of all channels, ready to judge candidates.
+
+    Parameters
+    ----------
+    channels : sequence of Channel
+    n_parameters, n_blocks : int
+    n_nulls : int
+        Sign-flipped noise series.
+    seed : int
+    """
+
+    def __init__(
+        self, channels: Sequence[Channel], n_parameters: int, n_blocks: int, n_nulls: int = 200, seed: int = 0
+    ) -> None:
+        rng = np.random.default_rng(seed)
+        signs = rng.choice([-1.0, 1.0], (n_blocks, n_nulls))
+        self.channels, self.n_blocks = tuple(channels), n_blocks
+        self.flipped = [c.noise[:, None] * signs[c.block] for c in channels]
+        self.matrix = np.zeros((n_blocks, n_parameters, n_parameters))
+        self.right = np.zeros((n_blocks, n_parameters))
+        self.energy = np.zeros(n_blocks)
+        self.nulls = np.zeros((n_parameters, n_nulls))
+        for c, flipped in zip(channels, self.flipped, strict=True):
+            for b, rows in self._rows(c):
+                x = c.columns[rows]
+                self.matrix[b][np.ix_(c.index, c.index)] += x.T @ x
+                self.right[b, c.index] += x.T @ c.residual[rows]
+                self.energy[b] += c.residual[rows] @ c.residual[rows]
+            self.nulls[c.index] += c.columns.T @ flipped
+        self.size = sum(len(c.residual) for c in channels)
+        self._total = _Solver(self.matrix.sum(0))
+        self._fitted = self._total.solve(self.right.sum(0))
+        self._null_fitted = self._total.solve(self.nulls)
+
+    def _rows(self, c: Channel) -> list[tuple[int, slice]]:
+        edges = np.flatnonzero(np.diff(c.block)) + 1
+        starts, stops = np.concatenate([[0], edges]), np.concatenate([edges, [len(c.block)]])
+        return [(int(c.block[a]), slice(int(a), int(b))) for a, b in zip(starts, stops, strict=True)]
+
+    def products(self, columns: Sequence[tuple[int, Array]]) -> Products:
+        """Sums for a candidate given as (channel number, whitened columns (n, k)), same k on every channel."""
+        k = columns[0][1].shape[1]
+        own = np.zeros((self.n_blocks, k, k))
+        cross = np.zeros((self.n_blocks, self.matrix.shape[1], k))
+        right = np.zeros((self.n_blocks, k))
+        nulls = np.zeros((k, self.nulls.shape[1]))
+        for number, values in columns:
+            c = self.channels[number]
+            for b, rows in self._rows(c):
+                part = values[rows]
+                own[b] += part.T @ part
+                cross[b, c.index] += c.columns[rows].T @ part
+                right[b] += part.T @ c.residual[rows]
+            nulls += values.T @ self.flipped[number]
+        return Products(own, cross, right, nulls)
+
+    def gain(self, p: Products, low: Array, high: Array) -> Gain:
+        """Log-likelihood gained on all blocks by the candidate, amplitudes between bounds, baseline fitted again."""
+        cross = p.cross.sum(0)
+        own = p.own.sum(0)
+        schur = own - cross.T @ self._total.solve(cross)
+        left = np.diag(schur) / np.maximum(np.diag(own), 1e-300)
+        unabsorbed = float(np.min(left)) if len(left) > 1 else float(left[0])
+        if unabsorbed < (ABSORBED if len(left) == 1 else ABSORBED_PART):
+            return Gain(0.0, np.zeros(len(low)), unabsorbed)
+        target = p.right.sum(0) - cross.T @ self._fitted
+        amplitudes = _bounded(schur, target, low, high)
+        return Gain(float(target @ amplitudes - 0.5 * amplitudes @ schur @ amplitudes), amplitudes, unabsorbed)
+
+    def null_gains(self, p: Products) -> Array:
+        """The same gain on every sign-flipped noise (R,), without bounds."""
+        cross = p.cross.sum(0)
+        schur = _Solver(p.own.sum(0) - cross.T @ self._total.solve(cross))
+        target = p.nulls - cross.T @ self._null_fitted
+        return 0.5 * np.sum(target * schur.solve(target), axis=0)
+
+    def fresh_gains(self, p: Products, low: Array, high: Array) -> Array:
+        """Log-likelihood gained on each block by a fit to the other blocks (B,)."""
+        gains = np.zeros(self.n_blocks)
+        for b in range(self.n_blocks):
+            solver = _Solver(self.matrix.sum(0) - self.matrix[b])
+            right = self.right.sum(0) - self.right[b]
+            cross = p.cross.sum(0) - p.cross[b]
+            schur = p.own.sum(0) - p.own[b] - cross.T @ solver.solve(cross)
+            amplitudes = _bounded(schur, p.right.sum(0) - p.right[b] - cross.T @ solver.solve(right), low, high)
+            without = solver.solve(right)
+            beside = solver.solve(right - cross @ amplitudes)
+            gains[b] = 0.5 * (self._energy(b, without) - self._energy(b, beside, p, amplitudes))
+        return gains
+
+    def shares(self, p: Products, amplitudes: Array) -> Array:
+        """Log-likelihood gained on each block by the fit to all of them (B,)."""
+        beside = self._total.solve(self.right.sum(0) - p.cross.sum(0) @ amplitudes)
+        return np.array(
+            [
+                0.5 * (self._energy(b, self._fitted) - self._energy(b, beside, p, amplitudes))
+                for b in range(self.n_blocks)
+            ]
+        )
+
+    def likeness(self, a: Mapping[int, Array], b: Mapping[int, Array]) -> float:
+        """Cosine between two whitened signals (channel to (n,)) once the baseline has taken its part of each."""
+        size = self.matrix.shape[1]
+        shadow = {name: np.zeros(size) for name in "ab"}
+        for name, signal in (("a", a), ("b", b)):
+            for number, values in signal.items():
+                c = self.channels[number]
+                shadow[name][c.index] += c.columns.T @ values
+        both = float(sum(a[c] @ b[c] for c in a.keys() & b.keys())) - shadow["a"] @ self._total.solve(shadow["b"])
+        own = [
+            float(sum(x @ x for x in signal.values())) - shadow[name] @ self._total.solve(shadow[name])
+            for name, signal in (("a", a), ("b", b))
+        ]
+        return float(both / np.sqrt(max(own[0] * own[1], 1e-300)))
+
+    def smallest(self, p: Products, needed: float) -> float:
+        """Amplitude of a one-column candidate that would gain ``needed``, the baseline fitted again beside it."""
+        cross = p.cross.sum(0)
+        schur = float((p.own.sum(0) - cross.T @ self._total.solve(cross))[0, 0])
+        return float(np.sqrt(2 * needed / max(schur, 1e-300)))
+
+    def _energy(self, b: int, theta: Array, p: Products | None = None, amplitudes: Array | None = None) -> float:
+        """Squared residual of a block at baseline step ``theta`` and a candidate's amplitudes."""
+        energy = self.energy[b] - 2 * self.right[b] @ theta + theta @ self.matrix[b] @ theta
+        if p is not None and amplitudes is not None:
+            energy += -2 * p.right[b] @ amplitudes + amplitudes @ p.own[b] @ amplitudes
+            energy += 2 * theta @ p.cross[b] @ amplitudes
+        return float(energy)
+
+
+class _Solver:
+    """Solves with a normal matrix whose weak directions are left alone."""
+
+    def __init__(self, matrix: Array) -> None:
+        self.scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+        values, vectors = np.linalg.eigh(matrix / np.outer(self.scale, self.scale))
+        keep = values > 1e-10 * max(values[-1], 1e-300) if len(values) else np.zeros(0, bool)
+        self.half = vectors[:, keep] / np.sqrt(values[keep])
+
+    def solve(self, right: Array) -> Array:
+        scale = self.scale if right.ndim == 1 else self.scale[:, None]
+        return self.half @ (self.half.T @ (right / scale)) / scale
+
+
+def _bounded(schur: Array, target: Array, low: Array, high: Array) -> Array:
+    """Minimise ½ aᵀSa − targetᵀa between bounds."""
+    solver = _Solver(schur)
+    free = solver.solve(target)
+    if np.all(free >= low) and np.all(free <= high):
+        return free
+    values, vectors = np.linalg.eigh(schur / np.outer(solver.scale, solver.scale))
+    root = (vectors * np.sqrt(np.maximum(values, 1e-12 * values[-1]))).T
+    right = np.linalg.lstsq(root.T, target / solver.scale, rcond=None)[0]
+    answer = lsq_linear(root, right, bounds=(low * solver.scale, high * solver.scale), method="bvls")
+    return answer.x / solver.scale

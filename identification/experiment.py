@@ -1,0 +1,103 @@
+"""A conditioned recording with everything the rigid body contributes worked out once."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..models.model_file import Model
+from ..models.rigid_body import RigidBody
+from ..recordings import JointKind, read_recording
+from ..recordings.condition import Motion, condition
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Experiment:
+    """Motion of one recording and the rigid body's share of its torque.
+
+    ``n`` samples, ``J`` joints, ``L`` links; ``store`` keeps columns that do not change while a model is fitted.
+    """
+
+    motion: Motion
+    body: RigidBody
+    store: dict[object, Array] = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def regressor(self) -> Array:
+        """Torque per inertial parameter (n, J, 10 L)."""
+        return self.body.regressor(self.motion.q, self.motion.qd, self.motion.qdd)
+
+    @cached_property
+    def mass_matrix(self) -> Array:
+        """Joint-space inertia at the nominal parameters (n, J, J)."""
+        return self.body.mass_matrix(self.motion.q)
+
+    @cached_property
+    def tangent(self) -> tuple[Array, Array]:
+        """Derivative of the nominal torque by position and by rate, each (n, J, J)."""
+        return self.body.tangent(self.motion.q, self.motion.qd, self.motion.qdd)
+
+    @cached_property
+    def measured(self) -> Array:
+        """Measured torque in the analysis band (n_band, J)."""
+        return self.motion.to_band(self.motion.tau)
+
+    @cached_property
+    def elapsed(self) -> Array:
+        """Time from the recording's start (n,) [s]."""
+        return self.motion.time - self.motion.time[0]
+
+
+@dataclass(frozen=True)
+class Scales:
+    """What a joint does in the training recordings: peak speed, travel, peak torque; bounds and grids refer to them."""
+
+    speed: float
+    travel: float
+    torque: float
+
+    def of(self, kind: str) -> float:
+        """The scale a parameter's ``relative_to`` names."""
+        return {
+            "": 1.0,
+            "speed": self.speed,
+            "travel": self.travel,
+            "torque": self.torque,
+            "rate": self.torque / self.travel,
+        }[kind]
+
+
+def load_experiments(
+    model: Model, paths: Sequence[str | Path], body: RigidBody, band: float | None = None
+) -> list[Experiment]:
+    """Read and condition recordings for a model; all in one analysis band, the narrowest that any of them carries.
+
+    Raises
+    ------
+    InputError
+        Whatever is wrong with a recording.
+    """
+    kinds: dict[str, JointKind] = {j.name: j.kind for j in model.tree.joints}
+    datasets = [read_recording(path, model.signals, kinds) for path in paths]
+    wanted = band or model.bandwidth
+    motions = [condition(d, model.joints, wanted) for d in datasets]
+    narrowest = min(m.band for m in motions)
+    if any(m.band > 1.01 * narrowest for m in motions):
+        motions = [condition(d, model.joints, narrowest) for d in datasets]
+    return [Experiment(m, body) for m in motions]
+
+
+def scales(experiments: Sequence[Experiment]) -> Mapping[str, Scales]:
+    """Peak speed, travel and peak torque of every joint over all recordings; never zero."""
+    found = {}
+    for k, joint in enumerate(experiments[0].motion.joints):
+        q, qd, tau = (np.concatenate([getattr(e.motion, s)[:, k] for e in experiments]) for s in ("q", "qd", "tau"))
+        found[joint] = Scales(
+            max(float(np.max(np.abs(qd))), 1e-9), max(float(np.ptp(q)), 1e-9), max(float(np.max(np.abs(tau))), 1e-9)
+        )
+    return found

@@ -1,0 +1,143 @@
+"""``snarelab identify``: every parameter of a model from recordings, with its standard deviation."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..models.inertia import Array
+from ..models.model_file import Model
+from ..models.rigid_body import RigidBody
+from .assembly import Assembly
+from .base_parameters import INERTIAL, BaseParameters, base_parameters
+from .consistent_inertia import ConsistentInertia, consistent_inertia
+from .experiment import Experiment, load_experiments, scales
+from .fit import Fit, channel_rms, fit
+
+
+@dataclass(frozen=True)
+class Identified:
+    """A fit, the model with its values, and the recordings.
+
+    ``inertia`` holds the physically consistent links where inertia was identified; ``base`` what was identified.
+    """
+
+    model: Model
+    fit: Fit
+    train: tuple[Experiment, ...]
+    holdout: tuple[Experiment, ...]
+    base: BaseParameters | None
+    inertia: ConsistentInertia | None
+
+    def to_json(self) -> dict[str, Any]:
+        """The published form."""
+        found = self.fit
+        combination = {} if self.base is None else {f"inertia.{n[0]}.{n[1]}": n[2] for n in self.base.names}
+        parameters = [
+            {
+                "effect": s.effect,
+                "at": s.at,
+                "name": s.name,
+                "value": float(value),
+                "std": float(std),
+                "unit": s.unit,
+                "at_bound": bool(bound),
+            }
+            | ({"combination": combination[s.key]} if s.key in combination else {})
+            for s, value, std, bound in zip(found.assembly.slots, found.theta, found.std, found.at_bound, strict=True)
+        ]
+        fits: dict[str, Any] = {}
+        for role, experiments in (("train", self.train), ("holdout", self.holdout)):
+            if experiments:
+                rms, measured = channel_rms(found.assembly, experiments, found.theta)
+                for joint, r, m in zip(self.model.tree.joints, rms, measured, strict=True):
+                    channel = fits.setdefault(f"tau.{joint.name}", {})
+                    channel[role] = {"rms": float(r), "relative": float(r / m)}
+                    channel["unit"] = "N" if joint.kind == "prismatic" else "N*m"
+        answer: dict[str, Any] = {
+            "model": self.model.name,
+            "parameters": parameters,
+            "fit": fits,
+            "condition": found.condition,
+            "band": {"value": self.train[0].motion.band, "unit": "Hz"},
+            "starts": {"tried": found.starts, "agreed": found.agreed},
+            "notes": [f"{Path(e.motion.path).name}: {note}" for e in (*self.train, *self.holdout) for note in e.motion.notes],
+        }
+        if self.inertia is not None:
+            answer["inertia"] = {
+                "physical": not self.inertia.changed,
+                "links": {
+                    link.name: dict(zip(INERTIAL, map(float, phi), strict=True))
+                    for link, phi in zip(self.model.tree.links, self.inertia.phi.reshape(-1, 10), strict=True)
+                },
+            }
+        return answer
+
+
+def identify(
+    model: Model,
+    recordings: Sequence[str | Path],
+    holdout: Sequence[str | Path] = (),
+    *,
+    progress: Callable[[str], None] = lambda _: None,
+    seed: int = 0,
+) -> Identified:
+    """Fit all parameters of a model to all recordings jointly.
+
+    Parameters
+    ----------
+    model : Model
+    recordings : sequence of path
+    holdout : sequence of path
+        Recordings on which the fit is only evaluated.
+    progress : callable
+        Told in a few words what is under way.
+    seed : int
+        Of the random starts.
+
+    Raises
+    ------
+    InputError
+        Whatever is wrong with a recording, or effects that the identified inertia already holds.
+    """
+    progress("reading and conditioning the recordings")
+    body = RigidBody(model.tree)
+    train = load_experiments(model, recordings, body)
+    band = min(e.motion.band for e in train)
+    locked = load_experiments(model, holdout, body, band) if holdout else []
+    base = base_parameters(body) if model.inertia == "free" else None
+    assembly = Assembly(model.tree, model.effects, base, scales(train), model.values)
+    found = fit(assembly, train, progress=progress, seed=seed)
+    found, inertia = physical(found, train)
+    values = {**model.values, **assembly.values(found.theta), **inertial_values(model, inertia)}
+    return Identified(replace(model, values=values), found, tuple(train), tuple(locked), base, inertia)
+
+
+def physical(found: Fit, experiments: Sequence[Experiment]) -> tuple[Fit, ConsistentInertia | None]:
+    """Make an identified inertia one that bodies can have; where that changes it, fit all the rest again beside it."""
+    assembly = found.assembly
+    if assembly.base is None:
+        return found, None
+    n = len(assembly.base.names)
+    information = np.linalg.pinv(found.covariance[:n, :n], hermitian=True)
+    nearest = consistent_inertia(assembly.base, found.theta[:n], information, assembly.phi)
+    if not nearest.changed:
+        return found, nearest
+    held = Assembly(assembly.tree, assembly.placed, assembly.base, assembly.scales, assembly.values(found.theta))
+    held.low[:n] = held.high[:n] = nearest.beta_consistent
+    start: Array = np.concatenate([nearest.beta_consistent, found.theta[n:]])
+    again = fit(held, experiments, start=start, multi_start=False)
+    return replace(again, std=np.concatenate([found.std[:n], again.std[n:]])), nearest
+
+
+def inertial_values(model: Model, inertia: ConsistentInertia | None) -> dict[str, float]:
+    """Links' inertial parameters by key, for a model file."""
+    if inertia is None:
+        return {}
+    return {
+        f"inertia.{link.name}.{name}": float(value)
+        for link, phi in zip(model.tree.links, inertia.phi.reshape(-1, 10), strict=True)
+        for name, value in zip(INERTIAL, phi, strict=True)
+    }

@@ -1,0 +1,40 @@
+"""The diagnosis as one self-contained HTML page for test engineers: verdict first, then the grounds for it."""
+
+import os
+from datetime import date
+from pathlib import Path
+
+from ..errors import InputError
+from .diagnosis import Diagnosis
+from .report_findings import STATUS, missing, verdict, where
+from .report_fit import notes, parameters, screened, shape, step_by_step, unseen
+from .report_page import page
+
+
+def write_report(diagnosis: Diagnosis, path: str | Path) -> None:
+    """Write a diagnosis as one HTML file that needs nothing else: no script, and no request to anywhere.
+
+    The file appears whole or not at all. Raises InputError where it cannot be written.
+    """
+    path = Path(path)
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: the folder {path.parent} does not exist; make it, or choose another")
+    document = _document(diagnosis, date.today())
+    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    try:
+        partial.write_text(document, encoding="utf-8")
+        os.replace(partial, path)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror or error}); choose another folder") from error
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def _document(diagnosis: Diagnosis, day: date) -> str:
+    parts = (missing, where, unseen, step_by_step, shape, screened, parameters, notes)
+    return page(
+        f"{diagnosis.model}: {STATUS[diagnosis.verdict]}",
+        verdict(diagnosis, day),
+        [part(diagnosis) for part in parts],
+        f"Written by snarelab. All residuals are measurement minus model, in the band 0 to {diagnosis.band:g} Hz.",
+    )

@@ -1,0 +1,82 @@
+"""Numbers, units and names as a test engineer reads them; plain text, nothing escaped."""
+
+import math
+import re
+
+_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_MISSING = "–"
+_PEOPLE = re.compile(r"\b(coulomb|stribeck|makkar)\b")
+
+
+def words(name: str) -> str:
+    """A vocabulary name in words: ``coulomb_friction`` is "Coulomb friction"."""
+    return _PEOPLE.sub(lambda match: match[0].capitalize(), name.replace("_", " "))
+
+
+def unit_words(unit: str) -> str:
+    """A unit as printed: ``N*m/rad**2`` is "N·m/rad²"."""
+    raised = re.sub(r"(?:\*\*|\^)\s*(-?\d+)", lambda match: match[1].translate(_SUPERSCRIPT), unit)
+    return re.sub(r"\s*\*\s*", "·", raised)
+
+
+def number(value: float, digits: int = 3) -> str:
+    """A number to so many significant digits; far from one with a power of ten."""
+    if not math.isfinite(value):
+        return _MISSING
+    if value == 0:
+        return "0"
+    exponent = _exponent(value, digits)
+    if -4 <= exponent <= 5:
+        return _fixed(value, digits - 1 - exponent)
+    return f"{_fixed(value / 10.0**exponent, digits - 1)}\u2009×\u200910{str(exponent).translate(_SUPERSCRIPT)}"
+
+
+def percent(share: float) -> str:
+    """A share (0 to 1) as a percentage, to three significant digits at most."""
+    if not math.isfinite(share):
+        return _MISSING
+    value = 100 * share
+    if 0 < abs(value) < 0.005:
+        return "under 0.01\u202f%"
+    return f"{_fixed(value, 1 if abs(value) >= 9.95 else 2)}\u202f%"
+
+
+def chance(probability: float) -> str:
+    """A probability as a whole percentage; never "100 %", which nothing measured can be, nor "0 %"."""
+    if not math.isfinite(probability):
+        return _MISSING
+    if probability > 0.99:
+        return "over 99\u202f%"
+    if probability < 0.01:
+        return "under 1\u202f%"
+    return f"{100 * probability:.0f}\u202f%"
+
+
+def with_std(value: float, std: float) -> tuple[str, str]:
+    """A value and its standard deviation to the same last digit: one of the deviation's, two where it begins with 1."""
+    if not (math.isfinite(value) and math.isfinite(std) and std > 0):
+        return number(value, 4), _MISSING
+    last = _exponent(std, 7) - (f"{std:e}"[0] == "1")
+    size = _exponent(max(abs(value), std), 3)
+    if -4 <= size <= 5:
+        return _fixed(value, -last), _fixed(std, -last)
+    power = f"\u2009×\u200910{str(size).translate(_SUPERSCRIPT)}"
+    return _fixed(value / 10.0**size, size - last) + power, _fixed(std / 10.0**size, size - last) + power
+
+
+def spans(windows: tuple[tuple[float, float], ...], most: int = 8) -> str:
+    """Time windows in seconds, the first few of many."""
+    text = ", ".join(f"{start:.1f}–{end:.1f}" for start, end in windows[:most])
+    if not windows:
+        return _MISSING
+    return f"{text} s" + (f", and {len(windows) - most} more" if len(windows) > most else "")
+
+
+def _exponent(value: float, digits: int) -> int:
+    """Power of ten of the leading digit, once rounded to so many digits."""
+    return int(f"{abs(value):.{digits - 1}e}".split("e")[1])
+
+
+def _fixed(value: float, decimals: int) -> str:
+    rounded = round(value, decimals)
+    return f"{rounded + 0.0:.{max(decimals, 0)}f}".replace("-", "\u2212")

@@ -1,0 +1,253 @@
+"""One screening: every effect at every place and shape judged on top of a fit, and the noise they are judged against."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..models.model_file import Model, Placed
+from .assembly import Block, Evaluation
+from .candidates import Variant, candidate_columns, free_parameters, library, smooth_columns, variants
+from .evidence import Channel, Evidence, Products
+from .experiment import Experiment
+from .fit import Fit, gather
+from .noise import Whitener, whitener
+
+Array = NDArray[np.float64]
+Parts = list[Array]
+"""One array an experiment."""
+
+BLOCK = 1.5
+"""[s] Shortest time block: longer than the residual remembers."""
+
+RAW_BLOCKS = 12
+"""Blocks of unwhitened samples, each predicted from the others."""
+
+NULLS = 200
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A candidate and what the recordings say of it.
+
+    Parameters
+    ----------
+    variant : Variant
+        Best point of the effect's shape grid, and the amplitudes that the data asks for.
+    placed : Placed
+        Effect and place, with the parameters to hold.
+    amplitudes : array (k,)
+    score : float
+        Log-likelihood gained, less ½ log(samples) for each parameter.
+    price : float
+        What was taken off.
+    explained : float
+        Share of the residual energy of the channels it reaches, 0 to 1.
+    channels : tuple of int
+        Channels it reaches.
+    products : Products
+    signal : mapping of int to array (n_white,)
+        What it explains of each channel, whitened.
+    """
+
+    variant: Variant
+    placed: Placed
+    amplitudes: Array
+    score: float
+    price: float
+    explained: float
+    channels: tuple[int, ...]
+    products: Products
+    signal: Mapping[int, Array]
+
+    def start(self) -> dict[str, float]:
+        """Starting values by key for the joint refit."""
+        full = self.variant.parameters.copy()
+        if len(self.variant.amplitudes):
+            full[self.variant.amplitudes] = self.amplitudes
+        names = [p.name for p in self.placed.effect.parameters]
+        return {f"{self.placed.key}.{name}": float(value) for name, value in zip(names, full, strict=True)}
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Whitener and innovations of every channel, learnt once from the saturated model, and the time blocks."""
+
+    whiteners: tuple[Whitener, ...]
+    innovations: tuple[Array, ...]
+    blocks: NDArray[np.int_]
+    segments: tuple[tuple[slice, ...], ...]
+
+    def whiten(self, channel: int, parts: Parts) -> Array:
+        """Columns of one channel, all experiments, as innovations (n_white, k)."""
+        own = self.whiteners[channel]
+        return np.concatenate([own(x, s) for x, s in zip(parts, self.segments, strict=True)])
+
+
+@dataclass(frozen=True)
+class Screening:
+    """Candidates best first, the score that noise alone reaches, and what smooth nameless curves would explain."""
+
+    evidence: Evidence
+    judged: tuple[Judged, ...]
+    threshold: float
+    nameless: Mapping[int, float]
+    limits: Mapping[str, float]
+    noise: Noise
+
+
+def screen(model: Model, found: Fit, experiments: Sequence[Experiment], noise: Noise | None, seed: int) -> Screening:
+    """Judge every candidate on top of a fit.
+
+    Parameters
+    ----------
+    model : Model
+        With the effects of the fit.
+    found : Fit
+    experiments : sequence of Experiment
+        Training recordings.
+    noise : Noise or None
+        From the first screening; None learns it.
+    seed : int
+        Of the sign-flipped nulls.
+    """
+    assembly = found.assembly
+    states = [assembly.evaluate(e, found.theta) for e in experiments]
+    residuals = [assembly.residual(e, found.theta) for e in experiments]
+    baseline = _baseline(found, residuals, len(model.joints))
+    pool = [[(v, _columns(found, experiments, states, v)) for v in variants(assembly, p)] for p in library(model)]
+    smooth = [
+        [smooth_columns(e, s, c) for e, s in zip(experiments, states, strict=True)] for c in range(len(model.joints))
+    ]
+    if noise is None:
+        noise = _learn(experiments, residuals, baseline, pool, smooth)
+    white, plain = [], []
+    for c, parts in enumerate(baseline):
+        index, own = parts[0][0], [r[:, c] for r, _ in residuals]
+        columns = [x for _, x in parts]
+        innovations = noise.innovations[c]
+        white.append(Channel(index, noise.whiten(c, columns), noise.whiten(c, own), innovations, noise.blocks))
+        r = np.concatenate(own) / found.sigma[c]
+        block = np.arange(len(r)) * RAW_BLOCKS // len(r)
+        plain.append(Channel(index, np.concatenate(columns) / found.sigma[c], r, 0 * r, block))
+    n_parameters = len(found.theta)
+    evidence = Evidence(white, n_parameters, int(noise.blocks[-1]) + 1, NULLS, seed)
+    raw = Evidence(plain, n_parameters, RAW_BLOCKS, 1, seed)
+    energy = np.array([float(np.sum(c.residual**2)) for c in raw.channels])
+
+    judged: list[Judged] = []
+    null = np.zeros(NULLS)
+    limits: dict[str, float] = {}
+    log_size = np.log(evidence.size)
+    for options in pool:
+        best: tuple[float, float, Variant, Array, Products, dict[int, Parts]] | None = None
+        for subset in options[0][0].subsets():
+            first = _with(options[0][0], subset)
+            price = 0.5 * log_size * len(free_parameters(assembly, experiments[0], states[0], first))
+            for whole, columns in options:
+                variant = _with(whole, subset)
+                own = {c: [x[:, subset] for x in parts] for c, parts in columns.items()}
+                products = evidence.products([(c, noise.whiten(c, parts)) for c, parts in own.items()])
+                gain = evidence.gain(products, variant.low, variant.high)
+                if gain.total <= 0:
+                    continue
+                null = np.maximum(null, evidence.null_gains(products) - price)
+                if best is None or gain.total - price > best[0]:
+                    best = (gain.total - price, price, variant, gain.amplitudes, products, own)
+        if best is None:
+            continue
+        score, price, variant, amplitudes, products, own = best
+        plain_products = raw.products([(c, np.concatenate(x) / found.sigma[c]) for c, x in own.items()])
+        explained = 2 * raw.gain(plain_products, variant.low, variant.high).total / energy[list(own)].sum()
+        free = free_parameters(assembly, experiments[0], states[0], variant)
+        hold = tuple(p.name for p in variant.placed.effect.parameters if p.name not in free)
+        placed = replace(variant.placed, hold=hold)
+        signal = {c: noise.whiten(c, parts) @ amplitudes for c, parts in own.items()}
+        judged.append(Judged(variant, placed, amplitudes, score, price, explained, tuple(own), products, signal))
+    threshold = float(np.quantile(null, 0.99))
+    for j in judged:
+        if len(j.variant.amplitudes) == 1:
+            name = j.placed.effect.parameters[int(j.variant.amplitudes[0])].name
+            limits[f"{j.placed.key}.{name}"] = evidence.smallest(j.products, threshold + j.price)
+    nameless = {}
+    for c, parts in enumerate(smooth):
+        products = evidence.products([(c, noise.whiten(c, parts))])
+        free = np.full(products.right.shape[1], np.inf)
+        gain = evidence.gain(products, -free, free).total - 0.5 * len(free) * log_size
+        if gain > threshold and reliably_positive(evidence.fresh_gains(products, -free, free)):
+            plain_products = raw.products([(c, np.concatenate(parts) / found.sigma[c])])
+            nameless[c] = float(2 * np.sum(raw.fresh_gains(plain_products, -free, free)) / energy[c])
+    judged.sort(key=lambda j: -j.score)
+    return Screening(evidence, tuple(judged), threshold, nameless, limits, noise)
+
+
+def reliably_positive(gains: Array) -> bool:
+    """Mean over blocks left out clearly above zero: one-sided 5 %."""
+    return bool(np.mean(gains) > 1.7 * np.std(gains, ddof=1) / np.sqrt(len(gains)))
+
+
+def _with(variant: Variant, subset: NDArray[np.int_]) -> Variant:
+    """A variant reduced to some of its amplitudes."""
+    if not len(variant.amplitudes):
+        return variant
+    return replace(
+        variant, amplitudes=variant.amplitudes[subset], low=variant.low[subset], high=variant.high[subset]
+    )
+
+
+def _columns(
+    found: Fit, experiments: Sequence[Experiment], states: Sequence[Evaluation], variant: Variant
+) -> dict[int, Parts]:
+    """Columns per channel."""
+    per: dict[int, Parts] = {}
+    for e, state in zip(experiments, states, strict=True):
+        for channel, columns in candidate_columns(found.assembly, e, state, variant):
+            per.setdefault(channel, []).append(columns)
+    return per
+
+
+def _baseline(
+    found: Fit, residuals: Sequence[tuple[Array, list[Block]]], n_channels: int
+) -> list[list[tuple[NDArray[np.int_], Array]]]:
+    """For every channel and experiment: free parameters and their columns; those at a bound stay there."""
+    channels = []
+    for c in range(n_channels):
+        parts = []
+        for residual, blocks in residuals:
+            index, columns = gather(blocks, c)
+            keep = ~found.at_bound[index]
+            parts.append((index[keep], columns[:, keep] if len(index) else np.zeros((len(residual), 0))))
+        channels.append(parts)
+    return channels
+
+
+def _learn(
+    experiments: Sequence[Experiment],
+    residuals: Sequence[tuple[Array, list[Block]]],
+    baseline: Sequence[Sequence[tuple[NDArray[np.int_], Array]]],
+    pool: Sequence[Sequence[tuple[Variant, dict[int, Parts]]]],
+    smooth: Sequence[Parts],
+) -> Noise:
+    """Noise model of every channel from the saturated model: baseline, smooth curves, a middle variant of each candidate."""
+    columns: list[list[Array]] = [[np.concatenate(parts)] for parts in smooth]
+    for options in pool:
+        for c, parts in options[len(options) // 2][1].items():
+            columns[c].append(np.concatenate(parts))
+    segments = tuple(e.motion.band_segments() for e in experiments)
+    offsets = np.cumsum([0] + [len(r) for r, _ in residuals])
+    joined = [slice(s.start + o, s.stop + o) for o, parts in zip(offsets, segments, strict=False) for s in parts]
+    learnt = []
+    for c, own in enumerate(columns):
+        everything = np.concatenate([np.concatenate([x for _, x in baseline[c]]), *own], axis=1)
+        learnt.append(whitener(np.concatenate([r[:, c] for r, _ in residuals]), everything, joined))
+    lead = learnt[0][0].lead
+    blocks, count = [], 0
+    for e, parts in zip(experiments, segments, strict=True):
+        n = sum(max(0, s.stop - s.start - lead) for s in parts)
+        most = max(4, 24 // len(experiments))
+        pieces = int(np.clip(n / (2 * e.motion.band) / BLOCK, 2, most))
+        blocks.append(count + np.minimum(np.arange(n) * pieces // max(n, 1), pieces - 1))
+        count += pieces
+    whiteners, innovations = zip(*learnt, strict=True)
+    return Noise(whiteners, innovations, np.concatenate(blocks), segments)

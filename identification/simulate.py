@@ -1,0 +1,49 @@
+"""``snarelab simulate``: what every torque channel would read along a recorded motion, as a recording."""
+
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from ..errors import InputError
+from ..models.model_file import Model
+from ..models.rigid_body import RigidBody
+from .assembly import Assembly
+from .experiment import load_experiments, scales
+
+
+def simulate(model: Model, motion: str | Path) -> xr.Dataset:
+    """Torque of a model along the motion of a recording (inverse dynamics with every effect).
+
+    Parameters
+    ----------
+    model : Model
+        Its file must hold values of all parameters that its effects have; `identify` or `diagnose` saves such a file.
+    motion : path
+        Recording with the position of every joint; its torque is only used to choose the analysis band.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``q qd qdd tau`` of every joint, over the samples whose derivatives are known.
+
+    Raises
+    ------
+    InputError
+        A parameter without a value, or whatever is wrong with the recording.
+    """
+    experiment = load_experiments(model, [motion], RigidBody(model.tree))[0]
+    assembly = Assembly(model.tree, model.effects, None, scales([experiment]), model.values)
+    missing = [s.key for s in assembly.slots if s.key not in model.values]
+    if missing:
+        raise InputError(
+            f"{model.path}: no value for {missing[0]!r} ({len(missing)} missing); "
+            f"write it under [parameters], or let 'snarelab identify --save-model' do it"
+        )
+    recorded = experiment.motion
+    tau = assembly.torque(experiment, assembly.start)
+    variables = {}
+    for name, x in (("q", recorded.q), ("qd", recorded.qd), ("qdd", recorded.qdd), ("tau", tau)):
+        for c, joint in enumerate(model.joints):
+            variables[f"{name}.{joint}"] = ("time", np.ascontiguousarray(x[:, c]))
+    return xr.Dataset(variables, coords={"time": recorded.time}, attrs={"path": str(motion), "notes": list(recorded.notes)})

@@ -1,0 +1,65 @@
+"""The words of a diagnosis: verdict, evidence and experiments, as a test engineer would say them."""
+
+from collections.abc import Sequence
+
+from ..models.model_file import Placed
+from .diagnosis import ChannelFit, Finding
+
+
+def spoken(name: str) -> str:
+    """An effect's name without underscores."""
+    return name.replace("_", " ")
+
+
+def percent(share: float) -> str:
+    """A share (0 to 1) in per cent, two digits below ten."""
+    value = 100 * share
+    return f"{value:.2g} %" if abs(value) < 10 else f"{value:.0f} %"
+
+
+def evidence_sentence(
+    placed: Placed, explained: float, channels: Sequence[str], relative_with: float, relative_without: float
+) -> str:
+    """What an effect explains, and what happens on the held-out recording when it is taken out again."""
+    where = " and ".join(channels) if len(channels) < 3 else f"{len(channels)} channels"
+    return (
+        f"{placed.effect.sentence}: it explains {percent(explained)} of what the model so far left over on {where}, and "
+        f"taking it out again raises the error on the held-out recording from {percent(relative_with)} "
+        f"to {percent(relative_without)}"
+    )
+
+
+def experiment_sentence(placed: Placed, rival: Placed) -> str:
+    """The motion or measurement that would tell two effects apart."""
+    own, other = placed.effect.experiment, rival.effect.experiment
+    joint = rival.at.removeprefix("tau.").removeprefix("q.")
+    if other and other != own:
+        return other.format(at=joint)
+    return own.format(at=placed.at.removeprefix("tau.").removeprefix("q."))
+
+
+def verdict_sentence(findings: Sequence[Finding], fit: Sequence[ChannelFit], remainder: str) -> str:
+    """The first sentence of the report."""
+    worst = max(fit, key=lambda f: f.holdout.relative_before)
+    before, after = percent(worst.holdout.relative_before), percent(worst.holdout.relative_after)
+    if findings:
+        by_name: dict[str, list[str]] = {}
+        for f in findings:
+            by_name.setdefault(f.name, []).append(f.at)
+        named = [f"{spoken(name)} at {_listed(places)}" for name, places in by_name.items()]
+        return (
+            f"The model leaves out {_listed(named)}. With that added, the error of {worst.channel} on the recording that "
+            f"the fit never saw falls from {before} to {after}.{remainder}"
+        )
+    if remainder:
+        return f"Something is missing on {worst.channel} that no effect of the vocabulary explains.{remainder}"
+    return (
+        f"The model is adequate: nothing is left out that these recordings can show. "
+        f"On the recording that the fit never saw, the error of {worst.channel} is {before}."
+    )
+
+
+def _listed(items: Sequence[str]) -> str:
+    if len(items) < 2:
+        return "".join(items)
+    return ", ".join(items[:-1]) + " and " + items[-1]

@@ -1,0 +1,1 @@
+"""Rigid bodies, effects and model files: what is believed of the hardware."""

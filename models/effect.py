@@ -1,0 +1,114 @@
+"""What an effect is: named parameters and one CasADi law, shared by fit, simulation and FMU.
+
+An effect is one file in ``models/effects`` that ends in ``EFFECT = Effect(...)``. Its law is written once, for one
+place (a joint, a link, a sensor channel) and one instant, in CasADi symbols:
+
+- ``at="joint"``: the torque [N·m or N] that the drive must supply on top of the rigid body's.
+- ``at="link"``: the link's ten inertial parameters about its own frame, changed.
+- ``at="sensor"``: what the channel reads, given the true value.
+
+Hidden state (a spring's twist, a delayed signal) is a system of ordinary differential equations: ``states`` names it,
+``rate`` is its right-hand side, and the law may read it.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import casadi as ca
+
+Symbols = Mapping[str, ca.SX]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of an effect.
+
+    Parameters
+    ----------
+    name : str
+        Field's word, snake_case; with the effect's name and place it is unique in a model.
+    unit : str
+        Unit with ``T`` for the joint's torque unit (N·m or N) and ``S`` for its position unit (rad or m),
+        for example ``"T*s/S"`` for a viscous coefficient; pint's spelling otherwise.
+    zero : float
+        The value at which the effect vanishes (an amplitude), or a usual value (a shape).
+    low, high : float
+        Physical bounds. ``-inf`` and ``inf`` where there are none.
+    meaning : str
+        What it is, in a few words.
+    grid : tuple of float
+        Empty for an amplitude. For a shape parameter (nonlinear in the law): starting values that span what
+        hardware shows; relative to the scale named by ``relative_to`` if that is set.
+    relative_to : "", "speed", "travel", "torque" or "rate"
+        What the bounds' finite ends and the grid are multiples of: the joint's peak speed, its travel, its peak torque,
+        or peak torque per travel; "" for absolute numbers in SI units.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    zero: float = 0.0
+    low: float = float("-inf")
+    high: float = float("inf")
+    grid: tuple[float, ...] = ()
+    relative_to: Literal["", "speed", "travel", "torque", "rate"] = ""
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A named piece of physics: where it acts, what it is, and its law.
+
+    Parameters
+    ----------
+    name : str
+        The vocabulary's word; also the file's name.
+    family : str
+        Heading of the vocabulary it stands under.
+    at : "joint", "link" or "sensor"
+        Where it acts.
+    sentence : str
+        What a test engineer would say: "friction that does not depend on speed".
+    equation, source : str
+        The law in one line, and who gave it (author, year).
+    parameters : tuple of Parameter
+        In the law's order.
+    law : callable
+        ``law(s, p) -> ca.SX``. ``s`` maps signal names to symbols, ``p`` parameter names to symbols.
+        Joint signals: ``q qd qdd`` [S, S/s, S/s²], ``load`` [T] the rigid-body torque at the joint, ``inertia``
+        [T·s²/S] the joint's own entry of the mass matrix, ``time`` [s], ``temperature`` [°C],
+        ``speed_scale`` [S/s] the joint's peak speed in the recordings that the model was fitted to, saved with the model.
+        Link: ``s["phi"]``, 10 numbers (m, m·cx, m·cy, m·cz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz) about the link's frame, and
+        ``s["tip"]``, 3 numbers [m]: the next joint's origin, or the centre of mass of a last link; returns 10.
+        Sensor: ``value`` (true value), ``time``, and the joint signals of its joint.
+        A state is read as ``s[state_name]``.
+    states : tuple of str
+        Names of hidden states, all starting at rest (zero rate).
+    rate : callable or None
+        ``rate(s, p) -> list of ca.SX``, the states' time derivatives.
+    acts_on : "torque" or "position"
+        Joint effects only: the law gives a torque at the joint, or a displacement of the link behind the joint
+        (a vector: displacement, its rate, its second rate), which changes the torque of every joint.
+    dissipates : bool
+        True where the law's power ``qd * torque`` can never be negative; the contract test holds it to that.
+    contains : tuple of str
+        Simpler effects that are special cases of this one. A search names the simpler one first, and this one only for
+        what is then left (the principle of marginality: Nelder 1977).
+    experiment : str
+        The motion or measurement that shows this effect apart from others, as an instruction: "move {at} slowly ...".
+    """
+
+    name: str
+    family: str
+    at: Literal["joint", "link", "sensor"]
+    sentence: str
+    equation: str
+    source: str
+    parameters: tuple[Parameter, ...]
+    law: Callable[[Symbols, Symbols], ca.SX]
+    states: tuple[str, ...] = ()
+    rate: Callable[[Symbols, Symbols], list[ca.SX]] | None = None
+    acts_on: Literal["torque", "position"] = "torque"
+    dissipates: bool = False
+    contains: tuple[str, ...] = ()
+    experiment: str = ""

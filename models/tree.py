@@ -1,0 +1,95 @@
+"""A tree of rigid bodies on a fixed base: joints in order, and one moving link behind each.
+
+Frames: joint i's frame sits at a fixed pose on the parent link; the link behind it has the same frame when the joint is
+at zero, turned about (revolute) or moved along (prismatic) ``axis`` otherwise. The base is the world frame.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ..errors import InputError
+from .inertia import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """One degree of freedom.
+
+    Parameters
+    ----------
+    name : str
+    kind : "revolute" or "prismatic"
+    axis : array (3,)
+        Unit vector in the joint's frame.
+    parent : int
+        Index of the joint (and link) that carries it; -1 for the base.
+    rotation, translation : array (3, 3), (3,)
+        Fixed pose of the joint's frame in the parent link's frame [–, m].
+    lower, upper : float
+        Position limits [rad or m]; infinite where there are none.
+    speed : float
+        Velocity limit [rad/s or m/s].
+    """
+
+    name: str
+    kind: Literal["revolute", "prismatic"]
+    axis: Array
+    parent: int
+    rotation: Array
+    translation: Array
+    lower: float = float("-inf")
+    upper: float = float("inf")
+    speed: float = float("inf")
+
+
+@dataclass(frozen=True, eq=False)
+class Link:
+    """The moving body behind a joint, with everything welded to it: name and inertial parameters phi (10,)."""
+
+    name: str
+    phi: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Tree:
+    """Joints and links of a fixed-base tree; ``links[i]`` is moved by ``joints[i]``, parents stand before children.
+
+    Raises
+    ------
+    InputError
+        Where there is no joint, links and joints differ in number, a parent stands after its child, or an axis is not
+        a unit vector.
+    """
+
+    name: str
+    joints: tuple[Joint, ...]
+    links: tuple[Link, ...]
+    gravity: Array
+
+    def __post_init__(self) -> None:
+        """Refuse what the recursions could not run through."""
+        if not self.joints or len(self.joints) != len(self.links):
+            raise InputError(
+                f"{self.name}: {len(self.joints)} joints and {len(self.links)} links; "
+                "give one link per joint, and at least one"
+            )
+        for index, joint in enumerate(self.joints):
+            if not -1 <= joint.parent < index:
+                raise InputError(
+                    f"{self.name}: joint '{joint.name}' is number {index} and has parent {joint.parent}; "
+                    f"allowed are -1 to {index - 1}: order parents before children"
+                )
+            if abs(np.linalg.norm(joint.axis) - 1.0) > 1e-9:
+                raise InputError(f"{self.name}: joint '{joint.name}' has axis {joint.axis}; give it length 1")
+
+    @property
+    def n_joints(self) -> int:
+        """Number of joints J."""
+        return len(self.joints)
+
+    @property
+    def phi(self) -> Array:
+        """Inertial parameters of all links, one after the other, shape (10 * n_joints,)."""
+        return np.concatenate([link.phi for link in self.links])

@@ -1,0 +1,252 @@
+"""A URDF file as a `Tree`: Drake reads the kinematics, the inertias are taken as published.
+
+Drake's parser replaces an inertia that no body can have by another one, with a warning, and ends the process on limits
+that cross. Inertias and limits are therefore read here; an inertia is refused with the nearest physical one.
+Joint damping and friction in the file are not read: they are effects, to be identified. A limit that the file leaves
+out is infinite.
+"""
+
+import re
+import xml.etree.ElementTree as ET
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from xml.parsers import expat
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
+
+from ..errors import InputError
+from . import inertia
+from .inertia import Array
+from .tree import Joint, Link, Tree
+
+_KINDS = ("revolute", "continuous", "prismatic", "fixed")
+_KINEMATIC = ("parent", "child", "origin", "axis")
+_INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+
+
+def load_urdf(path: str | Path, gravity: ArrayLike = (0.0, 0.0, -9.81)) -> Tree:
+    """Read a URDF; its root link stands still in the world, links behind fixed joints are welded to what carries them.
+
+    Parameters
+    ----------
+    path : str or Path
+        Meshes need not be there: shapes are not read.
+    gravity : array (3,)
+        In the world frame [m/s²].
+
+    Raises
+    ------
+    InputError
+        Where the file is missing or is no URDF of one tree; a joint is not revolute, continuous, prismatic or fixed, or
+        mimics another; nothing moves; an inertia is not physical; or a joint moves no mass.
+    """
+    path = Path(path)
+    down = np.asarray(gravity, float)
+    if down.shape != (3,) or not np.isfinite(down).all():
+        raise InputError(f"{path}: gravity is {gravity}; give three finite numbers [m/s²]")
+    robot = _robot(path)
+    root = _checked_topology(path, robot)
+    parameters = {link.get("name", ""): _parameters(path, link) for link in robot.findall("link")}
+    limits = {joint.get("name", ""): _limits(path, joint) for joint in robot.findall("joint")}
+
+    joints: list[Joint] = []
+    names: list[str] = []
+    moved: list[Array] = []
+    for drake_joint, parent, rotation, translation in _walk(_parse(path, robot, root), root):
+        child = drake_joint.child_body().name()
+        if drake_joint.type_name() == "weld":
+            if parent >= 0:
+                moved[parent] = moved[parent] + inertia.transform(parameters[child], rotation, translation)
+            continue
+        kind = "revolute" if drake_joint.type_name() == "revolute" else "prismatic"
+        axis = drake_joint.revolute_axis() if kind == "revolute" else drake_joint.translation_axis()
+        name = drake_joint.name()
+        joints.append(Joint(name, kind, axis, parent, rotation, translation, *limits[name]))
+        names.append(child)
+        moved.append(parameters[child])
+    if not joints:
+        raise InputError(f"{path}: no joint moves; give at least one revolute, continuous or prismatic joint")
+    links = [Link(name, phi) for name, phi in zip(names, moved, strict=True)]
+    _check_mass_outboard(path, joints, links)
+    return Tree(robot.get("name", path.stem), tuple(joints), tuple(links), down)
+
+
+def _robot(path: Path) -> ET.Element:
+    """The <robot> element; prefixes such as drake: stay as written, declared or not."""
+    builder, parser = ET.TreeBuilder(), expat.ParserCreate()
+    parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
+    try:
+        parser.Parse(path.read_bytes(), True)
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file; name an existing URDF") from None
+    except OSError as problem:
+        raise InputError(f"{path}: cannot be read ({problem.strerror}); name a readable URDF") from None
+    except expat.ExpatError as problem:
+        raise InputError(f"{path}: not XML ({problem}); give a URDF") from None
+    robot = builder.close()
+    if robot.tag != "robot":
+        raise InputError(f"{path}: root element is <{robot.tag}>; a URDF has <robot>: convert the file")
+    if any(element.tag.startswith("xacro:") for element in robot.iter()):
+        raise InputError(f"{path}: holds xacro macros; expand it first: xacro {path.name} > expanded.urdf")
+    return robot
+
+
+def _checked_topology(path: Path, robot: ET.Element) -> str:
+    """Name of the one root link; refuses what is not a tree of one-axis joints."""
+    for element in robot:
+        if element.tag.startswith("drake:") and element.tag != "drake:collision_filter_group":
+            raise InputError(f"{path}: <{element.tag}> is not supported; use URDF's own joints, or remove it")
+    for tag in ("link", "joint"):
+        twice = [name for name, count in Counter(e.get("name") for e in robot.findall(tag)).items() if count > 1]
+        if twice:
+            raise InputError(f"{path}: {tag} name '{twice[0]}' is given twice; give every {tag} its own name")
+    carried: dict[str, str] = {}
+    for joint in robot.findall("joint"):
+        name, kind = joint.get("name"), joint.get("type")
+        if kind not in _KINDS:
+            raise InputError(f"{path}: joint '{name}' is of type '{kind}'; allowed are {', '.join(_KINDS)}")
+        if joint.find("mimic") is not None:
+            raise InputError(f"{path}: joint '{name}' mimics another, which is not supported; fix it or free it")
+        for part, key in (("origin", "xyz"), ("origin", "rpy"), ("axis", "xyz")):
+            found = joint.find(part)
+            if found is not None and key in found.attrib:
+                _numbers(path, f"joint '{name}': {part} {key}", found.get(key), 3)
+        child = joint.find("child")
+        link = "" if child is None else child.get("link", "")
+        if link in carried:
+            raise InputError(
+                f"{path}: link '{link}' hangs on joints '{carried[link]}' and '{name}'; "
+                "closed loops are not supported: cut one"
+            )
+        carried[link] = name or ""
+    roots = [link.get("name", "") for link in robot.findall("link") if link.get("name", "") not in carried]
+    if len(roots) != 1:
+        raise InputError(f"{path}: root links are {roots}; give exactly one link that is no joint's child")
+    return roots[0]
+
+
+def _numbers(path: Path, where: str, text: str | None, count: int) -> Array:
+    try:
+        values = np.array([float(word) for word in (text or "").split()])
+    except ValueError:
+        values = np.empty(0)
+    if len(values) != count or not np.isfinite(values).all():
+        raise InputError(f"{path}: {where} is {text!r}; give {count} finite number{'s' * (count > 1)}")
+    return values
+
+
+def _limits(path: Path, joint: ET.Element) -> tuple[float, float, float]:
+    """Lower and upper position limit and speed limit of one joint; infinite where the file has none."""
+    limit, name = joint.find("limit"), f"joint '{joint.get('name')}'"
+    given = {} if limit is None else limit.attrib
+    keys = ("velocity",) if joint.get("type") == "continuous" else ("lower", "upper", "velocity")
+    values = {key: float(_numbers(path, f"{name}: limit {key}", given[key], 1)[0]) for key in keys if key in given}
+    lower, upper, speed = values.get("lower", -np.inf), values.get("upper", np.inf), values.get("velocity", np.inf)
+    if lower > upper or speed < 0:
+        raise InputError(f"{path}: {name} has limits {given}; give lower <= upper and a velocity of at least 0")
+    return lower, upper, speed
+
+
+def _parameters(path: Path, link: ET.Element) -> Array:
+    """Inertial parameters phi (10,) of one link as published, about its own frame."""
+    inertial = link.find("inertial")
+    if inertial is None:
+        return np.zeros(10)
+    name = f"link '{link.get('name')}'"
+    empty = ET.Element("absent")
+    origin, mass_element, tensor = (inertial.find(tag) for tag in ("origin", "mass", "inertia"))
+    pose = (empty if origin is None else origin).attrib
+    com = _numbers(path, f"{name}: inertial origin xyz", pose.get("xyz", "0 0 0"), 3)
+    angles = _numbers(path, f"{name}: inertial origin rpy", pose.get("rpy", "0 0 0"), 3)
+    given_mass = (empty if mass_element is None else mass_element).get("value")
+    mass = float(_numbers(path, f"{name}: mass value", given_mass, 1)[0])
+    given = [(empty if tensor is None else tensor).get(key) for key in _INERTIA]
+    moments = [float(_numbers(path, f"{name}: {key}", text, 1)[0]) for key, text in zip(_INERTIA, given, strict=True)]
+    if mass < 0 or (mass == 0 and np.any(moments)):
+        raise InputError(
+            f"{path}: {name} has mass {mass:g} kg, inertia {moments}; give it a mass above 0, or no <inertial>"
+        )
+    about_com = np.concatenate([[mass], np.zeros(3), moments])
+    if not inertia.is_physical(about_com):
+        _refuse_inertia(path, name, mass, inertia.symmetric(moments))
+    return inertia.transform(about_com, Rotation.from_euler("xyz", angles).as_matrix(), com)
+
+
+def _refuse_inertia(path: Path, name: str, mass: float, matrix: Array) -> None:
+    """Say what is wrong with an inertia and what the nearest possible one is, ready to paste."""
+    small, middle, large = np.linalg.eigvalsh(matrix)
+    fault = f"{small:.6g} is negative" if small < 0 else f"{large:.6g} > {small:.6g} + {middle:.6g}"
+    nearest = inertia.nearest_physical(mass, np.zeros(3), matrix)[4:]
+    scale = np.abs(nearest).max() * 1e-12
+    paste = " ".join(f'{key}="{0.0 if abs(x) < scale else x:.12g}"' for key, x in zip(_INERTIA, nearest, strict=True))
+    raise InputError(
+        f"{path}: {name} has an inertia that no body can have: principal moments "
+        f"{small:.6g}, {middle:.6g}, {large:.6g} kg·m² ({fault}); "
+        f"correct it, or take the nearest possible one: <inertia {paste}/>"
+    )
+
+
+def _parse(path: Path, robot: ET.Element, root: str) -> Any:
+    """Drake's plant of the bare kinematics, its root welded to the world."""
+    # imported here: Drake takes a second to load, and most commands refuse bad input before they need it
+    from pydrake.multibody.parsing import Parser
+    from pydrake.multibody.plant import MultibodyPlant
+
+    bare = ET.Element("robot", {"name": robot.get("name", path.stem)})
+    for element in robot:
+        if element.tag in ("link", "joint"):
+            kept = ET.SubElement(bare, element.tag, element.attrib)
+            kept.extend([part for part in element if element.tag == "joint" and part.tag in _KINEMATIC])
+    plant = MultibodyPlant(0.0)
+    try:
+        Parser(plant).AddModelsFromString(ET.tostring(bare, encoding="unicode"), "urdf")
+        if root != "world":
+            plant.WeldFrames(plant.world_frame(), plant.GetBodyByName(root).body_frame())
+        plant.Finalize()
+    except (RuntimeError, ValueError) as problem:
+        reason = re.sub(r"^\S*literal-string\S*\s*(error: )?", "", " ".join(str(problem).split()))
+        raise InputError(f"{path}: Drake cannot read it: {reason}") from None
+    return plant
+
+
+def _walk(plant: Any, root: str) -> Iterator[tuple[Any, int, Array, Array]]:
+    """Drake's joints, parents first: (joint, index of the moving joint that carries it or -1, rotation, translation).
+
+    The pose is the joint's frame in its carrier's link frame, at rest; for a weld that of the body welded on.
+    """
+    from pydrake.math import RigidTransform
+
+    outward: dict[str, list[Any]] = {}
+    for index in plant.GetJointIndices():
+        joint = plant.get_joint(index)
+        outward.setdefault(joint.parent_body().name(), []).append(joint)
+    pending = [(joint, -1, RigidTransform()) for joint in reversed(outward.get(root, []))]
+    moving = 0
+    while pending:
+        joint, carrier, base = pending.pop()
+        pose = base @ joint.frame_on_parent().GetFixedPoseInBodyFrame()
+        if joint.type_name() == "weld":
+            pose = pose @ joint.X_FM() @ joint.frame_on_child().GetFixedPoseInBodyFrame().inverse()
+        yield joint, carrier, pose.rotation().matrix(), pose.translation()
+        if joint.type_name() == "weld":
+            behind, at = carrier, pose
+        else:
+            behind, at, moving = moving, RigidTransform(), moving + 1
+        pending.extend((child, behind, at) for child in reversed(outward.get(joint.child_body().name(), [])))
+
+
+def _check_mass_outboard(path: Path, joints: list[Joint], links: list[Link]) -> None:
+    """Refuse a joint with no mass behind it: its motion would have no torque, and its mass matrix no inverse."""
+    masses = [float(link.phi[0]) for link in links]
+    for i in reversed(range(len(joints))):
+        if masses[i] <= 0:
+            raise InputError(
+                f"{path}: joint '{joints[i].name}' moves no mass: link '{links[i].name}' and all beyond it have none; "
+                "give one an <inertial>, or make the joint fixed"
+            )
+        if joints[i].parent >= 0:
+            masses[joints[i].parent] += masses[i]

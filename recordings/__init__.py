@@ -1,0 +1,22 @@
+"""Recordings of tests: reading, units, conditioning."""
+
+from .columns import nearest
+from .find import find_recording
+from .read import read_recording
+from .signals import JointKind, Signal, default_unit
+from .timebase import Sampling, sampling
+from .units import UNITS
+from .write import write_recording
+
+__all__ = [
+    "UNITS",
+    "JointKind",
+    "Sampling",
+    "Signal",
+    "default_unit",
+    "find_recording",
+    "nearest",
+    "read_recording",
+    "sampling",
+    "write_recording",
+]

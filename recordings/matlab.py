@@ -1,0 +1,40 @@
+"""MATLAB files: version 4 to 7 through SciPy, version 7.3 (which is HDF5) through h5py.
+
+Variables are columns or single numbers, fields of a struct are ``"struct/field"``.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import h5py
+import numpy as np
+import scipy.io
+from scipy.io.matlab import mat_struct
+
+from ..errors import InputError
+from .columns import Columns, sorted_by_kind
+from .hdf5 import datasets
+from .matlab_structure import check_structure
+
+
+def read(path: Path) -> Columns:
+    """Read every numeric variable of a MATLAB file; cells, objects and struct arrays cannot be columns."""
+    if h5py.is_hdf5(path):
+        return sorted_by_kind(path, datasets(path, matlab=True))
+    try:
+        check_structure(path.read_bytes())
+        content = scipy.io.loadmat(path, squeeze_me=True, struct_as_record=False)
+    except Exception as error:  # a damaged file makes SciPy raise anything from TypeError to zlib.error
+        raise InputError(f"{path}: cannot be read as a MATLAB file; it is damaged or of another format") from error
+    variables = {name: value for name, value in content.items() if isinstance(name, str) and not name.startswith("__")}
+    return sorted_by_kind(path, dict(_flat(variables)))
+
+
+def _flat(variables: dict[str, object], prefix: str = "") -> Iterator[tuple[str, object]]:
+    for name, value in variables.items():
+        if isinstance(value, mat_struct):
+            yield from _flat({field: getattr(value, field) for field in vars(value)["_fieldnames"]}, f"{prefix}{name}/")
+        elif isinstance(value, (np.ndarray, np.generic, int, float)):
+            yield f"{prefix}{name}", value
+        else:
+            yield f"{prefix}{name}", np.array(None, dtype=object)

@@ -1,0 +1,239 @@
+"""From a file to an ``xarray.Dataset`` in SI units."""
+
+import math
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+import pint
+import xarray as xr
+
+from ..errors import InputError
+from . import csv_table, hdf5, matlab, parquet, ros_bag
+from .columns import Columns, nearest, split_header
+from .signals import FORMS, JointKind, Signal, default_unit, is_signal, joint_of
+from .timebase import UNIFORM, sampling
+from .units import convert, fits, parse_unit
+
+_READERS: Mapping[str, Callable[[Path], Columns]] = {
+    ".csv": csv_table.read,
+    ".tsv": csv_table.read,
+    ".parquet": parquet.read,
+    ".mat": matlab.read,
+    ".h5": hdf5.read,
+    ".hdf5": hdf5.read,
+}
+_BAGS = (".db3", ".mcap")
+_LISTED_GAPS = 20
+
+
+def read_recording(
+    path: str | Path, signals: Mapping[str, Signal] | None = None, joint_kinds: Mapping[str, JointKind] | None = None
+) -> xr.Dataset:
+    """Read a recording: CSV, Parquet, MATLAB, HDF5, or a ROS 2 bag (folder, .db3 or .mcap).
+
+    Parameters
+    ----------
+    path : str or Path
+        The file, or a bag's folder.
+    signals : mapping of str to Signal
+        A model's [signals]: where each signal is found. A mapped signal wins over a column of its own name.
+    joint_kinds : mapping of str to "revolute" or "prismatic"
+        Kind of each joint. An unknown kind is taken from the dimension of a unit that the file gives for that joint;
+        where it gives none, the joint is revolute.
+
+    Returns
+    -------
+    xarray.Dataset
+        One float64 variable of shape (n_samples,) per recognised signal over ``time`` [s], in its SI default unit.
+        ``attrs["unit"]`` and ``attrs["column"]`` of a variable: its unit as pint reads it, and the column it came from.
+        ``attrs["path"]`` and ``attrs["notes"]`` of the dataset: the file, and what the reader saw, one sentence each
+        (gaps, missing samples, uneven sampling, columns left out). Missing samples are NaN; nothing is interpolated.
+
+    Raises
+    ------
+    InputError
+        The file is missing, damaged, empty or of an unknown kind; a mapped column is missing; there is no time, or it
+        does not increase; a unit does not fit; a channel holds text, infinities or no number, or is not as long as
+        time.
+    """
+    path, signals = Path(path), signals or {}
+    kinds: dict[str, JointKind] = dict(joint_kinds or {})
+    for name in signals:
+        if not is_signal(name):
+            raise InputError(f"{path}: {name!r} in [signals] is not a signal's name; allowed are {FORMS}")
+    columns = _load(path, signals)
+    headers = _signal_headers(columns, signals)
+    time_header, time = _time(columns, signals, headers)
+    raw = {name: columns.column(header, name, len(time)) for name, header in headers.items() if name != "time"}
+    if not raw:
+        raise InputError(
+            f"{path}: none of its {len(columns.names)} columns is a signal ({_some(columns.names)}); "
+            "map them in [signals]"
+        )
+    units = {name: _unit(columns, header, signals.get(name)) for name, (header, _) in raw.items()}
+    for name, unit in units.items():
+        joint = joint_of(name)
+        if joint and joint not in kinds and unit is not None and fits(unit, default_unit(name, "prismatic")):
+            kinds[joint] = "prismatic"
+    variables = {}
+    for name, (header, values) in raw.items():
+        wanted = default_unit(name, kinds.get(joint_of(name) or name, "revolute"))
+        values = _in_unit(columns, header, name, values, units[name], wanted, signals.get(name))
+        _check_numbers(columns, header, values)
+        variables[name] = ("time", values, {"unit": wanted, "column": header})
+    dataset = xr.Dataset(variables, {"time": ("time", time, {"unit": "s", "column": time_header})})
+    used = {"time": time_header} | {name: header for name, (header, _) in raw.items()}
+    gains = {signal.gain for signal in signals.values() if isinstance(signal.gain, str)}
+    left_out = _left_out(columns, used, gains | {gain.rpartition("[")[0] for gain in gains})
+    return dataset.assign_attrs(path=str(path), notes=[*columns.notes, *left_out, *_quality(dataset)])
+
+
+def _load(path: Path, signals: Mapping[str, Signal]) -> Columns:
+    if not path.exists():
+        raise InputError(f"{path}: there is no such file; check the path")
+    suffix = path.suffix.lower()
+    if path.is_dir() or suffix in _BAGS:
+        return ros_bag.read(path, {name: signal.column for name, signal in signals.items()})
+    if suffix not in _READERS:
+        raise InputError(
+            f"{path}: suffix {suffix!r} is not one of a recording; known are {' '.join([*_READERS, *_BAGS])} "
+            "and the folder of a ROS 2 bag"
+        )
+    if path.stat().st_size == 0:
+        raise InputError(f"{path}: the file is empty; record it again")
+    try:
+        return _READERS[suffix](path)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror or error}); check the file's permissions") from error
+
+
+def _signal_headers(columns: Columns, signals: Mapping[str, Signal]) -> dict[str, str]:
+    """Header of each signal: the one that [signals] names, else the first that carries the signal's name.
+
+    A struct or group is read as a dot: ``q/joint1`` is ``q.joint1``.
+    """
+    headers = {name: signal.column for name, signal in signals.items()}
+    for header in [*columns.arrays, *columns.problems]:
+        name = split_header(header)[0].replace("/", ".")
+        if is_signal(name):
+            headers.setdefault(name, header)
+    return headers
+
+
+def _left_out(columns: Columns, used: Mapping[str, str], gains: set[str]) -> list[str]:
+    """Notes on the columns that no signal came from; ``used`` maps signal to header."""
+    notes, unknown = [], []
+    for header in [*columns.arrays, *columns.problems]:
+        bare = split_header(header)[0]
+        name = bare.replace("/", ".")
+        if header in used.values() or {header, bare} & gains:
+            continue
+        if name in used:
+            notes.append(f"column {header!r} is ignored; {name} is taken from {used[name]!r}")
+        else:
+            unknown.append(header)
+    if unknown:
+        notes.append(f"ignored, because no signal has such a name: {_some(unknown)}")
+    return notes
+
+
+def _time(columns: Columns, signals: Mapping[str, Signal], headers: Mapping[str, str]) -> tuple[str, np.ndarray]:
+    """Header of the time column, and the time itself [s], checked to increase."""
+    if "time" not in headers:
+        raise InputError(
+            f"{columns.path}: there is no column 'time' among {_some(columns.names)}; rename one, or map it: "
+            f'[signals] "time" = {{ column = "{nearest("time", columns.names)}", unit = "s" }}'
+        )
+    header, values = columns.column(headers["time"], "time")
+    if len(values) < 2:
+        raise InputError(f"{columns.path}: has {len(values)} rows; at least 2 are wanted")
+    values = _in_unit(
+        columns, header, "time", values, _unit(columns, header, signals.get("time")), "s", signals.get("time")
+    )
+    bad = np.flatnonzero(~np.isfinite(values))
+    if bad.size:
+        raise InputError(
+            f"{columns.path}: column {header!r}: time is missing in row {columns.row(int(bad[0]))}; delete that row"
+        )
+    bad = np.flatnonzero(np.diff(values) <= 0.0)
+    if bad.size:
+        before, after = float(values[bad[0]]), float(values[bad[0] + 1])
+        raise InputError(
+            f"{columns.path}: column {header!r}: time {'repeats' if before == after else 'goes backwards'} in row "
+            f"{columns.row(int(bad[0]) + 1)}: {after!r} s after {before!r} s; sort or cut the recording"
+        )
+    return header, values
+
+
+def _unit(columns: Columns, header: str, signal: Signal | None) -> pint.Unit | None:
+    """The unit that [signals] or the header gives a column; None where neither does, or a gain settles it."""
+    if signal is not None and signal.gain is not None:
+        return None
+    text = signal.unit if signal is not None and signal.unit is not None else split_header(header)[1]
+    return None if text is None else parse_unit(text, header, columns.path)
+
+
+def _in_unit(
+    columns: Columns,
+    header: str,
+    name: str,
+    values: np.ndarray,
+    unit: pint.Unit | None,
+    wanted: str,
+    signal: Signal | None,
+) -> np.ndarray:
+    if signal is not None and signal.gain is not None:
+        gain = columns.scalar(signal.gain, name) if isinstance(signal.gain, str) else float(signal.gain)
+        if not math.isfinite(gain) or gain == 0.0:
+            raise InputError(
+                f"{columns.path}: gain {signal.gain!r} of [signals] {name!r} is {gain}; a number but 0 is wanted"
+            )
+        return values * gain
+    if unit is None:
+        return values
+    if not fits(unit, wanted):
+        raise InputError(
+            f"{columns.path}: column {header!r}: unit '{unit:~P}' ({unit.dimensionality}) does not fit {name}, "
+            f"which is in {wanted} or a unit of that dimension; correct the unit or the joint's kind"
+        )
+    return convert(values, unit, wanted)
+
+
+def _check_numbers(columns: Columns, header: str, values: np.ndarray) -> None:
+    infinite = np.flatnonzero(np.isinf(values))
+    if infinite.size:
+        raise InputError(
+            f"{columns.path}: column {header!r}: row {columns.row(int(infinite[0]))} is infinite; "
+            "write NaN where a sample is missing"
+        )
+    if np.isnan(values).all():
+        raise InputError(
+            f"{columns.path}: column {header!r}: holds no number in any of its {len(values)} rows; "
+            "remove the column or record the channel"
+        )
+
+
+def _quality(dataset: xr.Dataset) -> list[str]:
+    """Notes on missing samples, gaps and uneven sampling."""
+    size = dataset.sizes["time"]
+    counts = {name: int(np.isnan(values.to_numpy()).sum()) for name, values in dataset.data_vars.items()}
+    notes = [f"{name}: {count} of {size} samples are missing" for name, count in counts.items() if count]
+    rate = sampling(dataset)
+    notes += [
+        f"gap of {stop - start:.6g} s from {start:.9g} s to {stop:.9g} s" for start, stop in rate.gaps[:_LISTED_GAPS]
+    ]
+    if len(rate.gaps) > _LISTED_GAPS:
+        total = sum(stop - start for start, stop in rate.gaps)
+        notes.append(
+            f"{len(rate.gaps)} gaps in all, {total:.6g} s of {float(np.ptp(dataset['time'].to_numpy())):.6g} s"
+        )
+    if rate.jitter > UNIFORM:
+        notes.append(
+            f"uneven sampling: median period {rate.period:.6g} s, steps off by up to {100 * rate.jitter:.3g} %"
+        )
+    return notes
+
+
+def _some(names: list[str], most: int = 8) -> str:
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")

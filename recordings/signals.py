@@ -1,0 +1,79 @@
+"""The names a recording's columns can have, and their SI default units.
+
+``time``; of a joint ``q qd qdd q_link tau temp``; ``tension.<sling>``; of a body ``pos quat vel omega``; of a wrench
+sensor ``force torque``; ``angle.ring``.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+JointKind = Literal["revolute", "prismatic"]
+
+_JOINT = {
+    "q": {"revolute": "rad", "prismatic": "m"},
+    "q_link": {"revolute": "rad", "prismatic": "m"},
+    "qd": {"revolute": "rad/s", "prismatic": "m/s"},
+    "qdd": {"revolute": "rad/s^2", "prismatic": "m/s^2"},
+    "tau": {"revolute": "N*m", "prismatic": "N"},
+}
+_SCALAR = {"tension": "N", "temp": "degC"}
+_VECTOR = {"pos": "m", "quat": "dimensionless", "vel": "m/s", "omega": "rad/s", "force": "N", "torque": "N*m"}
+_SINGLE = {"time": "s", "angle.ring": "rad"}
+
+#: How signal names look, for messages.
+FORMS = (
+    "time, q|qd|qdd|q_link|tau|temp.<joint>, tension.<sling>, pos|vel|omega.<body>.x|y|z, quat.<body>.w|x|y|z, "
+    "force|torque.<sensor>.x|y|z, angle.ring"
+)
+
+
+@dataclass(frozen=True)
+class Signal:
+    """Where a model's signal is found in a recording that has names of its own.
+
+    Parameters
+    ----------
+    column : str
+        The recording's column: a header, ``"group/name"`` or ``"name[0]"`` in MATLAB and HDF5 files,
+        ``"/topic/field.path"`` in ROS 2 bags.
+    unit : str, optional
+        The column's unit; the header's own unit, or the signal's default, where it is left out.
+        With a gain it only documents the raw unit.
+    gain : float or str, optional
+        Signal's default unit (N·m or N for ``tau``) per unit of the column, or the name of a number in the recording.
+    """
+
+    column: str
+    unit: str | None = None
+    gain: float | str | None = None
+
+
+def is_signal(name: str) -> bool:
+    """True when ``name`` is one a recording's column can have."""
+    family, _, place = name.partition(".")
+    if name in _SINGLE:
+        return True
+    if family in _VECTOR:
+        body, _, axis = place.rpartition(".")
+        return bool(body) and axis in (("w", "x", "y", "z") if family == "quat" else ("x", "y", "z"))
+    return bool(place) and (family in _JOINT or family in _SCALAR)
+
+
+def joint_of(name: str) -> str | None:
+    """The joint of a signal whose unit depends on the joint's kind (``q qd qdd q_link tau``), else None."""
+    family, _, joint = name.partition(".")
+    return joint if family in _JOINT else None
+
+
+def default_unit(name: str, kind: JointKind = "revolute") -> str:
+    """SI default unit of a signal, as pint reads it; ``kind`` matters for joint signals only."""
+    family = name.partition(".")[0]
+    if family in _JOINT:
+        return _JOINT[family][kind]
+    return (_SINGLE | _SCALAR | _VECTOR)[name if name in _SINGLE else family]
+
+
+def joint_signals(names: Iterable[str]) -> list[str]:
+    """Those of ``names`` that are a joint's motion or torque."""
+    return [name for name in names if joint_of(name) is not None]

@@ -1,0 +1,32 @@
+"""Writing a recording."""
+
+import os
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import xarray as xr
+
+from ..errors import InputError
+
+
+def write_recording(dataset: xr.Dataset, path: str | Path) -> None:
+    """Write a recording as CSV or Parquet, by the suffix of ``path``: time first, plain names, SI units, all digits.
+
+    The file appears whole or not at all. Raises InputError for another suffix, or where the file cannot be written.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in (".csv", ".parquet"):
+        raise InputError(f"{path}: a recording is written as .csv or .parquet, not {path.suffix!r}; change the suffix")
+    table = dataset.to_dataframe().reset_index()
+    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    try:
+        if path.suffix.lower() == ".csv":
+            table.to_csv(partial, index=False, lineterminator="\n")
+        else:
+            pq.write_table(pa.Table.from_pandas(table, preserve_index=False), partial)
+        os.replace(partial, path)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror or error}); choose another folder") from error
+    finally:
+        partial.unlink(missing_ok=True)

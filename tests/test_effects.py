@@ -1,0 +1,350 @@
+"""One contract for every effect found in models/effects."""
+
+import itertools
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pint
+import pytest
+import snarelab.models.effects
+from scipy.integrate import solve_ivp
+from scipy.optimize import least_squares
+from snarelab.errors import InputError
+from snarelab.models.effects import FAMILIES, effects, get_effect
+from snarelab.models.hidden_state import THROUGH, Evaluation, evaluate_law
+
+VOCABULARY = """
+viscous_friction coulomb_friction asymmetric_friction stribeck_friction makkar_friction quadratic_friction
+load_dependent_friction position_dependent_friction presliding_hysteresis joint_elasticity backlash torque_ripple
+rotor_inertia link_torsion link_bending payload_mass com_offset inertia_error harness_stiffness slide_friction
+sling_tension_error suspension_sway hang_point_clearance external_torque flexible_appendage propellant_slosh
+wheel_friction contact_friction contact_damping contact_stiffness cable_damping cable_pretension umbilical_stiffness
+sensor_bias sensor_drift sensor_gain sensor_delay
+"""
+NAMES = list(effects())
+DT = 2e-3
+TIME = np.arange(4000) * DT
+
+
+def wave(time, *terms):
+    """Sum of amplitude * sin(2 pi frequency time + phase), and its first two derivatives."""
+    total = np.zeros((3, *np.shape(time)))
+    for amplitude, frequency, phase in terms:
+        turn = 2 * np.pi * frequency
+        total += amplitude * np.stack(
+            [
+                np.sin(turn * time + phase),
+                turn * np.cos(turn * time + phase),
+                -(turn**2) * np.sin(turn * time + phase),
+            ]
+        )
+    return total
+
+
+def load(time):
+    return wave(time, (20.0, 0.31, 0.4), (9.0, 1.7, 1.1), (4.0, 3.3, 2.0))[0]
+
+
+def value(time):
+    return wave(time, (2.0, 0.41, 0.3), (1.0, 1.9, 1.7), (0.5, 4.1, 0.2))[0]
+
+
+def signals():
+    """A joint's motion over 8 s, and 4000 random links; speeds from a crawl to about 4 rad/s."""
+    q, qd, qdd = wave(TIME, (0.9, 0.23, 0.1), (0.4, 0.71, 1.3), (0.12, 1.9, 0.7))
+    rng = np.random.default_rng(3)
+    points = rng.normal(size=(TIME.size, 6, 3))
+    masses = rng.uniform(0.5, 2.0, size=(TIME.size, 6))
+    columns = {"q": q, "qd": qd, "qdd": qdd, "load": load(TIME), "inertia": 2.0, "temperature": 20.0, "time": TIME}
+    columns |= {"speed_scale": np.abs(qd).max(), "value": value(TIME)}
+    scalars = {name: np.broadcast_to(column, TIME.shape) for name, column in columns.items()}
+    links = {"phi": inertial_parameters(masses, points), "tip": rng.normal(size=(TIME.size, 3))}
+    return scalars | links | {"points": points, "masses": masses}
+
+
+def inertial_parameters(masses, points):
+    """The ten numbers of clouds of point masses, by summation: shapes (n, k) and (n, k, 3) to (n, 10)."""
+    x, y, z = np.moveaxis(points, -1, 0)
+    terms = [np.ones_like(x), x, y, z, y**2 + z**2, -x * y, -x * z, x**2 + z**2, -y * z, x**2 + y**2]
+    return np.stack([(masses * term).sum(axis=-1) for term in terms], axis=-1)
+
+
+# ---- References: what hardware would have recorded, written without the laws -----------------------------------------
+
+
+@dataclass(frozen=True)
+class Reference:
+    """True parameters in the effect's order, and what is measured with them: ``output(signals, *truth)``."""
+
+    truth: tuple[float, ...]
+    output: Callable[..., np.ndarray]
+    tolerance: float = 0.02  # on each parameter, relative to its true value
+    settle: float = 0.0  # s left out at the start: what was before it is not in the recording
+
+
+def both_directions(s, level_difference, coefficient_difference):
+    speed = np.abs(s["qd"])
+    forward = (5 + level_difference / 2) + (2 + coefficient_difference / 2) * speed
+    backward = (5 - level_difference / 2) + (2 - coefficient_difference / 2) * speed
+    return np.where(s["qd"] > 0, forward, -backward) - np.sign(s["qd"]) * (5 + 2 * speed)
+
+
+def exponential_tanh(x):
+    return 1 - 2 / (np.exp(2 * np.clip(x, -300, 300)) + 1)
+
+
+def makkar(s, stribeck_level, stribeck_speed, stribeck_ratio, coulomb_level, coulomb_speed, viscous):
+    steep, shallow, slope = 1 / stribeck_speed, 1 / (stribeck_ratio * stribeck_speed), 1 / coulomb_speed
+    bump = stribeck_level * (exponential_tanh(steep * s["qd"]) - exponential_tanh(shallow * s["qd"]))
+    return bump + coulomb_level * exponential_tanh(slope * s["qd"]) + viscous * s["qd"]
+
+
+def friction_table(s, cosine, sine, period):
+    grid = np.linspace(0, 1, 2001)
+    amplitude, lead = np.hypot(cosine, sine), np.arctan2(sine, cosine) / (2 * np.pi)
+    level = np.interp(s["q"] / period % 1, grid, amplitude * np.cos(2 * np.pi * (grid - lead)))
+    return level * np.sign(s["qd"])
+
+
+def ripple(s, cosine, sine, period):
+    return np.real((cosine - 1j * sine) * np.exp(2j * np.pi * s["q"] / period))
+
+
+def sprung_link(s, stiffness, damping):
+    inertia = s["inertia"][0]
+
+    def rate(time, state):
+        return [state[1], (load(time) - damping * state[1] - stiffness * state[0]) / inertia]
+
+    start = [load(0.0) / stiffness, 0.0]
+    twist, twist_rate = solve_ivp(rate, (0, TIME[-1]), start, "DOP853", TIME, rtol=1e-10, atol=1e-12).y
+    return -np.column_stack([twist, twist_rate, rate(TIME, [twist, twist_rate])[1]])
+
+
+def with_point(s, mass):
+    points = np.concatenate([s["points"], s["tip"][:, None]], axis=1)
+    return inertial_parameters(np.pad(s["masses"], ((0, 0), (0, 1)), constant_values=mass), points)
+
+
+def extra_bodies(s, *change):
+    """The same change on every link, as point masses of either sign: see EXTRA."""
+    clouds = (np.broadcast_to(part, (TIME.size, *part.shape)) for part in EXTRA)
+    return s["phi"] + inertial_parameters(*clouds)
+
+
+EXTRA = (np.array([0.8, -0.3, 0.5]), np.array([[0.3, -0.9, 1.1], [0.7, 0.4, -0.6], [-1.0, 0.8, 0.5]]))
+
+REFERENCES = {
+    "viscous_friction": Reference((3.0,), lambda s, c: np.gradient(0.5 * c * s["qd"] ** 2) / np.gradient(s["qd"])),
+    "coulomb_friction": Reference((5.0,), lambda s, level: level * np.sign(s["qd"])),
+    "asymmetric_friction": Reference((1.5, -0.4), both_directions),
+    "stribeck_friction": Reference(
+        (2.0, 0.3), lambda s, f, v: f * np.sign(s["qd"]) * np.power(np.e, -np.square(s["qd"]) / v**2)
+    ),
+    "makkar_friction": Reference((2.0, 0.03, 12.0, 4.0, 1.2, 0.8), makkar, tolerance=0.1),
+    "quadratic_friction": Reference((0.7,), lambda s, c: np.where(s["qd"] > 0, c, -c) * s["qd"] ** 2),
+    "load_dependent_friction": Reference((0.12,), lambda s, c: c * np.sqrt(s["load"] ** 2) * np.sign(s["qd"])),
+    "position_dependent_friction": Reference((0.6, -0.8, 1.3), friction_table),
+    "rotor_inertia": Reference((0.4,), lambda s, inertia: np.gradient(inertia * s["qd"], DT, edge_order=2)),
+    "torque_ripple": Reference((0.3, 0.5, 0.21), ripple),
+    "joint_elasticity": Reference((3000.0, 15.0), sprung_link),
+    "payload_mass": Reference((1.7,), with_point),
+    "com_offset": Reference(
+        (0.2, -0.1, 0.3), lambda s, *shift: inertial_parameters(s["masses"], s["points"] + np.array(shift))
+    ),
+    "inertia_error": Reference(tuple(inertial_parameters(*EXTRA)), extra_bodies),
+    "harness_stiffness": Reference(
+        (6.0, 2.4), lambda s, k, t0: np.gradient(0.5 * k * (s["q"] + t0 / k) ** 2) / np.gradient(s["q"])
+    ),
+    "sensor_bias": Reference((0.3,), lambda s, offset: np.polyval([1.0, offset], s["value"])),
+    "sensor_drift": Reference((0.05,), lambda s, rate: np.interp(TIME, [0, 9], [0, 9 * rate]) + s["value"]),
+    "sensor_gain": Reference((-0.07,), lambda s, error: np.polyval([1 + error, 0.0], s["value"])),
+    "sensor_delay": Reference((0.013,), lambda s, delay: value(TIME - delay), settle=0.3),
+}
+
+
+def reference_of(name):
+    if name not in REFERENCES:
+        pytest.fail(
+            f"effect '{name}' has no reference: add REFERENCES['{name}'] to tests/test_effects.py, a "
+            "Reference(truth, output) whose output does without the effect's law (closed form, solve_ivp, theorem)"
+        )
+    return REFERENCES[name]
+
+
+# ---- Helpers ---------------------------------------------------------------------------------------------------------
+
+
+def scale_of(parameter, s):
+    travel, torque = np.ptp(s["q"]), np.abs(s["load"]).max()
+    scales = {"": 1.0, "speed": s["speed_scale"][0], "travel": travel, "torque": torque, "rate": torque / travel}
+    return scales[parameter.relative_to]
+
+
+def draw(parameter, s, rng):
+    """A random value inside the bounds."""
+    if np.isfinite(parameter.high):
+        low = max(parameter.low, 1e-3 * parameter.high)
+        return scale_of(parameter, s) * np.exp(rng.uniform(np.log(low), np.log(parameter.high)))
+    drawn = rng.normal()
+    return drawn if drawn > parameter.low else abs(drawn)
+
+
+def evaluate(effect, s, parameters) -> Evaluation:
+    return evaluate_law(effect, s, np.asarray(parameters), dt=DT)
+
+
+def baseline(effect, s):
+    """What stands where the effect acts, without it."""
+    return 0.0 if effect.at == "joint" else s[THROUGH[effect.at]].reshape(TIME.size, -1)
+
+
+def rms(rows):
+    return np.sqrt(np.mean(rows**2, axis=0))
+
+
+def fit(effect, s, measured, keep):
+    """Best start on the shapes' grid with the amplitudes by linear least squares, then a nonlinear refinement."""
+    spread = rms(measured - baseline(effect, s)) + 1e-9
+    scales = np.array([scale_of(parameter, s) for parameter in effect.parameters])
+    low = np.array([parameter.low for parameter in effect.parameters]) * scales
+    high = np.array([parameter.high for parameter in effect.parameters]) * scales
+    amplitudes = np.array([not parameter.grid for parameter in effect.parameters])
+
+    def residual(p):
+        return ((evaluate(effect, s, p).values - measured) / spread)[keep].ravel()
+
+    def slope(p):
+        return (evaluate(effect, s, p).by_parameter / spread[:, None])[keep].reshape(-1, p.size)
+
+    starts = []
+    for shape in itertools.product(*(parameter.grid or (0.0,) for parameter in effect.parameters)):
+        start = np.array(shape) * scales
+        if amplitudes.any():
+            start[amplitudes] -= np.linalg.lstsq(slope(start)[:, amplitudes], residual(start))[0]
+        start = np.clip(start, low, high)
+        starts.append((np.sum(residual(start) ** 2), tuple(start)))
+    how: dict[str, Any] = {"jac": slope, "bounds": (low, high), "x_scale": "jac", "xtol": 1e-10}
+    return least_squares(residual, min(starts)[1], **how).x
+
+
+# ---- The contract ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_metadata_is_complete(name):
+    effect = effects()[name]
+    assert name in re.split(r"\s+", VOCABULARY)
+    assert effect.family in FAMILIES
+    assert effect.sentence
+    assert effect.equation
+    assert effect.experiment.format(at="joint3").count("joint3") == effect.experiment.count("{at}") > 0
+    assert set(effect.contains) <= set(NAMES) - {name}
+    assert re.search(r"\(.*(\d{4}|eq).*\)|\d{4}", effect.source)
+    assert bool(effect.states) == bool(effect.rate)
+    units = pint.UnitRegistry()
+    for parameter in effect.parameters:
+        assert parameter.meaning
+        for torque, position in (("(N*m)", "rad"), ("N", "m")):
+            spelled = {"T": torque, "S": position, "U": "(N*m)"}
+            units.parse_units(re.sub(r"\b[TSU]\b", lambda match, by=spelled: by[match[0]], parameter.unit))
+        inside = parameter.grid or (parameter.zero,)
+        assert all(parameter.low <= number <= parameter.high for number in inside)
+        assert parameter.low <= parameter.zero <= parameter.high
+        assert list(parameter.grid) in (sorted(parameter.grid), sorted(parameter.grid, reverse=True))
+        assert not parameter.relative_to or parameter.grid
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_derivatives_agree_with_finite_differences(name):
+    effect, s, rng = effects()[name], signals(), np.random.default_rng(11)
+    through = THROUGH[effect.at]
+    for _ in range(4):
+        p = np.array([draw(parameter, s, rng) for parameter in effect.parameters])
+        result = evaluate(effect, s, p)
+        for i in range(p.size):
+            step = 1e-5 * max(abs(p[i]), 1e-3) * np.eye(p.size)[i]
+            change = (evaluate(effect, s, p + step).values - evaluate(effect, s, p - step).values) / (2 * step[i])
+            size = np.abs(change).max(axis=0) + 1e-6 * np.abs(result.values).max(axis=0) / max(abs(p[i]), 1e-3)
+            assert np.all(np.abs(result.by_parameter[:, :, i] - change) <= 2e-5 * size + 1e-12)
+        if result.by_signal is None:
+            continue
+        for i in range(result.by_signal.shape[2]) if not effect.states else ():
+            step = 1e-6 * (np.eye(10)[i] if effect.at == "link" else 1.0)
+            ahead, behind = (evaluate(effect, s | {through: s[through] + sign * step}, p) for sign in (1, -1))
+            change = (ahead.values - behind.values) / 2e-6
+            np.testing.assert_allclose(result.by_signal[:, :, i], change, rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_zero_amplitude_equals_baseline(name):
+    effect, s, rng = effects()[name], signals(), np.random.default_rng(12)
+    elastic = effect.acts_on == "position"  # vanishes as the stiffness grows, not at zero
+    p = [draw(parameter, s, rng) if parameter.zero else 0.0 for parameter in effect.parameters]
+    if elastic:
+        p[[parameter.name for parameter in effect.parameters].index("stiffness")] = 1e14
+    result = evaluate(effect, s, p).values
+    np.testing.assert_allclose(result, np.broadcast_to(baseline(effect, s), result.shape), rtol=0, atol=1e-6)
+    if not elastic:
+        p = [draw(parameter, s, rng) for parameter in effect.parameters]
+        assert np.abs(evaluate(effect, s, p).values - baseline(effect, s)).max() > 1e-3
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if effects()[name].dissipates])
+def test_friction_never_feeds_energy_in(name):
+    effect, s, rng = effects()[name], signals(), np.random.default_rng(13)
+    s = s | {"qd": np.sign(s["qd"]) * 10 ** rng.uniform(-7, 1.5, TIME.size), "load": rng.normal(size=TIME.size)}
+    for _ in range(50):
+        p = np.array([draw(parameter, s, rng) for parameter in effect.parameters])
+        power = s["qd"] * evaluate(effect, s, p).values[:, 0]
+        assert power.min() >= -1e-12 * power.max()
+        assert power.max() > 0
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_recovers_parameters_from_data_it_did_not_generate(name):
+    effect, s, rng = effects()[name], signals(), np.random.default_rng(14)
+    reference = reference_of(name)
+    clean = reference.output(s, *reference.truth).reshape(TIME.size, -1)
+    keep = s["time"] >= reference.settle
+    size = rms(clean - baseline(effect, s))
+    sharp = keep & (np.abs(s["qd"]) > 0.005 * s["speed_scale"])  # where a smooth sign equals a sign
+    assert np.all(rms((evaluate(effect, s, reference.truth).values - clean)[sharp]) <= 2e-3 * size)
+    measured = clean + 0.01 * size * rng.normal(size=clean.shape)
+    found = fit(effect, s, measured, keep)
+    np.testing.assert_allclose(found, reference.truth, rtol=reference.tolerance)
+
+
+def test_effect_without_reference_says_what_to_add():
+    with pytest.raises(pytest.fail.Exception, match=r"add REFERENCES\['new_effect'\] to tests/test_effects.py"):
+        reference_of("new_effect")
+
+
+# ---- Finding them ----------------------------------------------------------------------------------------------------
+
+
+def test_members_are_the_files_in_order_of_family():
+    folder = Path(snarelab.models.effects.__path__[0])
+    assert sorted(NAMES) == sorted(path.stem for path in folder.glob("[!_]*.py"))
+    families = [FAMILIES.index(effects()[name].family) for name in NAMES]
+    assert families == sorted(families)
+
+
+def test_unknown_effect_names_the_nearest_and_all():
+    assert get_effect("torque_ripple").name == "torque_ripple"
+    with pytest.raises(InputError) as caught:
+        get_effect("columb_friction")
+    message = str(caught.value)
+    assert "'columb_friction'" in message
+    assert "nearest: coulomb_friction" in message
+    assert all(name in message for name in NAMES)
+    assert "\n" not in message
+
+
+def test_missing_signal_is_named():
+    with pytest.raises(InputError, match="reads the signal 'qd'"):
+        evaluate_law(effects()["viscous_friction"], {"q": TIME}, np.array([1.0]))

@@ -1,0 +1,163 @@
+"""The integrator of hidden states: order, stability, start, and what a delay does to a sine."""
+
+import casadi as ca
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from snarelab.errors import InputError
+from snarelab.models.effect import Effect, Parameter
+from snarelab.models.effects import get_effect
+from snarelab.models.hidden_state import evaluate_law, simulate_states
+
+DELAY = get_effect("sensor_delay")
+SPRING = get_effect("joint_elasticity")
+
+
+def load(time):
+    return 3 * np.sin(2 * time) + np.cos(5 * time)
+
+
+def inertia(time):
+    return 2 + np.sin(1.5 * time)
+
+
+def nonlinear(name="nonlinear", rate=lambda s, p: [s["load"] - s["x"] - p["a"] * s["x"] ** 3]):
+    return Effect(
+        name=name,
+        family="drive train",
+        at="joint",
+        sentence="",
+        equation="",
+        source="",
+        parameters=(Parameter("a", "1", ""),),
+        law=lambda s, p: p["a"] * s["x"],
+        states=("x",),
+        rate=rate,
+    )
+
+
+def orders(errors):
+    return np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
+
+
+def test_second_order_on_a_spring_with_moving_inertia():
+    stiffness, damping, end = 400.0, 6.0, 4.0
+
+    def rate(time, state):
+        return [state[1], (load(time) - damping * state[1] - stiffness * state[0]) / inertia(time)]
+
+    start = [load(0) / stiffness, 0.0]
+    exact = solve_ivp(rate, (0, end), start, "DOP853", rtol=1e-12, atol=1e-14).y[:, -1]
+    errors = []
+    for n in (400, 800, 1600, 3200):
+        time = np.linspace(0, end, n + 1)
+        inputs = {"load": load(time), "inertia": inertia(time)}
+        states, _ = simulate_states(SPRING, inputs, np.array([stiffness, damping]), end / n)
+        errors.append(np.linalg.norm(states[-1] - exact) / np.linalg.norm(exact))
+    assert errors[-1] < 1e-4
+    assert np.all(orders(errors) > 1.9)
+    assert np.all(orders(errors) < 2.2)
+
+
+def test_second_order_states_and_sensitivities_of_a_nonlinear_rate():
+    a, end = 0.8, 3.0
+    start = np.roots([a, 0, 1, -load(0)])
+    start = start[np.isreal(start)].real[0]
+
+    def rate(time, state):  # the sensitivity's own equation beside the state's
+        x, by_a = state
+        return [load(time) - x - a * x**3, -(1 + 3 * a * x**2) * by_a - x**3]
+
+    start_by_a = -(start**3) / (1 + 3 * a * start**2)
+    exact = solve_ivp(rate, (0, end), [start, start_by_a], "DOP853", rtol=1e-12, atol=1e-14).y[:, -1]
+    errors = []
+    for n in (200, 400, 800, 1600):
+        inputs = {"load": load(np.linspace(0, end, n + 1))}
+        states, sensitivities = simulate_states(nonlinear(), inputs, np.array([a]), end / n)
+        assert states[0, 0] == pytest.approx(start, rel=1e-10)
+        assert sensitivities[0, 0, 0] == pytest.approx(start_by_a, rel=1e-10)
+        errors.append(np.abs([states[-1, 0] - exact[0], sensitivities[-1, 0, 0] - exact[1]]))
+    assert np.all(np.abs(orders(errors) - 2) < 0.2)
+
+
+def test_start_has_the_sensitivities_of_the_steady_state():
+    chain = Effect(
+        name="chain",
+        family="drive train",
+        at="joint",
+        sentence="",
+        equation="",
+        source="",
+        parameters=(Parameter("a", "1", ""), Parameter("b", "1", "")),
+        law=lambda s, p: s["y"],
+        states=("x", "y"),
+        rate=lambda s, p: [s["load"] - p["a"] * s["x"], s["x"] - p["b"] * s["y"]],
+    )
+    states, sensitivities = simulate_states(chain, {"load": np.full(50, 6.0)}, np.array([2.0, 3.0]), 0.01)
+    # x = load/a, y = load/(a b), for good: nothing moves.
+    np.testing.assert_allclose(states, np.broadcast_to([3.0, 1.0], (50, 2)))
+    np.testing.assert_allclose(sensitivities, np.broadcast_to([[-1.5, 0.0], [-0.5, -1 / 3]], (50, 2, 2)), atol=1e-12)
+
+
+def test_law_takes_its_derivative_through_the_states():
+    inputs = {"load": load(np.linspace(0, 3, 301))}
+    states, sensitivities = simulate_states(nonlinear(), inputs, np.array([0.8]), 0.01)
+    result = evaluate_law(nonlinear(), inputs, np.array([0.8]), dt=0.01)
+    np.testing.assert_allclose(result.values[:, 0], 0.8 * states[:, 0])
+    np.testing.assert_allclose(result.by_parameter[:, 0, 0], states[:, 0] + 0.8 * sensitivities[:, 0, 0])
+    assert result.by_signal is None
+
+
+@pytest.mark.parametrize("delay", [0.0, 1e-6, 1e-4])
+def test_delay_much_shorter_than_the_sampling_gives_the_value_back(delay):
+    dt = 0.01
+    value = np.random.default_rng(5).normal(size=500)
+    result = evaluate_law(DELAY, {"value": value}, np.array([delay]), dt)
+    slope = np.append(0.0, np.diff(value) / dt)
+    # Within one interval the value is a straight line, which a short delay moves along.
+    np.testing.assert_allclose(result.values[:, 0], value - delay * slope, atol=20 * delay + 1e-5)
+    np.testing.assert_allclose(result.by_parameter[:, 0, 0], -slope, atol=0.1 * np.abs(slope).max())
+
+
+@pytest.mark.parametrize(
+    ("frequency", "delay", "error"),
+    [(1.0, 0.03, 1e-6), (3.0, 0.05, 1.5e-3), (5.0, 0.05, 0.015), (20.0, 0.0007, 8e-4), (3.0, 0.2 / 3, 6e-3)],
+)
+def test_delayed_sine_is_the_shifted_sine(frequency, delay, error):
+    dt, turn = 1e-3, 2 * np.pi * frequency
+    time = np.arange(4000) * dt
+    read = evaluate_law(DELAY, {"value": np.sin(turn * time)}, np.array([delay]), dt).values[:, 0]
+    settled = time > 10 * delay
+    np.testing.assert_allclose(read[settled], np.sin(turn * (time - delay))[settled], atol=error)
+
+
+def test_ramp_is_delayed_exactly():
+    time = np.arange(2000) * 1e-3
+    read = evaluate_law(DELAY, {"value": 4 * time}, np.array([0.02]), 1e-3).values[:, 0]
+    np.testing.assert_allclose(read[1000:], 4 * (time[1000:] - 0.02), atol=1e-10)
+
+
+def test_stiff_spring_follows_its_load_at_rest_and_in_motion():
+    time = np.arange(300) * 0.01
+    inputs = {"load": 10 + load(time), "inertia": inertia(time)}
+    states, _ = simulate_states(SPRING, inputs, np.array([1e9, 10.0]), 0.01)
+    assert states[0, 0] == pytest.approx(11e-9, rel=1e-12)
+    np.testing.assert_allclose(states[:, 0], inputs["load"] / 1e9, rtol=1e-2)
+
+
+def test_no_steady_state_is_said():
+    with pytest.raises(InputError, match=r"joint_elasticity has no steady state .*stiffness = 0 T/S"):
+        simulate_states(SPRING, {"load": np.ones(9), "inertia": np.ones(9)}, np.array([0.0, 1.0]), 0.01)
+    never = nonlinear("never", lambda s, p: [1 + s["x"] ** 2 + ca.fabs(s["load"]) + p["a"]])
+    with pytest.raises(InputError, match="never has no steady state"):
+        simulate_states(never, {"load": np.ones(9)}, np.array([1.0]), 0.01)
+
+
+def test_states_need_a_time_step():
+    with pytest.raises(ValueError, match="sensor_delay has states: dt is needed"):
+        evaluate_law(DELAY, {"value": np.ones(9)}, np.array([0.01]))
+
+
+def test_one_sample_is_the_start():
+    result = evaluate_law(DELAY, {"value": np.array([2.5])}, np.array([0.01]), 0.01)
+    assert result.values == pytest.approx(2.5)

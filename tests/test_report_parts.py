@@ -1,0 +1,70 @@
+"""What the report is made of: lines thinned for drawing, means in bins, numbers in print."""
+
+import numpy as np
+import pytest
+from snarelab.identification.report_curves import binned
+from snarelab.identification.report_drawing import thinned
+from snarelab.identification.report_words import chance, number, percent, spans, unit_words, with_std, words
+
+
+def test_thinning_keeps_peaks_ends_and_gaps() -> None:
+    t = np.arange(20_000) / 200
+    values = np.sin(t)
+    values[[777, 15_003]] = 9.0, -9.0
+    values[4000:4400] = np.nan
+    t[10_000:] += 5.0
+    kept_time, kept = thinned(t, values)
+    assert kept_time.size < 1600
+    assert (kept_time[0], kept_time[-1]) == (t[0], t[-1])
+    for place in (777, 15_003):
+        assert values[place] in kept[kept_time == t[place]]
+    finite = np.isfinite(kept)
+    assert np.all(np.isin(kept[finite], values))
+    assert np.all(np.diff(kept_time) >= 0)
+    for start, end in ((t[3999], t[4400]), (t[9999], t[10_000])):
+        assert not np.any(finite & (kept_time > start) & (kept_time < end))
+        assert np.any(~finite & (kept_time >= start) & (kept_time < end))
+
+
+def test_bins_find_a_jump_at_zero() -> None:
+    side = np.where(np.arange(4001) % 2, 0.5, -0.5)
+    speed = np.linspace(-0.73, 1.1, 4001)
+    centre, mean, spread = binned(speed, np.where(speed < 0, -2.0, 3.0) + side)
+    known = np.isfinite(mean)
+    assert known.sum() >= 39
+    np.testing.assert_allclose(mean[known], np.where(centre[known] < 0, -2.0, 3.0), atol=0.03)
+    np.testing.assert_allclose(spread[known], 0.5, atol=0.03)
+    assert np.isnan(binned(np.array([-1.0, 1.0]), np.zeros(2))[1]).all()
+
+
+@pytest.mark.parametrize(
+    ("value", "std", "expected"),
+    [
+        (20.3935, 0.0432, ("20.39", "0.04")),
+        (20.3937, 0.0149, ("20.394", "0.015")),
+        (5423.0, 61.0, ("5420", "60")),
+        (-3.1648, 0.0961, ("−3.16", "0.10")),
+        (12.0, 340.0, ("0", "300")),
+        (3.24e-5, 4e-6, ("3.2\u2009×\u200910⁻⁵", "0.4\u2009×\u200910⁻⁵")),
+        (2.5e9, 3e7, ("2.50\u2009×\u200910⁹", "0.03\u2009×\u200910⁹")),
+        (1.23456, 0.0, ("1.235", "–")),
+        (1.23456, float("nan"), ("1.235", "–")),
+    ],
+)
+def test_a_value_has_the_digits_of_its_deviation(value: float, std: float, expected: tuple[str, str]) -> None:
+    assert with_std(value, std) == expected
+
+
+def test_numbers_and_units_in_print() -> None:
+    assert [number(x) for x in (0.0, 0.034567, 7.3551, 21634.0, 1.2e-7)] == [
+        "0",
+        "0.0346",
+        "7.36",
+        "21600",
+        "1.20\u2009×\u200910⁻⁷",
+    ]
+    assert [percent(x) for x in (0.83, 0.0161, 0.00001)] == ["83.0\u202f%", "1.61\u202f%", "under 0.01\u202f%"]
+    assert [chance(x) for x in (0.999, 0.87, 0.001)] == ["over 99\u202f%", "87\u202f%", "under 1\u202f%"]
+    assert [unit_words(u) for u in ("N*m*s/rad", "kg*m**2", "s^-1")] == ["N·m·s/rad", "kg·m²", "s⁻¹"]
+    assert [words(n) for n in ("coulomb_friction", "joint_elasticity")] == ["Coulomb friction", "joint elasticity"]
+    assert spans(((80.1, 96.44), (100.0, 101.0))) == "80.1–96.4, 100.0–101.0 s"
