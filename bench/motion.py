@@ -71,6 +71,8 @@ def point_to_point_motion(
             break
         moves.append((start, cruise, here, target))
         start, here = start + cruise + 2.0 * blend + dwell, target
+    if not moves:
+        raise ValueError(f"duration {duration} s is too short for a move and the way back; try another seed or longer")
     moves.append((start, duration - start - 2.0 * blend, here, np.zeros(len(travel))))
 
     def motion(time: NDArray) -> tuple[NDArray, NDArray, NDArray]:

@@ -40,8 +40,8 @@ class BaseParameters:
     matrix : array (n_base, 10 * J)
         B, with ``beta = B @ phi``; the identity in ``columns``.
     names : tuple of (link, parameter, combination)
-        The kept parameter (``mass``; first moments ``mx my mz``; inertias ``Ixx`` to ``Izz`` about the link's frame), and
-        the sum that is identified in its place, such as ``Izz[upper] + 0.25*mass[fore]``.
+        The kept parameter (``mass``, first moments ``mx my mz``, inertias ``Ixx`` to ``Izz`` about the link's frame),
+        and the sum that is identified in its place, such as ``Izz[upper] + 0.25*mass[fore]``.
     units : tuple of str
         Of each kept parameter: ``kg``, ``kg*m`` or ``kg*m^2``.
     """
@@ -85,7 +85,7 @@ def base_parameters(body: RigidBody, seed: int = 0) -> BaseParameters:
 
 
 def _length(tree: Tree) -> float:
-    """Longest step from joint to joint [m]: the scale that makes kg, kg·m and kg·m² comparable; 1 where all is one point."""
+    """Longest step from joint to joint [m], 1 where there is none: it makes kg, kg·m and kg·m² comparable."""
     steps = [float(np.linalg.norm(joint.translation)) for joint in tree.joints if joint.parent >= 0]
     return max(steps, default=0.0) or 1.0
 

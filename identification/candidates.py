@@ -47,7 +47,9 @@ def library(model: Model) -> list[Placed]:
             continue  # the identified inertia already holds whatever a link effect could add
         spots = places(effect, model.tree)
         if effect.name == "sensor_delay":
-            spots += tuple(f"q.{joint}" for joint in model.joints)
+            # A torque channel is late or, where the encoder is late, early: one of the two.
+            other = {f"tau.{j}": f"q.{j}" for j in model.joints} | {f"q.{j}": f"tau.{j}" for j in model.joints}
+            spots = tuple(at for at in other if f"{effect.name}.{other[at]}" not in have)
         found += [Placed(effect, at) for at in spots if f"{effect.name}.{at}" not in have]
     return found
 
@@ -60,7 +62,7 @@ def variants(assembly: Assembly, placed: Placed) -> list[Variant]:
         axes.append([g * scale for g in p.grid] or [p.zero * scale])
         if not p.grid:
             amplitudes.append(i)
-    index = np.array(amplitudes if not placed.effect.states else [], int)
+    index = np.array(amplitudes, int)
     bounds = [assembly.bounds(placed, placed.effect.parameters[i]) for i in index] or [(0.0, np.inf)]
     low, high = (np.array(x, float) for x in zip(*bounds, strict=True))
     grid = list(product(*axes))

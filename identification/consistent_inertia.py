@@ -1,7 +1,7 @@
 """Physically consistent links behind identified base parameters: the nearest that some mass density could have.
 
-Every link's pseudo-inertia P (4, 4) has to be positive definite (Wensing, Kim, Slotine 2018). P is linear in phi, so the
-search is convex and its minimum global:
+Every link's pseudo-inertia P (4, 4) has to be positive definite (Wensing, Kim, Slotine 2018). P is linear in phi, so
+the search is convex and its minimum global:
 
     min over phi   (beta - B phi)' information (beta - B phi) + weight * sum over links of D(P, P_nominal),
     D(P, Q) = tr(P inv(Q)) - log det(P inv(Q)) - 4.
@@ -10,7 +10,8 @@ D is the divergence of Lee, Wensing, Park (2019): zero at the nominal link, the 
 where P stops being positive definite. It thus is barrier and prior at once, and the weight goes to zero: what the data
 show is kept, and what they cannot show comes from the nominal links. Newton's method follows the minimum down that path
 (Boyd & Vandenberghe 2004, ch. 11) in coordinates in which D's second derivative is the identity: with ``P = C C'``, a
-step is ``C S C'``, S symmetric.
+step is ``C S C'``, S symmetric. Log-Cholesky parameters (Rucker & Wensing 2022) would stay physical by themselves, but
+make the search non-convex, and endless where the best body is flat or has no mass: there they go to minus infinity.
 """
 
 from collections.abc import Iterator
@@ -48,9 +49,8 @@ MAX_STEPS = 100
 
 _ROW, _COLUMN = np.triu_indices(4)
 _SYMMETRIC = np.zeros((10, 4, 4))
-_SYMMETRIC[np.arange(10), _ROW, _COLUMN] = _SYMMETRIC[np.arange(10), _COLUMN, _ROW] = np.where(
-    _ROW == _COLUMN, 1.0, 0.5**0.5
-)
+_SYMMETRIC[np.arange(10), _ROW, _COLUMN] = np.where(_ROW == _COLUMN, 1.0, 0.5**0.5)
+_SYMMETRIC[np.arange(10), _COLUMN, _ROW] = np.where(_ROW == _COLUMN, 1.0, 0.5**0.5)
 """Orthonormal basis of symmetric matrices (4, 4)."""
 
 _TO_PSEUDO = np.array([pseudo_inertia(unit) for unit in np.eye(10)])
@@ -71,9 +71,9 @@ class ConsistentInertia:
         ``(beta - B phi)' information (beta - B phi)``: with the inverse covariance as information, squared standard
         deviations.
     changed : bool
-        Whether the data's own optimum is no physical body, and significantly so: the misfit exceeds what noise alone may
-        leave between the data and the true body, the 95 % point of chi-squared with the information's rank as degrees of
-        freedom. A smaller misfit is no reason to doubt the data.
+        Whether the data's own optimum is no physical body, and significantly so: the misfit exceeds what noise alone
+        may leave between the data and the true body, the 95 % point of chi-squared with the information's rank as
+        degrees of freedom. A smaller misfit is no reason to doubt the data.
     """
 
     phi: Array
@@ -87,7 +87,9 @@ def consistent_inertia(
 ) -> ConsistentInertia:
     """Nearest physically consistent links to identified base parameters.
 
-    A ``beta`` that bodies can have is met to rounding; of all bodies that have it, those nearest to the nominal are taken.
+    A ``beta`` that bodies can have is met to rounding; of all that have it, those nearest to the nominal are taken.
+    Else the misfit is the least to about 2 % if the nominal links are within a factor of ten of the true ones: the last
+    bit of it can often be had only with links that grow without end.
 
     Parameters
     ----------
@@ -97,8 +99,10 @@ def consistent_inertia(
     information : array (n_base, n_base)
         Inverse of their covariance; zero in directions that the data do not show.
     phi_nominal : array (10 * J,)
-        What the links are believed to be. One without a body of its own (no mass, no thickness) stands for one with at
-        least a ten-thousandth of all links' mass, and a hundredth of their size; where none has mass, for 1 kg and 1 m.
+        What the links are believed to be. Where they are no bodies, others stand for them: a link without mass gets a
+        thousandth of all links' mass and a tenth of their radius of gyration (1 kg and 1 m if none has mass), one
+        without thickness a hundredth of that radius, one that breaks the triangle inequality the nearest inertia that
+        keeps it.
 
     Raises
     ------
@@ -119,7 +123,7 @@ def consistent_inertia(
 
 
 class _Search:
-    """Newton's method from the nominal links, on what the data say: ``matrix @ phi = target``, (rank,) of unit variance."""
+    """Newton's method from the nominal links on what the data say, with unit variance: ``matrix @ phi = target``."""
 
     def __init__(self, matrix: Array, target: Array, nominal: Array) -> None:
         self._matrix, self._target, self._nominal = matrix, target, nominal
@@ -131,12 +135,12 @@ class _Search:
         Misfit counts here as what it takes to move the nominal links by it, so that no direction lags behind.
         """
         _, _, seen = self._coordinates(self._nominal)
-        cost = solve_triangular(np.linalg.cholesky(seen @ seen.T), np.eye(len(seen)), lower=True).T
+        cost = solve_triangular(np.linalg.qr(seen.T).R, np.eye(len(seen)))
         for phi in self._path(cost):
             _, by_phi, seen = self._coordinates(phi)
             step = _least_step(seen, self._target - self._matrix @ phi, 0.0)
             met = phi + _moved(by_phi, step)
-            if np.linalg.eigvalsh(_pseudo_inertias(met)).min() > 0:
+            if np.linalg.eigvalsh(_pseudo_inertias(met)).min() > 0 and _flatness(met) > FLATTEST:
                 return self._newton(met, np.eye(len(seen)), 0.0)
         return None
 
@@ -147,13 +151,13 @@ class _Search:
     def _path(self, cost: Array) -> Iterator[Array]:
         """Minima of ``|cost' (target - matrix @ phi)|² + weight * D`` at falling weights.
 
-        It ends where the misfit no longer falls, short of links that grow without end: a little more of it can always be
-        explained by more mass where mass does not show.
+        It ends where the misfit no longer falls, short of links that grow without end: a little more of it can often
+        be explained by ever more mass where mass does not show.
         """
         phi, whole = self._nominal, np.sum((cost.T @ self._target) ** 2)
         misfit = cost.T @ (self._target - self._matrix @ phi)
         # the first Newton step has at most length 1
-        weight = 2.0 * np.linalg.norm(self._coordinates(phi)[2].T @ cost @ misfit)
+        weight = 2.0 * float(np.linalg.norm(self._coordinates(phi)[2].T @ cost @ misfit))
         yield phi
         while weight > max(ENOUGH[0] * np.sum(misfit**2), ENOUGH[1] * whole) and _flatness(phi) > FLATTEST:
             phi = self._newton(phi, cost, weight)
@@ -179,7 +183,7 @@ class _Search:
 
     def _coordinates(self, phi: Array) -> tuple[Array, Array, Array]:
         """C (J, 4, 4), and the derivatives by S of phi (J, 10, 10) and of what the data see (rank, 10 * J)."""
-        factor = np.linalg.cholesky(_pseudo_inertias(phi))
+        factor = np.asarray(np.linalg.cholesky(_pseudo_inertias(phi)), float)
         steps = np.einsum("lab,kbc,ldc->lkad", factor, _SYMMETRIC, factor, optimize=True)
         by_phi = np.tensordot(steps, _TO_PHI, 2)
         seen = np.einsum("blp,lkp->blk", self._matrix.reshape(len(self._matrix), -1, 10), by_phi)
@@ -187,16 +191,16 @@ class _Search:
 
 
 def _least_step(measured: Array, right: Array, weight: float) -> Array:
-    """Step v (10 * J,) that minimises ``|right - measured v|² + weight/2 |v|²``; at weight 0 the least that meets right."""
+    """Step v (10 * J,) of least ``|right - measured v|² + weight / 2 |v|²``; at weight 0, the least to meet right."""
     n_rows, n_steps = measured.shape
     orthogonal, triangle = np.linalg.qr(np.concatenate([measured.T, np.sqrt(0.5 * weight) * np.eye(n_rows)]))
-    return orthogonal[:n_steps] @ solve_triangular(triangle, right, trans="T")
+    return orthogonal[:n_steps] @ solve_triangular(triangle, right, trans=1)
 
 
 def _share(stretch: Array, curvature: float) -> float:
     """Share of a Newton step to take: the first of 1, ½, ¼ … that stays positive definite and has not gone uphill.
 
-    With eigenvalues e of S (``stretch``) the slope along the step is ``-(1 - t) curvature - sum e² (1 - t / (1 + t e))``.
+    With eigenvalues e of S (``stretch``) the slope at share t is ``-(1 - t) curvature - sum e² (1 - t / (1 + t e))``.
     """
     share = 1.0
     while True:
@@ -239,15 +243,11 @@ def _root(information: Array) -> Array:
     spread = np.sqrt(np.diag(information).clip(min=0.0))
     scale = np.where(spread > 0, spread, 1.0)
     scaled = information / np.outer(scale, scale)
-    if (
-        np.abs(scaled - scaled.T).max() > 1e-6
-        or not spread.any()
-        or np.linalg.eigvalsh(scaled)[0] < -1e-9 * len(scaled)
-    ):
-        raise InputError("information: not symmetric and positive; give the inverse of the covariance of beta")
     values, vectors = np.linalg.eigh(scaled)
+    if np.abs(scaled - scaled.T).max() > 1e-6 or values[0] < -1e-9 * len(scaled) or not spread.any():
+        raise InputError("information: not symmetric and positive; give the inverse of the covariance of beta")
     shown = values > 1e-13 * values[-1]
-    return scale[:, None] * vectors[:, shown] * np.sqrt(values[shown])
+    return spread[:, None] * vectors[:, shown] * np.sqrt(values[shown])
 
 
 def _flatness(phi: Array) -> float:

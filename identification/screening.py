@@ -183,8 +183,8 @@ def screen(model: Model, found: Fit, experiments: Sequence[Experiment], noise: N
 
 
 def reliably_positive(gains: Array) -> bool:
-    """Mean over blocks left out clearly above zero: one-sided 5 %."""
-    return bool(np.mean(gains) > 1.7 * np.std(gains, ddof=1) / np.sqrt(len(gains)))
+    """Mean over blocks left out clearly above zero: one-sided 2.5 %."""
+    return bool(np.mean(gains) > 2.0 * np.std(gains, ddof=1) / np.sqrt(len(gains)))
 
 
 def _with(variant: Variant, subset: NDArray[np.int_]) -> Variant:

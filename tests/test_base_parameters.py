@@ -2,10 +2,16 @@
 
 import numpy as np
 import pytest
-from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import FixedOffsetFrame, MultibodyForces, PrismaticJoint, RevoluteJoint
-from pydrake.multibody.tree import RotationalInertia, SpatialInertia
 from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import (
+    FixedOffsetFrame,
+    MultibodyForces,
+    PrismaticJoint,
+    RevoluteJoint,
+    RotationalInertia,
+    SpatialInertia,
+)
 from scipy.spatial.transform import Rotation
 
 from snarelab.identification.base_parameters import base_parameters

@@ -16,7 +16,14 @@ from snarelab.models.tree import Joint, Link, Tree
 def arm(*joints, gravity=(0.0, 0.0, -9.81)):
     """Base parameters of a chain of joints given as (kind, roll-pitch-yaw, translation), each about or along z."""
     made = tuple(
-        Joint(f"joint{i}", kind, np.array([0.0, 0.0, 1.0]), i - 1, Rotation.from_euler("xyz", turn).as_matrix(), np.array(to))
+        Joint(
+            f"joint{i}",
+            kind,
+            np.array([0.0, 0.0, 1.0]),
+            i - 1,
+            Rotation.from_euler("xyz", turn).as_matrix(),
+            np.array(to),
+        )
         for i, (kind, turn, to) in enumerate(joints)
     )
     links = tuple(Link(f"link{i}", np.zeros(10)) for i in range(len(joints)))
@@ -108,7 +115,7 @@ def test_planar_arm_is_projected_onto_its_cone(seed):
 
     With gravity along both axes the base parameters are J1 = Izz1 + l² m2, mx2, my2, J2 = Izz2, and bodies have them
     where J1 >= l² m2 and J2 m2 >= mx2² + my2² for some m2, so where s >= |v| with s = (J1 + J2) / 2 and
-    v = ((J1 - J2) / 2, l mx2, l my2). Information (1, 2 l², 2 l², 1) makes misfit the distance in (s, v), twice squared.
+    v = ((J1 - J2) / 2, l mx2, l my2). Information (1, 2 l², 2 l², 1) makes misfit twice the squared distance in (s, v).
     """
     length, weight = 0.5, 1e4
     rng = np.random.default_rng(seed)
@@ -127,7 +134,7 @@ def test_planar_arm_is_projected_onto_its_cone(seed):
 
 
 def test_body_with_negative_mass_becomes_the_nearest_physical():
-    """The search over log-Cholesky parameters (Rucker & Wensing 2022) knows nothing of cones; it finds no nearer body."""
+    """A search over log-Cholesky parameters (Rucker & Wensing 2022), blind to cones, finds no nearer body."""
     rng = np.random.default_rng(4)
     nominal = random_bodies(rng, 6)
     wrong = nominal.copy()
@@ -181,6 +188,16 @@ def test_links_without_mass_or_thickness_are_made_bodies():
         found = consistent_inertia(SIX, beta, np.eye(len(beta)), believed)
         np.testing.assert_allclose(found.beta_consistent, beta, rtol=0, atol=1e-10)
         assert_positive_definite(found.phi)
+
+
+def test_information_of_very_unlike_strength_is_no_trouble():
+    rng = np.random.default_rng(6)
+    truth, nominal = random_bodies(rng, 6), random_bodies(rng, 6)
+    beta = SIX.matrix @ truth
+    axes = np.linalg.qr(rng.normal(size=(len(beta), len(beta)))).Q
+    information = axes @ np.diag(np.logspace(-6, 6, len(beta))) @ axes.T
+    found = consistent_inertia(SIX, beta, information, nominal)
+    np.testing.assert_allclose(found.beta_consistent, beta, rtol=0, atol=1e-6)
 
 
 def test_directions_without_information_are_free():

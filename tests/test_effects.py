@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 import pint
 import pytest
-import snarelab.models.effects
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
+
+import snarelab.models.effects
 from snarelab.errors import InputError
 from snarelab.models.effects import FAMILIES, effects, get_effect
 from snarelab.models.hidden_state import THROUGH, Evaluation, evaluate_law
@@ -35,13 +36,8 @@ def wave(time, *terms):
     total = np.zeros((3, *np.shape(time)))
     for amplitude, frequency, phase in terms:
         turn = 2 * np.pi * frequency
-        total += amplitude * np.stack(
-            [
-                np.sin(turn * time + phase),
-                turn * np.cos(turn * time + phase),
-                -(turn**2) * np.sin(turn * time + phase),
-            ]
-        )
+        sine, cosine = np.sin(turn * time + phase), np.cos(turn * time + phase)
+        total += amplitude * np.stack([sine, turn * cosine, -(turn**2) * sine])
     return total
 
 
@@ -78,9 +74,9 @@ def inertial_parameters(masses, points):
 
 @dataclass(frozen=True)
 class Reference:
-    """True parameters in the effect's order, and what is measured with them: ``output(signals, *truth)``."""
+    """True parameters by name, and what is measured with them: ``output(signals, *their values)``."""
 
-    truth: tuple[float, ...]
+    truth: dict[str, float]
     output: Callable[..., np.ndarray]
     tolerance: float = 0.02  # on each parameter, relative to its true value
     settle: float = 0.0  # s left out at the start: what was before it is not in the recording
@@ -137,33 +133,42 @@ def extra_bodies(s, *change):
 
 
 EXTRA = (np.array([0.8, -0.3, 0.5]), np.array([[0.3, -0.9, 1.1], [0.7, 0.4, -0.6], [-1.0, 0.8, 0.5]]))
+TEN = ("mass", *(f"moment_{a}" for a in "xyz"), *(f"inertia_{ab}" for ab in ("xx", "xy", "xz", "yy", "yz", "zz")))
+MAKKAR = {"stribeck_level": 2.0, "stribeck_speed": 0.03, "stribeck_ratio": 12.0, "coulomb_level": 4.0}
+MAKKAR |= {"coulomb_speed": 1.2, "viscous_coefficient": 0.8}
 
 REFERENCES = {
-    "viscous_friction": Reference((3.0,), lambda s, c: np.gradient(0.5 * c * s["qd"] ** 2) / np.gradient(s["qd"])),
-    "coulomb_friction": Reference((5.0,), lambda s, level: level * np.sign(s["qd"])),
-    "asymmetric_friction": Reference((1.5, -0.4), both_directions),
+    "viscous_friction": Reference(
+        {"coefficient": 3.0}, lambda s, c: np.gradient(0.5 * c * s["qd"] ** 2) / np.gradient(s["qd"])
+    ),
+    "coulomb_friction": Reference({"level": 5.0}, lambda s, level: level * np.sign(s["qd"])),
+    "asymmetric_friction": Reference({"level_difference": 1.5, "coefficient_difference": -0.4}, both_directions),
     "stribeck_friction": Reference(
-        (2.0, 0.3), lambda s, f, v: f * np.sign(s["qd"]) * np.power(np.e, -np.square(s["qd"]) / v**2)
+        {"level": 2.0, "speed": 0.3}, lambda s, f, v: f * np.sign(s["qd"]) * np.power(np.e, -np.square(s["qd"]) / v**2)
     ),
-    "makkar_friction": Reference((2.0, 0.03, 12.0, 4.0, 1.2, 0.8), makkar, tolerance=0.1),
-    "quadratic_friction": Reference((0.7,), lambda s, c: np.where(s["qd"] > 0, c, -c) * s["qd"] ** 2),
-    "load_dependent_friction": Reference((0.12,), lambda s, c: c * np.sqrt(s["load"] ** 2) * np.sign(s["qd"])),
-    "position_dependent_friction": Reference((0.6, -0.8, 1.3), friction_table),
-    "rotor_inertia": Reference((0.4,), lambda s, inertia: np.gradient(inertia * s["qd"], DT, edge_order=2)),
-    "torque_ripple": Reference((0.3, 0.5, 0.21), ripple),
-    "joint_elasticity": Reference((3000.0, 15.0), sprung_link),
-    "payload_mass": Reference((1.7,), with_point),
+    "makkar_friction": Reference(MAKKAR, makkar, tolerance=0.1),
+    "quadratic_friction": Reference({"coefficient": 0.7}, lambda s, c: np.where(s["qd"] > 0, c, -c) * s["qd"] ** 2),
+    "load_dependent_friction": Reference(
+        {"coefficient": 0.12}, lambda s, c: c * np.sqrt(s["load"] ** 2) * np.sign(s["qd"])
+    ),
+    "position_dependent_friction": Reference({"cosine": 0.6, "sine": -0.8, "period": 1.3}, friction_table),
+    "rotor_inertia": Reference({"inertia": 0.4}, lambda s, inertia: np.gradient(inertia * s["qd"], DT, edge_order=2)),
+    "torque_ripple": Reference({"cosine": 0.3, "sine": 0.5, "period": 0.21}, ripple),
+    "joint_elasticity": Reference({"stiffness": 3000.0, "damping": 15.0}, sprung_link),
+    "payload_mass": Reference({"mass": 1.7}, with_point),
     "com_offset": Reference(
-        (0.2, -0.1, 0.3), lambda s, *shift: inertial_parameters(s["masses"], s["points"] + np.array(shift))
+        {"x": 0.2, "y": -0.1, "z": 0.3},
+        lambda s, *shift: inertial_parameters(s["masses"], s["points"] + np.array(shift)),
     ),
-    "inertia_error": Reference(tuple(inertial_parameters(*EXTRA)), extra_bodies),
+    "inertia_error": Reference(dict(zip(TEN, inertial_parameters(*EXTRA), strict=True)), extra_bodies),
     "harness_stiffness": Reference(
-        (6.0, 2.4), lambda s, k, t0: np.gradient(0.5 * k * (s["q"] + t0 / k) ** 2) / np.gradient(s["q"])
+        {"stiffness": 6.0, "torque_at_zero": 2.4},
+        lambda s, k, t0: np.gradient(0.5 * k * (s["q"] + t0 / k) ** 2) / np.gradient(s["q"]),
     ),
-    "sensor_bias": Reference((0.3,), lambda s, offset: np.polyval([1.0, offset], s["value"])),
-    "sensor_drift": Reference((0.05,), lambda s, rate: np.interp(TIME, [0, 9], [0, 9 * rate]) + s["value"]),
-    "sensor_gain": Reference((-0.07,), lambda s, error: np.polyval([1 + error, 0.0], s["value"])),
-    "sensor_delay": Reference((0.013,), lambda s, delay: value(TIME - delay), settle=0.3),
+    "sensor_bias": Reference({"offset": 0.3}, lambda s, offset: np.polyval([1.0, offset], s["value"])),
+    "sensor_drift": Reference({"rate": 0.05}, lambda s, rate: np.interp(TIME, [0, 9], [0, 9 * rate]) + s["value"]),
+    "sensor_gain": Reference({"error": -0.07}, lambda s, error: np.polyval([1 + error, 0.0], s["value"])),
+    "sensor_delay": Reference({"delay": 0.013}, lambda s, delay: value(TIME - delay), settle=0.3),
 }
 
 
@@ -309,14 +314,14 @@ def test_friction_never_feeds_energy_in(name):
 def test_recovers_parameters_from_data_it_did_not_generate(name):
     effect, s, rng = effects()[name], signals(), np.random.default_rng(14)
     reference = reference_of(name)
-    clean = reference.output(s, *reference.truth).reshape(TIME.size, -1)
+    truth = [reference.truth[parameter.name] for parameter in effect.parameters]
+    clean = reference.output(s, *reference.truth.values()).reshape(TIME.size, -1)
     keep = s["time"] >= reference.settle
     size = rms(clean - baseline(effect, s))
     sharp = keep & (np.abs(s["qd"]) > 0.005 * s["speed_scale"])  # where a smooth sign equals a sign
-    assert np.all(rms((evaluate(effect, s, reference.truth).values - clean)[sharp]) <= 2e-3 * size)
+    assert np.all(rms((evaluate(effect, s, truth).values - clean)[sharp]) <= 2e-3 * size)
     measured = clean + 0.01 * size * rng.normal(size=clean.shape)
-    found = fit(effect, s, measured, keep)
-    np.testing.assert_allclose(found, reference.truth, rtol=reference.tolerance)
+    np.testing.assert_allclose(fit(effect, s, measured, keep), truth, rtol=reference.tolerance)
 
 
 def test_effect_without_reference_says_what_to_add():

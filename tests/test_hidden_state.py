@@ -4,6 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+
 from snarelab.errors import InputError
 from snarelab.models.effect import Effect, Parameter
 from snarelab.models.effects import get_effect

@@ -108,8 +108,7 @@ def test_a_payload_is_a_point_mass():
     assert loaded.mass == pytest.approx(last.mass + mass)
 
 
-@pytest.mark.parametrize("duration", [2.0, 15.0])
-@pytest.mark.parametrize("make", [fourier_motion, point_to_point_motion])
+@pytest.mark.parametrize(("make", "duration"), [(fourier_motion, 2), (fourier_motion, 15), (point_to_point_motion, 15)])
 def test_a_motion_is_its_own_derivative_within_limits_and_at_rest_at_both_ends(make, duration):
     arm = random_arm(np.random.default_rng(1), 5, prismatic_share=0.3)
     motion = make(arm, np.random.default_rng(2), duration)
@@ -173,7 +172,7 @@ def test_friction_that_grows_with_the_load_handed_to_the_link():
         qdd = motion_of(recording, plant.arm)[2][:, 0]
         load = 5.0 * (qdd + 9.81)
         expected = load + 20.0 * qdd + np.sign(speed) * (10 + 0.2 * np.abs(load))
-        np.testing.assert_allclose(recording["tau.joint1"][100:-20], expected[100:-20], atol=0.3)
+        np.testing.assert_allclose(recording["tau.joint1"][140:-20], expected[140:-20], atol=0.3)
 
 
 def test_friction_that_changes_along_the_travel():
@@ -301,12 +300,14 @@ def test_the_same_seed_gives_the_same_recording_and_the_filter_keeps_the_phase(t
     )
 
 
-def test_a_wrong_name_is_refused():
+def test_what_would_be_ignored_is_refused():
     arm = random_arm(np.random.default_rng(0), 2)
     with pytest.raises(ValueError, match="joint3"):
         Plant(arm, tau_delay={"joint3": 0.1})
     with pytest.raises(ValueError, match="armature"):
         Plant(arm, elasticity={"joint1": Elasticity(1e4)})
+    with pytest.raises(ValueError, match="too short"):
+        point_to_point_motion(arm, np.random.default_rng(0), 1.0)
 
 
 def test_the_bundled_recording_is_what_its_generator_makes():
