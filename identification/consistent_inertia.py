@@ -38,11 +38,11 @@ THINNEST = 1e-2
 FALL = 0.6
 """Of the prior's weight from one minimum to the next: near enough for whole Newton steps."""
 
-ENOUGH = 1e-9, 1e-13
+ENOUGH = 1e-9, 1e-16
 """Weight at which the search ends, as a share of the misfit, and of the misfit that no body at all would leave."""
 
 FLATTEST = 1e-11
-"""Least eigenvalue of a pseudo-inertia scaled to unit diagonal, at which the search ends too: (thickness / size)²."""
+"""(Thickness / size)² of a link at which the search ends too: inertias (10,) have no digits for less."""
 
 MAX_STEPS = 100
 """Newton steps at one weight."""
@@ -140,7 +140,7 @@ class _Search:
             _, by_phi, seen = self._coordinates(phi)
             step = _least_step(seen, self._target - self._matrix @ phi, 0.0)
             met = phi + _moved(by_phi, step)
-            if np.linalg.eigvalsh(_pseudo_inertias(met)).min() > 0 and _flatness(met) > FLATTEST:
+            if _flatness(met) > FLATTEST:
                 return self._newton(met, np.eye(len(seen)), 0.0)
         return None
 
@@ -198,14 +198,14 @@ def _least_step(measured: Array, right: Array, weight: float) -> Array:
 
 
 def _share(stretch: Array, curvature: float) -> float:
-    """Share of a Newton step to take: the first of 1, ½, ¼ … that stays positive definite and has not gone uphill.
+    """Share of a Newton step to take: the first of 1, ½, ¼ … that grows no tenfold and has not gone uphill.
 
     With eigenvalues e of S (``stretch``) the slope at share t is ``-(1 - t) curvature - sum e² (1 - t / (1 + t e))``.
     """
     share = 1.0
     while True:
         grown = 1.0 + share * stretch
-        if grown.min() > 0.1:
+        if grown.min() > 0.1 and grown.max() < 10.0:
             slope = (share - 1.0) * curvature + np.sum(stretch**2 * (share / grown - 1.0))
             if slope <= 0.5 * (curvature + np.sum(stretch**2)):
                 return share
@@ -251,9 +251,10 @@ def _root(information: Array) -> Array:
 
 
 def _flatness(phi: Array) -> float:
-    """Least eigenvalue of the links' pseudo-inertias scaled to unit diagonal."""
+    """Least eigenvalue of the links' pseudo-inertias in units of each link's mass and size."""
     pseudo = _pseudo_inertias(phi)
-    scale = np.sqrt(np.einsum("laa->la", pseudo))
+    scale = np.sqrt(np.abs(np.einsum("laa->la", pseudo)))
+    scale[:, :3] = np.linalg.norm(scale[:, :3], axis=1, keepdims=True)
     return float(np.linalg.eigvalsh(pseudo / (scale[:, :, None] * scale[:, None, :])).min())
 
 

@@ -123,13 +123,14 @@ class Evidence:
         if unabsorbed < (ABSORBED if len(left) == 1 else ABSORBED_PART):
             return Gain(0.0, np.zeros(len(low)), unabsorbed)
         target = p.right.sum(0) - cross.T @ self._fitted
-        amplitudes = _bounded(schur, target, low, high)
+        amplitudes = _bounded(schur, own, target, low, high)
         return Gain(float(target @ amplitudes - 0.5 * amplitudes @ schur @ amplitudes), amplitudes, unabsorbed)
 
     def null_gains(self, p: Products) -> Array:
         """The same gain on every sign-flipped noise (R,), without bounds."""
         cross = p.cross.sum(0)
-        schur = _Solver(p.own.sum(0) - cross.T @ self._total.solve(cross))
+        own = p.own.sum(0)
+        schur = _Solver(own - cross.T @ self._total.solve(cross), np.diag(own))
         target = p.nulls - cross.T @ self._null_fitted
         return 0.5 * np.sum(target * schur.solve(target), axis=0)
 
@@ -140,8 +141,9 @@ class Evidence:
             solver = _Solver(self.matrix.sum(0) - self.matrix[b])
             right = self.right.sum(0) - self.right[b]
             cross = p.cross.sum(0) - p.cross[b]
-            schur = p.own.sum(0) - p.own[b] - cross.T @ solver.solve(cross)
-            amplitudes = _bounded(schur, p.right.sum(0) - p.right[b] - cross.T @ solver.solve(right), low, high)
+            own = p.own.sum(0) - p.own[b]
+            schur = own - cross.T @ solver.solve(cross)
+            amplitudes = _bounded(schur, own, p.right.sum(0) - p.right[b] - cross.T @ solver.solve(right), low, high)
             without = solver.solve(right)
             beside = solver.solve(right - cross @ amplitudes)
             gains[b] = 0.5 * (self._energy(b, without) - self._energy(b, beside, p, amplitudes))
@@ -188,12 +190,17 @@ class Evidence:
 
 
 class _Solver:
-    """Solves with a normal matrix whose weak directions are left alone."""
+    """Solves with a normal matrix whose weak directions are left alone.
 
-    def __init__(self, matrix: Array) -> None:
-        self.scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    ``reference`` is the diagonal before a baseline took its share: a column with nothing left of it is left out.
+    """
+
+    def __init__(self, matrix: Array, reference: Array | None = None) -> None:
+        diagonal = np.diag(matrix)
+        floor = 1e-9 * (reference if reference is not None else np.max(diagonal, initial=0.0) * 1e-12) + 1e-300
+        self.scale = np.where(diagonal > floor, np.sqrt(np.maximum(diagonal, 1e-300)), np.inf)
         values, vectors = np.linalg.eigh(matrix / np.outer(self.scale, self.scale))
-        keep = values > 1e-10 * max(values[-1], 1e-300) if len(values) else np.zeros(0, bool)
+        keep = values > 1e-9 * max(values[-1], 1e-300) if len(values) else np.zeros(0, bool)
         self.half = vectors[:, keep] / np.sqrt(values[keep])
 
     def solve(self, right: Array) -> Array:
@@ -201,14 +208,15 @@ class _Solver:
         return self.half @ (self.half.T @ (right / scale)) / scale
 
 
-def _bounded(schur: Array, target: Array, low: Array, high: Array) -> Array:
-    """Minimise ½ aᵀSa − targetᵀa between bounds."""
-    solver = _Solver(schur)
+def _bounded(schur: Array, own: Array, target: Array, low: Array, high: Array) -> Array:
+    """Minimise ½ aᵀSa − targetᵀa between bounds; ``own`` is S before the baseline took its share."""
+    solver = _Solver(schur, np.diag(own))
     free = solver.solve(target)
     if np.all(free >= low) and np.all(free <= high):
         return free
-    values, vectors = np.linalg.eigh(schur / np.outer(solver.scale, solver.scale))
+    scale = np.where(np.isfinite(solver.scale), solver.scale, 1e150)
+    values, vectors = np.linalg.eigh(schur / np.outer(scale, scale))
     root = (vectors * np.sqrt(np.maximum(values, 1e-12 * values[-1]))).T
-    right = np.linalg.lstsq(root.T, target / solver.scale, rcond=None)[0]
-    answer = lsq_linear(root, right, bounds=(low * solver.scale, high * solver.scale), method="bvls")
-    return answer.x / solver.scale
+    right = np.linalg.lstsq(root.T, target / scale, rcond=None)[0]
+    answer = lsq_linear(root, right, bounds=(low * scale, high * scale), method="bvls")
+    return answer.x / scale

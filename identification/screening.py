@@ -26,6 +26,9 @@ RAW_BLOCKS = 12
 
 NULLS = 200
 
+LEVEL = 0.995
+"""Quantile of the best score on noise that a candidate must beat, among all that reach the same channels."""
+
 
 @dataclass(frozen=True)
 class Judged:
@@ -87,17 +90,24 @@ class Noise:
 
 @dataclass(frozen=True)
 class Screening:
-    """Candidates best first, the score that noise alone reaches, and what smooth nameless curves would explain."""
+    """Candidates best first, the score that noise alone reaches on each set of channels, and what nameless curves explain."""
 
     evidence: Evidence
     judged: tuple[Judged, ...]
-    threshold: float
+    threshold: Mapping[tuple[int, ...], float]
     nameless: Mapping[int, float]
     limits: Mapping[str, float]
     noise: Noise
 
 
-def screen(model: Model, found: Fit, experiments: Sequence[Experiment], noise: Noise | None, seed: int) -> Screening:
+def screen(
+    model: Model,
+    found: Fit,
+    experiments: Sequence[Experiment],
+    instruments: Sequence[Experiment],
+    noise: Noise | None,
+    seed: int,
+) -> Screening:
     """Judge every candidate on top of a fit.
 
     Parameters
@@ -106,19 +116,24 @@ def screen(model: Model, found: Fit, experiments: Sequence[Experiment], noise: N
         With the effects of the fit.
     found : Fit
     experiments : sequence of Experiment
-        Training recordings.
+        Training recordings: their residuals are explained.
+    instruments : sequence of Experiment
+        The same with the motion that was asked for: columns come from these, so that no disturbance stands in them.
     noise : Noise or None
         From the first screening; None learns it.
     seed : int
         Of the sign-flipped nulls.
     """
     assembly = found.assembly
-    states = [assembly.evaluate(e, found.theta) for e in experiments]
-    residuals = [assembly.residual(e, found.theta) for e in experiments]
+    states = [assembly.evaluate(e, found.theta) for e in instruments]
+    residuals = [
+        (assembly.residual(e, found.theta)[0], assembly.residual(z, found.theta)[1])
+        for e, z in zip(experiments, instruments, strict=True)
+    ]
     baseline = _baseline(found, residuals, len(model.joints))
-    pool = [[(v, _columns(found, experiments, states, v)) for v in variants(assembly, p)] for p in library(model)]
+    pool = [[(v, _columns(found, instruments, states, v)) for v in variants(assembly, p)] for p in library(model)]
     smooth = [
-        [smooth_columns(e, s, c) for e, s in zip(experiments, states, strict=True)] for c in range(len(model.joints))
+        [smooth_columns(e, s, c) for e, s in zip(instruments, states, strict=True)] for c in range(len(model.joints))
     ]
     if noise is None:
         noise = _learn(experiments, residuals, baseline, pool, smooth)
@@ -137,14 +152,14 @@ def screen(model: Model, found: Fit, experiments: Sequence[Experiment], noise: N
     energy = np.array([float(np.sum(c.residual**2)) for c in raw.channels])
 
     judged: list[Judged] = []
-    null = np.zeros(NULLS)
+    null: dict[tuple[int, ...], Array] = {(c,): np.zeros(NULLS) for c in range(len(model.joints))}
     limits: dict[str, float] = {}
     log_size = np.log(evidence.size)
     for options in pool:
         best: tuple[float, float, Variant, Array, Products, dict[int, Parts]] | None = None
         for subset in options[0][0].subsets():
             first = _with(options[0][0], subset)
-            price = 0.5 * log_size * len(free_parameters(assembly, experiments[0], states[0], first))
+            price = 0.5 * log_size * len(free_parameters(assembly, instruments[0], states[0], first))
             for whole, columns in options:
                 variant = _with(whole, subset)
                 own = {c: [x[:, subset] for x in parts] for c, parts in columns.items()}
@@ -152,7 +167,8 @@ def screen(model: Model, found: Fit, experiments: Sequence[Experiment], noise: N
                 gain = evidence.gain(products, variant.low, variant.high)
                 if gain.total <= 0:
                     continue
-                null = np.maximum(null, evidence.null_gains(products) - price)
+                reached = tuple(own)
+                null[reached] = np.maximum(null.get(reached, 0.0), evidence.null_gains(products) - price)
                 if best is None or gain.total - price > best[0]:
                     best = (gain.total - price, price, variant, gain.amplitudes, products, own)
         if best is None:
@@ -160,22 +176,22 @@ def screen(model: Model, found: Fit, experiments: Sequence[Experiment], noise: N
         score, price, variant, amplitudes, products, own = best
         plain_products = raw.products([(c, np.concatenate(x) / found.sigma[c]) for c, x in own.items()])
         explained = 2 * raw.gain(plain_products, variant.low, variant.high).total / energy[list(own)].sum()
-        free = free_parameters(assembly, experiments[0], states[0], variant)
+        free = free_parameters(assembly, instruments[0], states[0], variant)
         hold = tuple(p.name for p in variant.placed.effect.parameters if p.name not in free)
         placed = replace(variant.placed, hold=hold)
         signal = {c: noise.whiten(c, parts) @ amplitudes for c, parts in own.items()}
         judged.append(Judged(variant, placed, amplitudes, score, price, explained, tuple(own), products, signal))
-    threshold = float(np.quantile(null, 0.99))
+    threshold = {channels: float(np.quantile(x, LEVEL)) for channels, x in null.items()}
     for j in judged:
         if len(j.variant.amplitudes) == 1:
             name = j.placed.effect.parameters[int(j.variant.amplitudes[0])].name
-            limits[f"{j.placed.key}.{name}"] = evidence.smallest(j.products, threshold + j.price)
+            limits[f"{j.placed.key}.{name}"] = evidence.smallest(j.products, threshold[j.channels] + j.price)
     nameless = {}
     for c, parts in enumerate(smooth):
         products = evidence.products([(c, noise.whiten(c, parts))])
         free = np.full(products.right.shape[1], np.inf)
         gain = evidence.gain(products, -free, free).total - 0.5 * len(free) * log_size
-        if gain > threshold and reliably_positive(evidence.fresh_gains(products, -free, free)):
+        if gain > threshold[(c,)] and reliably_positive(evidence.fresh_gains(products, -free, free)):
             plain_products = raw.products([(c, np.concatenate(parts) / found.sigma[c])])
             nameless[c] = float(2 * np.sum(raw.fresh_gains(plain_products, -free, free)) / energy[c])
     judged.sort(key=lambda j: -j.score)

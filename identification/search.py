@@ -3,7 +3,7 @@
 A candidate is judged on whitened samples with the whole baseline fitted again beside it. It is taken when
 
 1. its score (log-likelihood gained less ½ log(samples) for each parameter) beats the best score that *any* candidate
-   reaches on noise alone (the 99 % quantile, over sign-flipped nulls, of the maximum over all candidates);
+      on the same channels reaches on noise alone (over sign-flipped nulls, the 99.5 % quantile of the maximum);
 2. fitted without a time block, it predicts that block better than the baseline, over all blocks;
 3. it explains a share of its channels' residual energy that is worth a name.
 """
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..models.model_file import Model, Placed
 from .assembly import Assembly
 from .base_parameters import BaseParameters
+from .closed_loop import planned
 from .experiment import Experiment, Scales
 from .fit import Fit, fit
 from .screening import Judged, Noise, Screening, reliably_positive, screen
@@ -61,6 +62,7 @@ class Found:
     taken: tuple[Taken, ...]
     opening: Screening
     closing: Screening
+    instruments: tuple[Experiment, ...]
 
 
 def assemble(
@@ -96,12 +98,13 @@ def search(
     """
     progress("fitting the baseline")
     first = found = fit(assemble(model, base, scales), experiments, progress=progress, seed=seed)
+    instruments = planned(found, experiments)
     taken: list[Taken] = []
     opening: Screening | None = None
     noise: Noise | None = None
     for number in range(1, MOST_ROUNDS + 2):
         progress(f"round {number}: screening every effect at every place")
-        result = screen(model, found, experiments, noise, seed)
+        result = screen(model, found, experiments, instruments, noise, seed)
         opening, noise = opening or result, result.noise
         chosen = _choose(result) if number <= MOST_ROUNDS else []
         if not chosen:
@@ -113,7 +116,7 @@ def search(
         assembly = assemble(model, base, scales)
         found = fit(assembly, experiments, start=carry(found, assembly), multi_start=False)
     assert opening is not None
-    return Found(first, model, found, tuple(taken), opening, result)
+    return Found(first, model, found, tuple(taken), opening, result, tuple(instruments))
 
 
 def carry(found: Fit, assembly: Assembly) -> Array:
@@ -133,8 +136,8 @@ def _choose(result: Screening) -> list[Judged]:
     """The best candidate that passes, and beside it the best on every channel that no better candidate reaches."""
     passing = []
     for j in result.judged:
-        if j.score <= result.threshold:
-            break
+        if j.score <= result.threshold[j.channels]:
+            continue
         fresh = result.evidence.fresh_gains(j.products, j.variant.low, j.variant.high)
         if j.explained >= WORTH and reliably_positive(fresh):
             passing.append(j)

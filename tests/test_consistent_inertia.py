@@ -162,6 +162,20 @@ def test_body_with_negative_mass_becomes_the_nearest_physical():
     assert found.misfit > 0.9 * 2 * search.cost
 
 
+@pytest.mark.parametrize("base", [SLIDE, PLANAR, SIX])
+@pytest.mark.parametrize("strength", [0.1, 1.0, 30.0])
+def test_noisy_data_are_fitted_at_least_as_well_as_by_the_true_links(base, strength):
+    rng = np.random.default_rng(7)
+    n_base, n_standard = base.matrix.shape
+    for _ in range(4):
+        truth, nominal = random_bodies(rng, n_standard // 10), random_bodies(rng, n_standard // 10)
+        information = random_information(rng, n_base)
+        noise = strength * np.linalg.solve(np.linalg.cholesky(information).T, rng.normal(size=n_base))
+        found = consistent_inertia(base, base.matrix @ truth + noise, information, nominal)
+        assert found.misfit <= 1.02 * (noise @ information @ noise)
+        assert_positive_definite(found.phi)
+
+
 def test_slide_of_negative_mass_has_next_to_none():
     nominal = random_bodies(np.random.default_rng(0), 1)
     found = consistent_inertia(SLIDE, [-4.0], [[25.0]], nominal)

@@ -162,3 +162,8 @@ def test_states_need_a_time_step():
 def test_one_sample_is_the_start():
     result = evaluate_law(DELAY, {"value": np.array([2.5])}, np.array([0.01]), 0.01)
     assert result.values == pytest.approx(2.5)
+
+
+def test_missing_signal_is_named():
+    with pytest.raises(InputError, match="sensor_delay reads the signal 'value'"):
+        evaluate_law(DELAY, {"q": np.ones(9)}, np.array([0.01]), 0.01)

@@ -42,4 +42,5 @@ EFFECT = Effect(
     law=_law,
     states=("bent",),
     rate=_rate,
+    experiment="move {at} to and fro by ever smaller strokes around rest and draw its torque over its position",
 )
