@@ -19,7 +19,7 @@ from .fit import Fit, gather
 
 Array = NDArray[np.float64]
 
-DRIVEN = 0.03
+DRIVEN = 0.002
 """Largest share of a joint's acceleration variance, inside the band kept, that the residual torque could have driven."""
 
 LEAST = 4.0
