@@ -66,10 +66,11 @@ def minimise(
         gain = -(here.gradient @ move + 0.5 * move @ here.matrix @ move)
         if gain <= tolerance * here.cost:
             return Solution(theta, here, step, True)
-        there = normal(theta + move)
+        trial = np.clip(theta + move, low, high)  # rounding may lead past a bound
+        there = normal(trial)
         ratio = (here.cost - there.cost) / gain if np.isfinite(there.cost) else -1.0
         if ratio > 1e-4:
-            theta, here = theta + move, there
+            theta, here = trial, there
             damping = max(damping * (0.1 if ratio > 0.7 else 0.5), 1e-12)
         elif damping > 1e8:
             return Solution(theta, here, step, True)

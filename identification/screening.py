@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from ..models.model_file import Model, Placed
 from .assembly import Block, Evaluation
 from .candidates import Variant, candidate_columns, free_parameters, library, smooth_columns, variants
+from .closed_loop import REST
 from .evidence import Channel, Evidence, Products
 from .experiment import Experiment
 from .fit import Fit, gather
@@ -50,8 +51,8 @@ class Judged:
     channels : tuple of int
         Channels it reaches.
     products : Products
-    signal : mapping of int to array (n_white,)
-        What it explains of each channel, whitened.
+    columns : mapping of int to array (n_white, k)
+        Its whitened columns on each channel.
     """
 
     variant: Variant
@@ -62,7 +63,11 @@ class Judged:
     explained: float
     channels: tuple[int, ...]
     products: Products
-    signal: Mapping[int, Array]
+    columns: Mapping[int, Array]
+
+    def signal(self) -> dict[int, Array]:
+        """What it explains of each channel, whitened (n_white,)."""
+        return {c: x @ self.amplitudes for c, x in self.columns.items()}
 
     def start(self) -> dict[str, float]:
         """Starting values by key for the joint refit."""
@@ -88,11 +93,22 @@ class Noise:
         return np.concatenate([own(x, s) for x, s in zip(parts, self.segments, strict=True)])
 
 
+    def whiten_mask(self, channel: int, parts: Sequence[NDArray[np.bool_]]) -> NDArray[np.bool_]:
+        """Innovations that a marked sample reaches (n_white,)."""
+        own = self.whiteners[channel]
+        reach = len(own.coefficients) + 1
+        spread = [np.convolve(x, np.ones(reach))[: len(x)] > 0 for x in parts]
+        return np.concatenate([m[s][own.lead :] for m, p in zip(spread, self.segments, strict=True) for s in p])
+
+
 @dataclass(frozen=True)
 class Screening:
     """Candidates best first, the score that noise alone reaches on each set of channels, and what nameless curves explain."""
 
     evidence: Evidence
+    moving: Evidence
+    """The same without the samples near rest of each channel's joint."""
+    at_rest: tuple[NDArray[np.bool_], ...]
     judged: tuple[Judged, ...]
     threshold: Mapping[tuple[int, ...], float]
     nameless: Mapping[int, float]
@@ -131,23 +147,34 @@ def screen(
         for e, z in zip(experiments, instruments, strict=True)
     ]
     baseline = _baseline(found, residuals, len(model.joints))
-    pool = [[(v, _columns(found, instruments, states, v)) for v in variants(assembly, p)] for p in library(model)]
+    exact = [assembly.evaluate(e, found.theta) for e in experiments]
+    pool = []
+    for p in library(model):
+        # Friction that sticks shows in the smallest motion only: a low-passed one has lost it.
+        source = (experiments, exact) if p.effect.at_rest else (instruments, states)
+        pool.append([(v, _columns(found, *source, v)) for v in variants(assembly, p)])
     smooth = [
         [smooth_columns(e, s, c) for e, s in zip(instruments, states, strict=True)] for c in range(len(model.joints))
     ]
     if noise is None:
         noise = _learn(experiments, residuals, baseline, pool, smooth)
-    white, plain = [], []
+    white, plain, awake, at_rest = [], [], [], []
     for c, parts in enumerate(baseline):
         index, own = parts[0][0], [r[:, c] for r, _ in residuals]
         columns = [x for _, x in parts]
-        innovations = noise.innovations[c]
+        rest = noise.whiten_mask(c, [_near_rest(e, c) for e in experiments])
+        # Nulls leave the samples near rest out: what sticks there is no noise.
+        innovations = noise.innovations[c] * ~rest
         white.append(Channel(index, noise.whiten(c, columns), noise.whiten(c, own), innovations, noise.blocks))
+        w = white[-1]
+        awake.append(Channel(index, w.columns[~rest], w.residual[~rest], w.noise[~rest], w.block[~rest]))
+        at_rest.append(rest)
         r = np.concatenate(own) / found.sigma[c]
         block = np.arange(len(r)) * RAW_BLOCKS // len(r)
         plain.append(Channel(index, np.concatenate(columns) / found.sigma[c], r, 0 * r, block))
     n_parameters = len(found.theta)
     evidence = Evidence(white, n_parameters, int(noise.blocks[-1]) + 1, NULLS, seed)
+    moving = Evidence(awake, n_parameters, int(noise.blocks[-1]) + 1, 1, seed)
     raw = Evidence(plain, n_parameters, RAW_BLOCKS, 1, seed)
     energy = np.array([float(np.sum(c.residual**2)) for c in raw.channels])
 
@@ -167,10 +194,11 @@ def screen(
                 gain = evidence.gain(products, variant.low, variant.high)
                 if gain.total <= 0:
                     continue
-                reached = tuple(own)
-                null[reached] = np.maximum(null.get(reached, 0.0), evidence.null_gains(products) - price)
                 if best is None or gain.total - price > best[0]:
                     best = (gain.total - price, price, variant, gain.amplitudes, products, own)
+                if not variant.placed.effect.at_rest:
+                    reached = tuple(own)
+                    null[reached] = np.maximum(null.get(reached, 0.0), evidence.null_gains(products) - price)
         if best is None:
             continue
         score, price, variant, amplitudes, products, own = best
@@ -179,8 +207,8 @@ def screen(
         free = free_parameters(assembly, instruments[0], states[0], variant)
         hold = tuple(p.name for p in variant.placed.effect.parameters if p.name not in free)
         placed = replace(variant.placed, hold=hold)
-        signal = {c: noise.whiten(c, parts) @ amplitudes for c, parts in own.items()}
-        judged.append(Judged(variant, placed, amplitudes, score, price, explained, tuple(own), products, signal))
+        columns = {c: noise.whiten(c, parts) for c, parts in own.items()}
+        judged.append(Judged(variant, placed, amplitudes, score, price, explained, tuple(own), products, columns))
     threshold = {channels: float(np.quantile(x, LEVEL)) for channels, x in null.items()}
     for j in judged:
         if len(j.variant.amplitudes) == 1:
@@ -195,12 +223,18 @@ def screen(
             plain_products = raw.products([(c, np.concatenate(parts) / found.sigma[c])])
             nameless[c] = float(2 * np.sum(raw.fresh_gains(plain_products, -free, free)) / energy[c])
     judged.sort(key=lambda j: -j.score)
-    return Screening(evidence, tuple(judged), threshold, nameless, limits, noise)
+    return Screening(evidence, moving, tuple(at_rest), tuple(judged), threshold, nameless, limits, noise)
 
 
 def reliably_positive(gains: Array) -> bool:
     """Mean over blocks left out clearly above zero: one-sided 2.5 %."""
     return bool(np.mean(gains) > 2.0 * np.std(gains, ddof=1) / np.sqrt(len(gains)))
+
+
+def _near_rest(experiment: Experiment, joint: int) -> NDArray[np.bool_]:
+    """Samples of the analysis band within REST of the joint's peak speed from standing still."""
+    speed = np.abs(experiment.motion.to_band(experiment.motion.qd)[:, joint])
+    return speed < REST * np.max(speed)
 
 
 def _with(variant: Variant, subset: NDArray[np.int_]) -> Variant:

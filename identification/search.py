@@ -24,7 +24,7 @@ from .screening import Judged, Noise, Screening, reliably_positive, screen
 
 Array = NDArray[np.float64]
 
-WORTH = 0.03
+WORTH = 0.05
 """Least share of its channels' residual energy that an effect must explain to be named."""
 
 ALIKE = 0.98
@@ -98,12 +98,13 @@ def search(
     """
     progress("fitting the baseline")
     first = found = fit(assemble(model, base, scales), experiments, progress=progress, seed=seed)
-    instruments = planned(found, experiments)
+    instruments = None
     taken: list[Taken] = []
     opening: Screening | None = None
     noise: Noise | None = None
     for number in range(1, MOST_ROUNDS + 2):
         progress(f"round {number}: screening every effect at every place")
+        instruments = planned(found, experiments, instruments)
         result = screen(model, found, experiments, instruments, noise, seed)
         opening, noise = opening or result, result.noise
         chosen = _choose(result) if number <= MOST_ROUNDS else []
@@ -116,7 +117,7 @@ def search(
         assembly = assemble(model, base, scales)
         found = fit(assembly, experiments, start=carry(found, assembly), multi_start=False)
     assert opening is not None
-    return Found(first, model, found, tuple(taken), opening, result, tuple(instruments))
+    return Found(first, model, found, tuple(taken), opening, result, tuple(instruments or ()))
 
 
 def carry(found: Fit, assembly: Assembly) -> Array:
@@ -139,7 +140,7 @@ def _choose(result: Screening) -> list[Judged]:
         if j.score <= result.threshold[j.channels]:
             continue
         fresh = result.evidence.fresh_gains(j.products, j.variant.low, j.variant.high)
-        if j.explained >= WORTH and reliably_positive(fresh):
+        if j.explained >= WORTH and reliably_positive(fresh) and _holds_in_motion(result, j):
             passing.append(j)
     keys = {j.placed.key for j in passing}
     chosen: list[Judged] = []
@@ -151,6 +152,19 @@ def _choose(result: Screening) -> list[Judged]:
             chosen.append(j)
         reached |= set(j.channels)
     return chosen
+
+
+def _holds_in_motion(result: Screening, j: Judged) -> bool:
+    """Does it still pass with the samples near rest left out? Stuck friction poses as delay, elasticity and Stribeck."""
+    if j.placed.effect.at_rest:
+        return True
+    moving = result.moving
+    products = moving.products([(c, x[~result.at_rest[c]]) for c, x in j.columns.items()])
+    gain = moving.gain(products, j.variant.low, j.variant.high)
+    energy = sum(float(np.sum(moving.channels[c].residual ** 2)) for c in j.channels)
+    fresh = moving.fresh_gains(products, j.variant.low, j.variant.high)
+    enough = gain.total - j.price > result.threshold[j.channels] and 2 * gain.total > WORTH * energy
+    return enough and reliably_positive(fresh)
 
 
 def _weigh(result: Screening, best: Judged, seed: int) -> Taken:
@@ -171,7 +185,7 @@ def _weigh(result: Screening, best: Judged, seed: int) -> Taken:
     # Half a win more than seen for each: no bootstrap is evidence of certainty.
     wins = (np.bincount(winners, minlength=len(rivals)) + 0.5) / (BOOTSTRAPS + 0.5 * len(rivals))
     others = [
-        RivalOdds(j.placed, float(w), bool(w < 0.05 and evidence.likeness(best.signal, j.signal) < ALIKE))
+        RivalOdds(j.placed, float(w), bool(w < 0.05 and evidence.likeness(best.signal(), j.signal()) < ALIKE))
         for j, w in zip(rivals[1:], wins[1:], strict=True)
     ]
     others.sort(key=lambda r: -r.probability)

@@ -1,35 +1,29 @@
 """A CasADi function over many samples, at the speed of C.
 
-CasADi writes the function as C; a loop over samples is appended, a C compiler makes a shared library of it, kept in the
-user's cache, and one call through `ctypes` (which releases Python's lock) does all samples. Where there is no compiler
-the same function runs in CasADi's virtual machine, with one `CompilerNotice`.
+CasADi writes the function as C, and a loop over samples is appended and compiled. One call through `ctypes` (which
+releases Python's lock, and keeps no state) does all samples: side by side, or one after another where each needs the
+state that the last one left. Where there is no compiler the same function runs in CasADi's virtual machine, with one
+`CompilerNotice`.
 """
 
 import ctypes
 import functools
-import hashlib
-import os
-import platform
-import shlex
-import shutil
 import subprocess
-import tempfile
+import threading
 import warnings
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from ..errors import InputError
+from .c_library import load_library
 from .inertia import Array
 
 _ENTRY = "snarelab_samples"
-_DIGEST_BYTES = 32
-# -O1: straight-line code gains next to nothing from more, and compiles in half the time.
-# No -march=native: a home folder may be shared between machines.
-_FLAGS = ("-O1", "-shared", "-fPIC", "-fvisibility=hidden", "-w")
-_Loop = Callable[[list[Array], list[int], list[Array], int], None]
+_NOTICE = threading.Lock()
+_Loop = Callable[[list[Array], list[Array], int], None]
 
 
 class CompilerNotice(UserWarning):
@@ -37,31 +31,29 @@ class CompilerNotice(UserWarning):
 
 
 class SampleFunction:
-    """A CasADi function evaluated on many samples at once.
+    """A CasADi function evaluated on many samples at once; threads may share it.
 
     Parameters
     ----------
     function : casadi.Function
         Of SX symbols (else ``function.expand()``); inputs are columns, outputs may be matrices.
-
-    Notes
-    -----
-    The environment variable ``SNARELAB_CC`` names the compiler (``none``: use no compiler); else ``cc``, ``gcc`` or
-    ``clang`` is taken. Libraries are kept in ``$XDG_CACHE_HOME/snarelab`` or ``~/.cache/snarelab``.
     """
 
     def __init__(self, function: ca.Function) -> None:
-        """Build, or find in the cache."""
+        """Build, or find in the cache (see `load_library`)."""
         inputs = function.sx_in()
         outputs = function.call(inputs, True, False)
         # CasADi stores columns, numpy rows: transposed and dense, a sample's output is written where it belongs.
         # The name is our own: the function's might be one of C's.
-        self._function = ca.Function("sample", inputs, [ca.densify(output.T) for output in outputs])
+        written = ca.Function("sample", inputs, [ca.densify(output.T) for output in outputs])
         self._name = function.name()
         self._names = function.name_in()
         self._sizes = [function.size1_in(i) for i in range(function.n_in())]
         self._shapes = [function.size_out(i) for i in range(function.n_out())]
-        self._loop = _compiled_loop(self._function) or self._machine_loop
+        # Held here: building a map of the virtual machine takes as long as running it.
+        self._map = functools.lru_cache(maxsize=16)(written.map)
+        self._accumulate = functools.lru_cache(maxsize=16)(written.mapaccum)
+        self._loop = _compiled_loop(written)
 
     def __call__(self, *inputs: Array) -> tuple[Array, ...]:
         """Evaluate all samples.
@@ -80,6 +72,42 @@ class SampleFunction:
         InputError
             Where the number of inputs, their shape, or the number of samples does not fit.
         """
+        arrays, n_samples = self._checked(inputs)
+        results = [np.empty((n_samples, *shape)) for shape in self._shapes]
+        if n_samples:
+            loop = self._loop or functools.partial(_machine, self._map(n_samples))
+            loop(arrays, results, n_samples)
+        return tuple(results)
+
+    def scan(self, start: Array, *inputs: Array) -> Array:
+        """Follow a state, x[k + 1] = f(x[k], inputs[k]): the function's one output is its first input a sample later.
+
+        Parameters
+        ----------
+        start : array (k,)
+            The first state.
+        *inputs : arrays
+            All but the first input, as in a call.
+
+        Returns
+        -------
+        array (n_samples + 1, k)
+
+        Raises
+        ------
+        InputError
+            As a call does.
+        """
+        (_, *arrays), n_samples = self._checked((start, *inputs))
+        states = np.empty((n_samples + 1, len(start)))
+        states[0] = start
+        if n_samples:
+            # In C, each sample reads the row that the one before it has written.
+            loop = self._loop or functools.partial(_machine, self._accumulate(n_samples))
+            loop([states[:-1], *arrays], [states[1:]], n_samples)
+        return states
+
+    def _checked(self, inputs: Sequence[Array]) -> tuple[list[Array], int]:
         if len(inputs) != len(self._sizes):
             raise InputError(f"{self._name}: {len(inputs)} inputs given, {len(self._sizes)} wanted")
         arrays = [np.ascontiguousarray(array, dtype=np.float64) for array in inputs]
@@ -91,36 +119,39 @@ class SampleFunction:
                 )
         if len(counts) != 1:
             raise InputError(f"{self._name}: inputs have {sorted(counts)} samples; give one number of samples in all")
-        n_samples = counts.pop()
-        results = [np.empty((n_samples, rows, columns)) for rows, columns in self._shapes]
-        steps = [array.shape[1] if array.ndim == 2 else 0 for array in arrays]
-        if n_samples:
-            self._loop(arrays, steps, results, n_samples)
-        return tuple(results)
+        return arrays, counts.pop()
 
-    def _machine_loop(self, arrays: list[Array], steps: list[int], results: list[Array], n_samples: int) -> None:
-        columns = [
-            array.T if step else np.tile(array[:, None], n_samples) for array, step in zip(arrays, steps, strict=True)
-        ]
-        outputs = self._function.map(n_samples).call([ca.DM(column) for column in columns])
-        for result, output in zip(results, outputs, strict=True):
-            result[...] = np.asarray(output).reshape(-1, order="F").reshape(result.shape)
+
+def _machine(function: ca.Function, arrays: list[Array], results: list[Array], n_samples: int) -> None:
+    """CasADi's virtual machine on NumPy's own memory: a row is one sample and is one column of CasADi's."""
+    pair: Any = function.buffer()  # CasADi declares another signature than it has
+    buffer, evaluate = pair
+    held = [np.ascontiguousarray(np.broadcast_to(array, (n_samples, array.shape[-1]))) for array in arrays]
+    for i, array in enumerate(held):
+        if array.size:
+            buffer.set_arg(i, array.data)
+    for i, result in enumerate(results):
+        if result.size:
+            buffer.set_res(i, result.data)
+    evaluate()
 
 
 def _compiled_loop(function: ca.Function) -> _Loop | None:
     """The loop over samples in C, or None after a notice that says why not."""
     try:
-        library = _load(_source(function))
+        library = load_library(_source(function))
     except (OSError, subprocess.SubprocessError) as problem:
-        _notify(str(problem))
+        with _NOTICE:
+            _notify(str(problem))
         return None
     entry = getattr(library, _ENTRY)
     entry.restype = None
 
-    def loop(arrays: list[Array], steps: list[int], results: list[Array], n_samples: int) -> None:
+    def loop(arrays: list[Array], results: list[Array], n_samples: int) -> None:
         pointers = (ctypes.c_void_p * len(arrays))(*[array.ctypes.data for array in arrays])
+        steps = (ctypes.c_longlong * len(arrays))(*[array.shape[1] if array.ndim == 2 else 0 for array in arrays])
         targets = (ctypes.c_void_p * len(results))(*[result.ctypes.data for result in results])
-        entry(pointers, (ctypes.c_longlong * len(steps))(*steps), targets, ctypes.c_longlong(n_samples))
+        entry(pointers, steps, targets, ctypes.c_longlong(n_samples))
 
     return loop
 
@@ -147,49 +178,6 @@ void {_ENTRY}(const double *const *in, const long long *step, double *const *out
   }}
 }}
 """
-
-
-def _load(source: str) -> ctypes.CDLL:
-    """The library of this source, from the cache or newly built there."""
-    compiler, version = _compiler(os.environ.get("SNARELAB_CC", ""), os.environ.get("PATH", ""))
-    identity = "\0".join([source, *compiler, version, platform.machine(), *_FLAGS])
-    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "snarelab"
-    cache.mkdir(mode=0o700, parents=True, exist_ok=True)
-    path = cache / f"{hashlib.sha256(identity.encode()).hexdigest()}.so"
-    if not _intact(path):
-        with tempfile.TemporaryDirectory(dir=cache) as folder:
-            built = Path(folder) / path.name
-            command = [*compiler, *_FLAGS, "-x", "c", "-", "-o", str(built), "-lm"]
-            run = subprocess.run(command, input=source, capture_output=True, text=True, check=False)
-            if run.returncode:
-                complaint = (run.stderr.strip().splitlines() or ["no message"])[0]
-                raise OSError(f"{compiler[0]} failed with '{complaint}'")
-            built.write_bytes(built.read_bytes() + hashlib.sha256(built.read_bytes()).digest())
-            built.replace(path)
-    return ctypes.CDLL(str(path))
-
-
-def _intact(path: Path) -> bool:
-    """Whether the library is there and ends in its own digest: a torn file may load and then crash."""
-    try:
-        content = path.read_bytes()
-    except FileNotFoundError:
-        return False
-    return hashlib.sha256(content[:-_DIGEST_BYTES]).digest() == content[-_DIGEST_BYTES:]
-
-
-@functools.cache
-def _compiler(named: str, search_path: str) -> tuple[tuple[str, ...], str]:
-    """Command and version of the C compiler; OSError where there is none."""
-    if named == "none":
-        raise OSError("SNARELAB_CC is 'none'")
-    for candidate in [named] if named else ["cc", "gcc", "clang"]:
-        program, *options = shlex.split(candidate)
-        found = shutil.which(program, path=search_path)
-        if found:
-            run = subprocess.run([found, "--version"], capture_output=True, text=True, check=True)
-            return (found, *options), run.stdout
-    raise OSError(f"SNARELAB_CC is '{named}', which is not found" if named else "no cc, gcc or clang on PATH")
 
 
 @functools.cache

@@ -94,6 +94,9 @@ class Effect:
     contains : tuple of str
         Simpler effects that are special cases of this one. A search names the simpler one first, and this one only for
         what is then left (the principle of marginality: Nelder 1977).
+    at_rest : bool
+        True where the effect shows while the joint seems to stand still. Any other effect must also hold up with the
+        samples near rest left out, where static friction laws say nothing.
     experiment : str
         The motion or measurement that shows this effect apart from others, as an instruction: "move {at} slowly ...".
     """
@@ -111,4 +114,5 @@ class Effect:
     acts_on: Literal["torque", "position"] = "torque"
     dissipates: bool = False
     contains: tuple[str, ...] = ()
+    at_rest: bool = False
     experiment: str = ""

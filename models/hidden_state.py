@@ -1,7 +1,7 @@
 """Evaluate an effect along recorded samples: its law, its hidden states, and their derivatives.
 
 Alphabet: n samples, n_x states, n_p parameters, n_out numbers that the law gives; u(t) the recorded signals, linear
-between samples. Everything is built once for each effect in CasADi and run over all samples by its virtual machine.
+between samples. Law and step are written once for each effect, in CasADi, and run over all samples in C.
 
 States follow x' = rate(x, u(t), p). One step of length h is ROS2 (Verwer, Spee, Blom and Hundsdorfer, 1999; Hairer and
 Wanner, *Solving Ordinary Differential Equations II*, IV.7), second-order and linearly implicit, with the time
@@ -16,14 +16,17 @@ faster than the sampling costs nothing and decays at once. A solution that is li
 sensitivities dx/dp are the exact derivatives of these steps, carried along in the same pass.
 """
 
-from collections.abc import Mapping
-from functools import cache, lru_cache
-from typing import Any, NamedTuple
+import os
+from collections.abc import Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
 from ..errors import InputError
+from .compiled import SampleFunction
 from .effect import Effect
 
 _GAMMA = 1 - np.sqrt(0.5)
@@ -37,10 +40,12 @@ THROUGH = {"joint": "load", "link": "phi", "sensor": "value"}
 
 
 class _Built(NamedTuple):
+    """X = [x; dx/dp by rows] is what a sample hands to the next."""
+
     signals: tuple[str, ...]  # those that law and rate read
-    law: ca.Function  # (u, x, p) -> value, d/dp, d/dx, d/dthrough
-    rate: ca.Function | None  # (u, x, p) -> rate, d/dx, d/dp
-    step: ca.Function | None  # ([x; dx/dp], [u0; u1], [p; h]) -> [x; dx/dp] a sample later
+    law: SampleFunction  # (*signals, X, p) -> value, total d/dp, and d/dthrough if any
+    rate: SampleFunction | None  # (*signals, x, p) -> rate, d/dx, d/dp
+    step: SampleFunction | None  # (X, *signals, *signals a sample later, [p; h]) -> X a sample later
 
 
 class Evaluation(NamedTuple):
@@ -90,17 +95,10 @@ def simulate_states(
         If a signal is missing, or there is no steady state to start from.
     """
     built = _build(effect)
-    if built.step is None:
-        raise ValueError(f"{effect.name} has no states")
-    u = _stack(effect, built.signals, inputs)
-    start = _steady_state(effect, built, u[0], np.asarray(parameters, dtype=float))
-    n_x, n_p, n = len(effect.states), len(effect.parameters), len(u)
-    rows = start[None]
-    if n > 1:
-        pairs, constants = np.hstack([u[:-1], u[1:]]), np.tile(np.append(parameters, dt), (n - 1, 1))
-        (after,) = _run(_accumulate(effect, n - 1), start, pairs, constants)
-        rows = np.vstack([start, after.reshape(n - 1, start.size)])
-    return rows[:, :n_x], _by_sample(rows[:, n_x:], n, n_x, n_p)
+    p = np.asarray(parameters, dtype=float)
+    rows = _carried(effect, built, _signals(effect, built, inputs), p, dt)
+    n_x = len(effect.states)
+    return rows[:, :n_x], rows[:, n_x:].reshape(len(rows), n_x, len(p))
 
 
 def evaluate_law(
@@ -125,81 +123,73 @@ def evaluate_law(
         If a signal is missing, or there is no steady state to start from.
     """
     built = _build(effect)
-    u = _stack(effect, built.signals, inputs)
-    n, n_p, n_x = len(u), len(effect.parameters), len(effect.states)
-    states, sensitivities = np.zeros((n, 0)), None
-    if n_x:
+    signals, p = _signals(effect, built, inputs), np.asarray(parameters, dtype=float)
+    carried = np.zeros(0)
+    if effect.states:
         if dt is None:
             raise ValueError(f"{effect.name} has states: dt is needed")
-        states, sensitivities = simulate_states(effect, inputs, parameters, dt)
-    outputs = _run(_map(effect, n), u, states, np.tile(parameters, (n, 1)))
-    n_out, n_signal = built.law.size1_out(0), built.law.size2_out(3)
-    by_parameter = _by_sample(outputs[1], n, n_out, n_p)
-    if sensitivities is not None:
-        by_parameter = by_parameter + _by_sample(outputs[2], n, n_out, n_x) @ sensitivities
-    by_signal = _by_sample(outputs[3], n, n_out, n_signal) if n_signal else None
-    return Evaluation(outputs[0].reshape(n, n_out), by_parameter, by_signal)
+        carried = _carried(effect, built, signals, p, dt)
+    values, by_parameter, *by_signal = built.law(*signals, carried, p)
+    return Evaluation(values[:, :, 0], by_parameter, by_signal[0] if by_signal else None)
 
 
-def _run(function: ca.Function, *arguments: np.ndarray) -> list[np.ndarray]:
-    """Evaluate on NumPy's own memory: converting to CasADi's matrices and back costs more than most laws.
-
-    CasADi stores by column: a row of an argument is one sample, and so is a stretch of a (flat) result.
-    """
-    pair: Any = function.buffer()  # CasADi declares another signature than it has
-    buffer, evaluate = pair
-    held = [np.ascontiguousarray(argument, dtype=float) for argument in arguments]
-    results = [np.zeros(function.nnz_out(i)) for i in range(function.n_out())]
-    for i, argument in enumerate(held):
-        if argument.size:
-            buffer.set_arg(i, argument.data)
-    for i, result in enumerate(results):
-        if result.size:
-            buffer.set_res(i, result.data)
-    evaluate()
-    return results
+def prepare(effects: Iterable[Effect]) -> None:
+    """Compile effects ahead of their first use, several at a time; those in the cache cost milliseconds."""
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        list(pool.map(_build, effects))
 
 
-def _by_sample(stacked: np.ndarray, n: int, rows: int, columns: int) -> np.ndarray:
-    """CasADi's matrices, stored by column, as shape (n, rows, columns)."""
-    return stacked.reshape(n, columns, rows).transpose(0, 2, 1)
-
-
-def _stack(effect: Effect, names: tuple[str, ...], inputs: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Signals side by side, shape (n_samples, sum of sizes)."""
-    missing = [name for name in names if name not in inputs]
+def _signals(effect: Effect, built: _Built, inputs: Mapping[str, np.ndarray]) -> list[np.ndarray]:
+    """What law and rate read, each of shape (n_samples, size)."""
+    missing = [name for name in built.signals if name not in inputs]
     if missing:
         given = ", ".join(inputs) or "none"
         raise InputError(f"{effect.name} reads the signal '{missing[0]}', which is not given (given: {given})")
-    return np.column_stack([np.asarray(inputs[name], dtype=float) for name in names])
+    arrays = [np.asarray(inputs[name], dtype=float) for name in built.signals]
+    return [array[:, None] if array.ndim == 1 else array for array in arrays]
+
+
+def _carried(effect: Effect, built: _Built, signals: list[np.ndarray], p: np.ndarray, dt: float) -> np.ndarray:
+    """States and sensitivities, stacked as the step hands them on (n_samples, n_x + n_x * n_p)."""
+    if built.step is None:
+        raise ValueError(f"{effect.name} has no states")
+    start = _steady_state(effect, built, [signal[:1] for signal in signals], p)
+    here, later = [signal[:-1] for signal in signals], [signal[1:] for signal in signals]
+    return built.step.scan(start, *here, *later, np.append(p, dt))
 
 
 @cache
 def _build(effect: Effect) -> _Built:
     p = ca.SX.sym("p", len(effect.parameters))
     x = ca.SX.sym("x", len(effect.states))
+    sensitivity = ca.SX.sym("S", x.numel(), p.numel())
     all_signals = {name: ca.SX.sym(name, size) for name, size in SIGNALS[effect.at].items()}
     named = dict(zip((parameter.name for parameter in effect.parameters), ca.vertsplit(p), strict=True))
     s = all_signals | dict(zip(effect.states, ca.vertsplit(x) if effect.states else [], strict=True))
     law = ca.vertcat(effect.law(s, named))
     rate = ca.vertcat(*effect.rate(s, named)) if effect.rate else ca.SX(0, 1)
     read = ca.vertcat(law, rate)
-    names = tuple(name for name, symbol in all_signals.items() if any(ca.which_depends(read, symbol, 1, False)))
-    u = ca.vertcat(*(all_signals[name] for name in names))
+    signals = {name: u for name, u in all_signals.items() if any(ca.which_depends(read, u, 1, False))}
+    names, u = tuple(signals), list(signals.values())
     through = all_signals[THROUGH[effect.at]]
-    if not any(ca.which_depends(law, through, 1, False)):
-        through = ca.SX(0, 1)
-    outputs = [law, ca.jacobian(law, p), ca.jacobian(law, x), ca.jacobian(law, through)]
-    law_function = ca.Function("law", [u, x, p], [ca.densify(output) for output in outputs])
+    outputs = [law, ca.jacobian(law, p) + ca.jacobian(law, x) @ sensitivity]
+    if any(ca.which_depends(law, through, 1, False)):
+        outputs.append(ca.jacobian(law, through))
+    law_function = _compiled(effect, "law", [*u, _stacked(x, sensitivity), p], outputs, [*names, "states", "p"])
     if not effect.states:
         return _Built(names, law_function, None, None)
-    rate_function = ca.Function("rate", [u, x, p], [rate, ca.jacobian(rate, x), ca.jacobian(rate, p)])
-    return _Built(names, law_function, rate_function, _step(u, x, p, rate))
+    outputs = [rate, ca.jacobian(rate, x), ca.jacobian(rate, p)]
+    rate_function = _compiled(effect, "rate", [*u, x, p], outputs, [*names, "states", "p"])
+    return _Built(names, law_function, rate_function, _step(effect, signals, x, p, sensitivity, rate))
 
 
-def _step(u: ca.SX, x: ca.SX, p: ca.SX, rate: ca.SX) -> ca.Function:
+def _step(
+    effect: Effect, signals: Mapping[str, ca.SX], x: ca.SX, p: ca.SX, sensitivity: ca.SX, rate: ca.SX
+) -> SampleFunction:
+    u = ca.vertcat(*signals.values())
+    later = {f"next_{name}": ca.SX.sym(f"next_{name}", symbol.shape) for name, symbol in signals.items()}
+    next_u, h = ca.vertcat(*later.values()), ca.SX.sym("h")
     f = ca.Function("f", [u, x, p], [rate, ca.jacobian(rate, x), ca.jacobian(rate, u)])
-    next_u, h, sensitivity = ca.SX.sym("next_u", u.shape), ca.SX.sym("h"), ca.SX.sym("S", x.numel(), p.numel())
     here, by_state, by_input = f(u, x, p)
     matrix = ca.SX.eye(x.numel()) - _GAMMA * h * by_state
     drift = _GAMMA * h * by_input @ (next_u - u)
@@ -207,39 +197,32 @@ def _step(u: ca.SX, x: ca.SX, p: ca.SX, rate: ca.SX) -> ca.Function:
     k2 = ca.solve(matrix, h * f(next_u, x + k1, p)[0] - 2 * k1 - drift)
     next_x = x + 1.5 * k1 + 0.5 * k2
     next_sensitivity = ca.jacobian(next_x, x) @ sensitivity + ca.jacobian(next_x, p)
-    return ca.Function(
-        "step",
-        [ca.vertcat(x, ca.vec(sensitivity)), ca.vertcat(u, next_u), ca.vertcat(p, h)],
-        [ca.densify(ca.vertcat(next_x, ca.vec(next_sensitivity)))],
-        {"cse": True},
-    )
+    inputs = [_stacked(x, sensitivity), *signals.values(), *later.values(), ca.vertcat(p, h)]
+    names = ["states", *signals, *later, "p_and_h"]
+    return _compiled(effect, "step", inputs, [_stacked(next_x, next_sensitivity)], names)
 
 
-# Held here: CasADi forgets a map that nobody holds, and building it takes as long as running it.
-@lru_cache(maxsize=256)
-def _map(effect: Effect, n: int) -> ca.Function:
-    return _build(effect).law.map(n)
+def _stacked(x: ca.SX, sensitivity: ca.SX) -> ca.SX:
+    return ca.vertcat(x, ca.vec(sensitivity.T))
 
 
-@lru_cache(maxsize=256)
-def _accumulate(effect: Effect, n: int) -> ca.Function:
-    step = _build(effect).step
-    assert step is not None
-    return step.mapaccum("steps", n)
+def _compiled(effect: Effect, what: str, inputs: list[ca.SX], outputs: list[ca.SX], names: list[str]) -> SampleFunction:
+    results = [f"out{i}" for i in range(len(outputs))]
+    return SampleFunction(ca.Function(f"{effect.name}_{what}", inputs, ca.cse(outputs), names, results))
 
 
-def _steady_state(effect: Effect, built: _Built, u: np.ndarray, p: np.ndarray) -> np.ndarray:
+def _steady_state(effect: Effect, built: _Built, first: list[np.ndarray], p: np.ndarray) -> np.ndarray:
     """States with zero rate, by Newton's method from zero, and their sensitivities, stacked as the step wants them."""
     assert built.rate is not None
     x = np.zeros(len(effect.states))
     for _ in range(50):
-        rate, by_state, by_parameter = (np.atleast_2d(output.full()) for output in built.rate(u, x, p))
+        rate, by_state, by_parameter = (output[0] for output in built.rate(*first, x, p))
         try:
             change = np.linalg.solve(by_state, -rate[:, 0])
         except np.linalg.LinAlgError:
             break
         x = x + change
         if np.all(np.abs(change) <= 1e-12 * (1e-300 + np.abs(x))) or not np.any(change):
-            return np.concatenate([x, np.linalg.solve(by_state, -by_parameter).ravel(order="F")])
+            return np.concatenate([x, np.linalg.solve(by_state, -by_parameter).ravel()])
     values = ", ".join(f"{a.name} = {b:g} {a.unit}" for a, b in zip(effect.parameters, p, strict=True))
     raise InputError(f"{effect.name} has no steady state to start from at the first sample ({values})")

@@ -19,6 +19,7 @@ from scipy.signal import fftconvolve
 from scipy.signal.windows import kaiser
 
 from ..errors import InputError
+from .columns import nearest
 
 Array = NDArray[np.float64]
 
@@ -105,12 +106,14 @@ def condition(dataset: xr.Dataset, joints: Sequence[str], band: float | None = N
         A joint without signal, a band the sampling cannot carry, too few samples.
     """
     path = str(dataset.attrs.get("path", "recording"))
-    missing = [f"{kind}.{j}" for j in joints for kind in ("q", "tau") if f"{kind}.{j}" not in dataset]
+    wanted = [f"{kind}.{j}" for j in joints for kind in ("q", "tau")]
+    missing = [name for name in wanted if name not in dataset]
     if missing:
-        known = ", ".join(sorted(str(v) for v in dataset.data_vars)) or "none"
+        known = sorted(str(v) for v in dataset.data_vars)
+        near = nearest(missing[0], [name for name in known if name not in wanted] or known)
         raise InputError(
-            f"{path}: no signal {missing[0]!r} for a joint of the URDF; the recording has {known}; "
-            f"add the column, or map it under [signals] in the model file"
+            f"{path}: no signal {missing[0]!r} for a joint of the URDF; nearest is {near!r} of "
+            f"{', '.join(known)}; add the column, or map it under [signals] in the model file"
         )
     stamps = np.asarray(dataset["time"].values, float)
     q, tau = (np.stack([np.asarray(dataset[f"{k}.{j}"].values, float) for j in joints], 1) for k in ("q", "tau"))
@@ -125,17 +128,18 @@ def condition(dataset: xr.Dataset, joints: Sequence[str], band: float | None = N
     pieces, period, uniform_note = _uniform_pieces(stamps, q, tau, temperature)
     notes += uniform_note
     rate = 1.0 / period
+    limit = "as asked"
     if band is None:
         edge = min(BAND_CAP, rate / 2.5)
         band, limit = _band_from_noise([p[1] for p in pieces], period, edge)
-        notes.append(f"analysis band 0 to {band:.3g} Hz ({limit})")
     elif not 0 < band <= rate / 2.5:
         raise InputError(
             f"{path}: bandwidth {band:g} Hz cannot be carried at {rate:.4g} samples a second; "
-            f"allowed is 0 < bandwidth <= {rate / 2.5:.4g} Hz"
+            f"allowed is 0 < bandwidth <= {rate / 2.5:.4g} Hz: give one in the model file"
         )
     thinning = max(1, int(np.ceil(rate / (2 * band) - 1e-9)))
     band = rate / (2 * thinning)
+    notes.append(f"analysis band 0 to {band:.3g} Hz ({limit}; every {thinning} samples make one)")
     kernels = _derivative_kernels(min(band, rate / 2.5), rate)
     half = len(kernels[0]) // 2
     shortest = 2 * half + 1 + 2 * _thin_half(thinning) + 4 * thinning
@@ -167,7 +171,7 @@ def _uniform_pieces(
 
     good = np.isfinite(q).all(1) & np.isfinite(tau).all(1)
     period = float(np.median(np.diff(t)))
-    jitter = 0.0
+    jitter, other_rates = 0.0, 0
     index = np.flatnonzero(good)
     cuts = np.flatnonzero((np.diff(index) > 1) | (np.diff(t[index]) > 1.5 * period)) + 1
     pieces: list[tuple[Array, Array, Array, Array]] = []
@@ -178,7 +182,9 @@ def _uniform_pieces(
         even = t[run[0]] + step * np.arange(len(run))
         deviation = float(np.max(np.abs(t[run] - even))) / period
         jitter = max(jitter, deviation)
-        if deviation <= 0.02:
+        other_rate = abs(step / period - 1) > 1e-3
+        other_rates += other_rate
+        if deviation <= 0.02 and not other_rate:
             pieces.append((t[run], q[run], tau[run], temperature[run]))
             continue
         even = t[run[0]] + period * np.arange(int((t[run[-1]] - t[run[0]]) / period + 1e-9) + 1)
@@ -194,13 +200,15 @@ def _uniform_pieces(
             f"sampling is uneven (stamps up to {jitter:.2g} periods off an even clock): cubic splines put it on an even "
             f"{1 / period:.4g} Hz clock inside each run"
         )
+    if other_rates:
+        notes.append(f"{other_rates} runs are not sampled at {1 / period:.4g} Hz: cubic splines put them there")
     return pieces, period, notes
 
 
 def _band_from_noise(pieces: Sequence[Array], period: float, edge: float) -> tuple[float, str]:
     """Widest band <= edge in which derived acceleration noise is below NOISE_SHARE of its signal, on moving joints."""
     rate = 1.0 / period
-    longest = max(pieces, key=len)
+    longest = max(pieces, key=len, default=np.zeros((0, 0)))
     n = len(longest)
     if n < 64:
         return edge, "few samples: the widest band"

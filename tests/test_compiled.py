@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from snarelab.errors import InputError
-from snarelab.models import compiled
+from snarelab.models import c_library, compiled
 from snarelab.models.compiled import CompilerNotice, SampleFunction
 
 
@@ -56,7 +56,7 @@ def test_a_damaged_library_is_rebuilt(own_cache):
         library.unlink()  # never in place: it is loaded
         library.write_bytes(damage)
         check_doubled()
-        assert compiled._intact(library)
+        assert c_library.intact(library)
     before = library.stat().st_mtime_ns
     check_doubled()
     assert library.stat().st_mtime_ns == before  # found, not built again

@@ -42,5 +42,6 @@ EFFECT = Effect(
     law=_law,
     states=("bent",),
     rate=_rate,
+    at_rest=True,
     experiment="move {at} to and fro by ever smaller strokes around rest and draw its torque over its position",
 )

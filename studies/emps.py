@@ -1,0 +1,116 @@
+"""The main job on real data: a servo axis (EMPS) whose model knows viscous friction only.
+
+Fits the published model and compares its parameters; then starts from viscous friction alone and lets the diagnosis name
+what is missing; then diagnoses the model that came out. Recordings: Janot, Gautier, Brunot (2019), looked for in
+``$SNARELAB_RECORDINGS``, beside the project, and at their publisher. Without them a bundled recording, made by another
+engine than ours, is diagnosed instead.
+"""
+
+import json
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from ..identification.diagnose import Answer, diagnose
+from ..identification.identify import identify
+from ..identification.report import write_report
+from ..models.model_file import load_model, save_model
+from ..recordings import find_recording
+
+HERE = Path(__file__).parent
+OUT = Path("build/studies/emps")
+
+PUBLISHED = {"mass": (95.1089, "kg"), "coefficient": (203.5034, "N*s/m"), "level": (20.3935, "N"), "offset": (-3.1648, "N")}
+"""IDIM-LS on DATA_EMPS (Janot, Gautier, Brunot 2019)."""
+
+PUBLISHED_ERROR = {"train": 0.040834, "holdout": 0.059824}
+"""Relative force error of the same, on DATA_EMPS and as a cross-test on DATA_EMPS_PULSES."""
+
+
+def main() -> int:
+    """Run the study; leaves report, numbers and the improved model in ``build/studies/emps``."""
+    begun = time.monotonic()
+    OUT.mkdir(parents=True, exist_ok=True)
+    try:
+        train, holdout = find_recording("DATA_EMPS.mat"), find_recording("DATA_EMPS_PULSES.mat")
+    except InputError as error:
+        _say(f"The EMPS recordings cannot be had ({error}).")
+        _say("Diagnosing the bundled recording of a three-joint arm instead; another engine (MuJoCo) generated it.")
+        folder = HERE / "bundled"
+        quantities: list[dict[str, Any]] = []
+        answer = _diagnose(folder / "arm3.toml", folder / "train.csv", folder / "holdout.csv")
+    else:
+        quantities = _published(train, holdout)
+        answer = _diagnose(HERE / "emps" / "viscous.toml", train, holdout)
+    found = answer.diagnosis
+    _say(_table(answer))
+    last = found.steps[-1]
+    quantities += [_quantity("relative_error_fitted", "1", None, last.train), _quantity("relative_error_held_out", "1", None, last.holdout)]
+    quantities.append({**_quantity("named", "", None, 0.0), "ours": [f"{e.name} at {e.at}" for e in found.effects]})
+    saved = OUT / "model.toml"
+    save_model(answer.model, saved, found.sentence)
+    _say("Diagnosing the model that came out ...")
+    again = _second(saved, train, holdout) if quantities[0]["name"] == "mass" else None
+    if again is not None:
+        _say(f"  {again.diagnosis.verdict}: {again.diagnosis.sentence}")
+        quantities.append({**_quantity("second_verdict", "", None, 0.0), "ours": again.diagnosis.verdict})
+    result = {
+        "study": "emps",
+        "command": "make study-emps",
+        "seconds": round(time.monotonic() - begun, 1),
+        "quantities": quantities,
+        "steps": [vars(s) for s in found.steps],
+    }
+    (OUT / "diagnosis.json").write_text(json.dumps(found.to_json(), indent=1) + "\n", encoding="utf-8")
+    (OUT / "result.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    write_report(found, OUT / "report.html")
+    _say(f"\n{found.sentence}\nReport: {(OUT / 'report.html').resolve()}")
+    return 0
+
+
+def _say(text: str) -> None:
+    print(text, flush=True)
+
+
+def _diagnose(model: Path, train: Path, holdout: Path) -> Answer:
+    _say(f"Diagnosing {model.stem} against {train.name}, with {holdout.name} locked away ...")
+    return diagnose(load_model(model), [train], holdout, progress=lambda text: _say(f"  {text}"))
+
+
+def _second(saved: Path, train: Path, holdout: Path) -> Answer:
+    return diagnose(load_model(saved), [train], holdout, progress=lambda text: _say(f"  {text}"))
+
+
+def _published(train: Path, holdout: Path) -> list[dict[str, Any]]:
+    """Fit the published model and set its parameters beside the published ones."""
+    found = identify(load_model(HERE / "emps" / "published.toml"), [train], [holdout]).to_json()
+    _say(f"The published model, fitted here:\n  {'':<14}{'published':>12}{'ours':>12}{'difference':>12}")
+    quantities = []
+    for p in found["parameters"]:
+        paper, unit = PUBLISHED[p["name"]]
+        quantities.append(_quantity(p["name"], unit, paper, p["value"]))
+        _say(f"  {p['name']:<14}{paper:>12.4f}{p['value']:>12.4f}{100 * (p['value'] / paper - 1):>11.2f} % {unit}")
+    for role, paper in PUBLISHED_ERROR.items():
+        ours = found["fit"]["tau.slide"][role]["relative"]
+        quantities.append(_quantity(f"relative_error_{role}", "1", paper, ours))
+        _say(f"  error, {role:<8}{100 * paper:>10.2f} %{100 * ours:>10.2f} %")
+    return quantities
+
+
+def _quantity(name: str, unit: str, paper: float | None, ours: float) -> dict[str, Any]:
+    """One line of result.json; nothing here is tuned to meet a published number."""
+    kind = "reference" if paper is None else "predicted"
+    return {"name": name, "unit": unit, "paper": paper, "ours": ours, "low": None, "high": None, "kind": kind}
+
+
+def _table(answer: Answer) -> str:
+    """The README's table."""
+    lines = ["| model | error, fitted | error, held out |", "| --- | ---: | ---: |"]
+    lines += [f"| {s.label} | {100 * s.train:.2f} % | {100 * s.holdout:.2f} % |" for s in answer.diagnosis.steps]
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,255 @@
+"""From a recording to motion and torques in one band: exact where it says so, and nothing crosses a gap."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from snarelab.errors import InputError
+from snarelab.recordings.condition import MINIMUM_SAMPLES, Motion, condition
+
+RATE = 200.0
+BAND = 20.0
+
+
+def recording(time, q, tau=None, joints=("joint1",), **attrs):
+    """A dataset as `read_recording` gives it; q, tau of shape (n_samples,) or (n_samples, n_joints)."""
+    q = np.asarray(q, float).reshape(len(time), -1)
+    tau = np.zeros_like(q) if tau is None else np.asarray(tau, float).reshape(len(time), -1)
+    variables = {f"q.{j}": ("time", q[:, k]) for k, j in enumerate(joints)}
+    variables |= {f"tau.{j}": ("time", tau[:, k]) for k, j in enumerate(joints)}
+    return xr.Dataset(variables, {"time": np.asarray(time, float)}, attrs={"path": "run.csv", **attrs})
+
+
+def clock(seconds=10.0, rate=RATE):
+    return np.arange(round(seconds * rate)) / rate
+
+
+def sine(time, frequency, phase=0.4):
+    """Position, rate and acceleration."""
+    w = 2 * np.pi * frequency
+    return np.sin(w * time + phase), w * np.cos(w * time + phase), -(w**2) * np.sin(w * time + phase)
+
+
+def noted(motion: Motion, *words):
+    assert any(all(w in note for w in words) for note in motion.notes), motion.notes
+
+
+@pytest.mark.parametrize("frequency", [0.3, 2.0, 7.0, 12.0, 17.0, 20.0])
+def test_derivatives_of_a_sine_in_the_band(frequency):
+    t = clock()
+    motion = condition(recording(t, sine(t, frequency)[0]), ["joint1"], BAND)
+    for found, wanted in zip((motion.q, motion.qd, motion.qdd), sine(motion.time, frequency), strict=True):
+        assert np.max(np.abs(found[:, 0] - wanted)) < 2e-3 * np.max(np.abs(wanted))
+
+
+def test_motion_above_the_band_is_stopped():
+    t = clock()
+    motion = condition(recording(t, sine(t, 90.0)[0]), ["joint1"], BAND)
+    for found, size in ((motion.q, 1.0), (motion.qd, 2 * np.pi * 90), (motion.qdd, (2 * np.pi * 90) ** 2)):
+        assert np.max(np.abs(found)) < 2e-3 * size
+
+
+def test_a_parabola_is_exact():
+    t = clock(5.0)
+    motion = condition(recording(t, 3.0 - 2.0 * t + 0.7 * t**2), ["joint1"], BAND)
+    at = motion.time
+    np.testing.assert_allclose(motion.q[:, 0], 3.0 - 2.0 * at + 0.7 * at**2, atol=1e-9)
+    np.testing.assert_allclose(motion.qd[:, 0], -2.0 + 1.4 * at, atol=1e-8)
+    np.testing.assert_allclose(motion.qdd[:, 0], 1.4, atol=1e-6)
+
+
+def test_samples_whose_window_leaves_the_recording_are_dropped():
+    t = clock()
+    motion = condition(recording(t, sine(t, 1.0)[0]), ["joint1"], BAND)
+    assert motion.time[0] > t[0]
+    assert motion.time[-1] < t[-1]
+    assert motion.time[0] - t[0] == pytest.approx(t[-1] - motion.time[-1])
+    # Nothing at the edges is worse than in the middle.
+    error = np.abs(motion.qdd[:, 0] - sine(motion.time, 1.0)[2])
+    assert error[:20].max() < 1e-3 * (2 * np.pi) ** 2
+    assert error[-20:].max() < 1e-3 * (2 * np.pi) ** 2
+
+
+def test_the_band_filter_is_linear_and_treats_every_column_alike():
+    t, rng = clock(), np.random.default_rng(0)
+    motion = condition(recording(t, sine(t, 1.0)[0]), ["joint1"], BAND)
+    columns = rng.normal(size=(len(motion.time), 3))
+    x = np.array([2.0, -3.0, 0.5])
+    np.testing.assert_allclose(motion.to_band(columns @ x), motion.to_band(columns) @ x, atol=1e-12)
+    blocks = motion.to_band(columns.reshape(-1, 3, 1))
+    np.testing.assert_array_equal(blocks[:, :, 0], motion.to_band(columns))
+
+
+def test_the_band_filter_passes_the_band_and_stops_what_would_alias():
+    t = clock()
+    motion = condition(recording(t, sine(t, 1.0)[0]), ["joint1"], BAND)
+    at = motion.to_band(motion.time)
+    assert motion.band == pytest.approx(RATE / (2 * motion.thinning))
+    assert 1 / np.median(np.diff(at)) == pytest.approx(2 * motion.band)
+    np.testing.assert_allclose(motion.to_band(np.full(len(motion.time), 7.0)), 7.0, rtol=1e-12)
+    # Passed to half the band, halved at its edge, stopped where it would fold back to below half the band.
+    for part, kept in ((0.1, 1.0), (0.5, 1.0), (1.0, 0.5), (1.6, 0.0), (3.0, 0.0)):
+        turn = 2j * np.pi * part * motion.band
+        passed = motion.to_band(np.exp(turn * motion.time).view(float).reshape(-1, 2))
+        np.testing.assert_allclose(passed @ [1, 1j], kept * np.exp(turn * at), atol=1e-3)
+
+
+def test_a_gap_in_time_splits_and_nothing_crosses_it():
+    t = clock(12.0)
+    keep = (t < 5.0) | (t > 6.5)
+    t = t[keep]
+    # The joint is somewhere else after the gap: a filter that crossed it would ring.
+    after = t > 6.0
+    q = sine(t, 1.0)[0] + 5.0 * after
+    tau = np.where(after, 100.0, -100.0)
+    motion = condition(recording(t, q, tau), ["joint1"], BAND)
+    assert len(motion.segments) == 2
+    noted(motion, "2 runs", "nothing is interpolated")
+    np.testing.assert_allclose(motion.qdd[:, 0], sine(motion.time, 1.0)[2], atol=1e-3 * (2 * np.pi) ** 2)
+    banded, at = motion.to_band(motion.tau)[:, 0], motion.to_band(motion.time)
+    np.testing.assert_allclose(banded, np.where(at > 6.0, 100.0, -100.0), atol=1e-9)
+    assert np.all((at < 5.0) | (at > 6.5))
+    first, second = motion.band_segments()
+    assert at[first][-1] < 5.0 < 6.5 < at[second][0]
+    assert second.stop == len(at)
+
+
+@pytest.mark.parametrize("channel", ["q", "tau"])
+def test_a_missing_sample_of_any_joint_splits_all(channel):
+    t = clock(12.0)
+    q, tau = np.stack([sine(t, 1.0)[0], sine(t, 0.5)[0]], 1), np.ones((len(t), 2))
+    (q if channel == "q" else tau)[1200:1203, 1] = np.nan
+    motion = condition(recording(t, q, tau, ("joint1", "joint2")), ["joint1", "joint2"], BAND)
+    assert len(motion.segments) == 2
+    noted(motion, "3 of 2400 samples", "missing")
+    for values in (motion.q, motion.qd, motion.qdd, motion.tau):
+        assert np.all(np.isfinite(values))
+    np.testing.assert_allclose(motion.qdd[:, 1], sine(motion.time, 0.5)[2], atol=1e-3 * np.pi**2)
+    assert not np.any((motion.time > t[1199]) & (motion.time < t[1203]))
+
+
+def test_a_gap_in_which_only_the_position_is_missing_keeps_the_time_of_the_rest():
+    t = clock(12.0)
+    q = sine(t, 1.0)[0]
+    q[:400] = np.nan  # an encoder that woke up late
+    motion = condition(recording(t, q, t), ["joint1"], BAND)
+    assert len(motion.segments) == 1
+    assert motion.time[0] > 2.0
+    np.testing.assert_allclose(motion.tau[:, 0], motion.time, atol=1e-12)
+
+
+def test_runs_too_short_to_filter_are_left_out_and_said():
+    t = clock(12.0)
+    q = sine(t, 1.0)[0]
+    q[[1000, 1030]] = np.nan
+    motion = condition(recording(t, q), ["joint1"], BAND)
+    assert len(motion.segments) == 2
+    noted(motion, "29 samples from 5.005 s", "left out")
+    np.testing.assert_allclose(motion.qdd[:, 0], sine(motion.time, 1.0)[2], atol=1e-3 * (2 * np.pi) ** 2)
+
+
+def test_uneven_stamps_are_resampled_said_and_right():
+    rng = np.random.default_rng(1)
+    t = clock() + rng.uniform(-0.25, 0.25, round(10 * RATE)) / RATE
+    motion = condition(recording(t, sine(t, 2.0)[0], sine(t, 2.0)[0]), ["joint1"], BAND)
+    noted(motion, "uneven", "cubic splines")
+    np.testing.assert_allclose(np.diff(motion.time), motion.period, rtol=1e-9)
+    for found, wanted in zip((motion.q, motion.qd, motion.qdd), sine(motion.time, 2.0), strict=True):
+        assert np.max(np.abs(found[:, 0] - wanted)) < 5e-3 * np.max(np.abs(wanted))
+    np.testing.assert_allclose(motion.tau[:, 0], sine(motion.time, 2.0)[0], atol=1e-4)
+
+
+def test_a_run_at_another_rate_is_not_taken_at_the_first_ones():
+    slow = 12.0 + clock(10.0, RATE / 1.2)
+    t = np.concatenate([clock(10.5), slow])
+    motion = condition(recording(t, sine(t, 1.0)[0]), ["joint1"], BAND)
+    assert len(motion.segments) == 2
+    noted(motion, "1 runs are not sampled at 200 Hz")
+    for s in motion.segments:
+        np.testing.assert_allclose(motion.qd[s, 0], sine(motion.time[s], 1.0)[1], atol=0.01 * 2 * np.pi)
+
+
+def test_the_band_shrinks_as_encoder_noise_grows():
+    t, rng = clock(20.0), np.random.default_rng(2)
+    q, noise = sine(t, 1.0)[0], rng.normal(size=round(20 * RATE))
+    motions = [condition(recording(t, q + level * noise), ["joint1"]) for level in (0.0, 1e-4, 1e-3, 1e-2)]
+    bands = [m.band for m in motions]
+    assert bands[0] == pytest.approx(RATE / 6)  # 40 Hz, at a whole number of samples
+    assert bands == sorted(bands, reverse=True)
+    assert bands[-1] < 0.5 * bands[0]
+    noted(motions[-1], "encoder noise")
+    # What the band is chosen for: noise in the acceleration stays below a tenth of its signal.
+    for motion in motions[:3]:
+        error = motion.to_band(motion.qdd[:, 0] - sine(motion.time, 1.0)[2])
+        assert np.sqrt(np.mean(error**2)) < 0.1 * (2 * np.pi) ** 2 / np.sqrt(2)
+
+
+def test_a_joint_that_stands_still_does_not_choose_the_band():
+    t, rng = clock(20.0), np.random.default_rng(3)
+    q = np.stack([sine(t, 1.0)[0], 1e-3 * rng.normal(size=len(t))], 1)
+    motion = condition(recording(t, q, joints=("joint1", "joint2")), ["joint1", "joint2"])
+    assert motion.band == pytest.approx(RATE / 6)
+
+
+@pytest.mark.parametrize("rate", [60.0, 200.0, 1000.0])
+def test_the_note_names_the_band_that_is_used(rate):
+    t = clock(20.0, rate)
+    motion = condition(recording(t, sine(t, 1.0)[0]), ["joint1"])
+    assert motion.band <= min(40.0, rate / 2.5)
+    noted(motion, f"0 to {motion.band:.3g} Hz")
+
+
+@pytest.mark.parametrize("band", [0.0, -3.0, 81.0, float("nan"), float("inf")])
+def test_a_bandwidth_out_of_range_is_refused(band):
+    t = clock()
+    with pytest.raises(InputError, match=r"run\.csv: bandwidth .* Hz .*200 samples a second.*<= 80 Hz"):
+        condition(recording(t, sine(t, 1.0)[0]), ["joint1"], band)
+
+
+@pytest.mark.parametrize("kind", ["q", "tau"])
+def test_a_joint_without_signal_is_refused(kind):
+    t = clock()
+    data = recording(t, np.ones((len(t), 2)), joints=("joint1", "joint2")).rename({f"{kind}.joint2": f"{kind}.jiont2"})
+    with pytest.raises(InputError) as caught:
+        condition(data, ["joint1", "joint2"])
+    line = str(caught.value)
+    for words in ("run.csv", f"'{kind}.joint2'", f"nearest is '{kind}.jiont2'", "q.joint1", "tau.joint1", "[signals]"):
+        assert words in line
+
+
+@pytest.mark.parametrize("n", [2, 3, 4, 60, 180])
+@pytest.mark.parametrize("band", [None, BAND])
+def test_too_few_samples_are_refused(n, band):
+    t = clock()[:n]
+    with pytest.raises(InputError, match=rf"run\.csv: too few samples: {n} rows leave .* at least {MINIMUM_SAMPLES}"):
+        condition(recording(t, sine(t, 1.0)[0]), ["joint1"], band)
+
+
+@pytest.mark.parametrize("every", [2, 4])
+@pytest.mark.parametrize("band", [None, BAND])
+def test_no_run_long_enough_is_refused(every, band):
+    """Two sensors on clocks of their own: each row lacks one or the other."""
+    t = clock()
+    q, tau = sine(t, 1.0)[0], np.ones(len(t))
+    q[::every] = np.nan
+    tau[1::every] = np.nan
+    with pytest.raises(InputError, match=r"too few samples.*close the gaps"):
+        condition(recording(t, q, tau), ["joint1"], band)
+
+
+def test_temperature_is_kept_and_may_be_missing():
+    t = clock()
+    data = recording(t, np.stack([sine(t, 1.0)[0]] * 2, 1), joints=("joint1", "joint2"))
+    data["temp.joint1"] = ("time", 20.0 + t)
+    motion = condition(data, ["joint1", "joint2"], BAND)
+    np.testing.assert_allclose(motion.temperature[:, 0], 20.0 + motion.time)
+    assert np.all(np.isnan(motion.temperature[:, 1]))
+
+
+def test_joints_come_in_the_models_order_and_notes_of_the_reader_are_kept():
+    t = clock()
+    data = recording(t, np.stack([sine(t, 1.0)[0], 0 * t], 1), joints=("a", "b"), notes=["read with care"])
+    motion = condition(data, ["b", "a"], BAND)
+    assert motion.joints == ("b", "a")
+    assert np.ptp(motion.q[:, 0]) == 0.0
+    assert np.ptp(motion.q[:, 1]) > 1.9
+    noted(motion, "read with care")
