@@ -26,11 +26,14 @@ from .wording import evidence_sentence, experiment_sentence, percent, verdict_se
 
 Array = NDArray[np.float64]
 
-CONFIRM = 0.01
+CONFIRM = 0.05
 """An effect is confirmed if the held-out residual energy of its channels rises by this share when it is taken out."""
 
 NAMELESS = 0.1
-"""Smooth curves that explain this share of a channel's residual, in blocks they did not see, mean something nameless."""
+"""Smooth curves that explain this share of a channel's residual, in blocks they did not see, mean something nameless ..."""
+
+MATERIAL = 0.01
+"""... if they also amount to this share of the channel's RMS torque."""
 
 
 @dataclass(frozen=True)
@@ -158,11 +161,13 @@ def _answer(
     findings = tuple(_finding(t, final, trials, joints) for t in confirmed)
     fits = _fits(model, found.first, final, train, locked)
     nameless = {c: x for c, x in found.closing.nameless.items() if x > NAMELESS}
-    description = "; ".join(
-        f"on tau.{joints[c]}, smooth curves over position, speed, load and time together still explain {percent(x)} of the "
-        f"residual in blocks that they were not fitted to"
+    size = {c: float(np.sqrt(x)) * fits[c].train.relative_after for c, x in nameless.items()}
+    words = {
+        c: f"on tau.{joints[c]}, smooth curves over position, speed, load and time together still explain {percent(x)} of "
+        f"the residual in blocks that they were not fitted to ({percent(size[c])} of the channel's torque)"
         for c, x in nameless.items()
-    )
+    }
+    description = "; ".join(text for c, text in words.items() if size[c] >= MATERIAL)
     if findings:
         verdict = "missing_physics"
         remainder = f" Still unnamed: {description}." if description else ""
@@ -175,6 +180,7 @@ def _answer(
         f"no better: not named"
         for t in dropped
     ]
+    notes += [f"too little to speak of: {text}" for c, text in words.items() if size[c] < MATERIAL]
     notes += _excitation(train)
     named = {t.judged.placed.key for t in confirmed}
     candidates = tuple(
@@ -198,7 +204,7 @@ def _answer(
         candidates,
         _moved(found.first, final),
         _traces(found.first, final, train, locked),
-        dict(found.closing.limits),
+        found.closing.limits,
         tuple(notes),
         train[0].motion.band,
     )

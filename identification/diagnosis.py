@@ -95,6 +95,17 @@ class Candidate:
 
 
 @dataclass(frozen=True)
+class Limit:
+    """Smallest value of an effect's parameter that these recordings would have shown."""
+
+    name: str
+    at: str
+    parameter: str
+    value: float
+    unit: str
+
+
+@dataclass(frozen=True)
 class Moved:
     """A baseline parameter before and after the missing physics was added."""
 
@@ -144,8 +155,8 @@ class Diagnosis:
         First screening, best first.
     moved : tuple of Moved
     traces : tuple of Trace
-    limits : mapping of str to float
-        Smallest share of a channel's residual energy that an effect must explain to be named on it.
+    limits : tuple of Limit
+        What would have been seen, had it been there.
     notes : tuple of str
         Conditioning and excitation, in words.
     band : float
@@ -163,7 +174,7 @@ class Diagnosis:
     candidates: tuple[Candidate, ...]
     moved: tuple[Moved, ...]
     traces: tuple[Trace, ...]
-    limits: Mapping[str, float]
+    limits: tuple[Limit, ...]
     notes: tuple[str, ...]
     band: float
 
@@ -196,7 +207,7 @@ class Diagnosis:
             "steps": [vars(s) for s in self.steps],
             "candidates": [vars(c) for c in self.candidates],
             "moved": [vars(m) for m in self.moved],
-            "limits": dict(self.limits),
+            "limits": [vars(x) for x in self.limits],
             "notes": list(self.notes),
             "band": {"value": self.band, "unit": "Hz"},
         }

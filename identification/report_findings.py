@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from datetime import date
 from html import escape
 
-from .diagnosis import Diagnosis, Finding, Rival, Trace
+from .diagnosis import Diagnosis, Finding, Limit, Rival, Trace
 from .report_figures import residual_over_time
 from .report_page import bar, figure, flag, paragraph, table
 from .report_words import chance, number, percent, spans, unit_words, with_std, words
@@ -74,26 +74,19 @@ def where(diagnosis: Diagnosis) -> tuple[str, str, str]:
 
 
 def detection_limits(diagnosis: Diagnosis) -> str:
-    """The smallest effect that would have been named, channel by channel; no effect names a channel without one."""
+    """The smallest size of each effect, at the place where it would have shown best and worst."""
     if not diagnosis.limits:
         return paragraph("No limits of detection were worked out for these recordings.")
-    residual = {fit.channel: fit for fit in diagnosis.fit}
+    kinds: dict[tuple[str, str, str], list[Limit]] = {}
+    for limit in diagnosis.limits:
+        kinds.setdefault((limit.name, limit.parameter, limit.unit), []).append(limit)
     rows = []
-    for channel, share in diagnosis.limits.items():
-        fit = residual.get(channel)
-        size = (
-            f"{number(share**0.5 * fit.train.rms_before, 2)} {escape(unit_words(fit.unit))}"
-            if fit and share >= 0
-            else "–"
-        )
-        rows.append([escape(channel), percent(share), size])
-    lead = (
-        "An effect is named only if it explains at least this share of a channel's residual energy; the last column is "
-        "the same as an RMS. Smaller effects may be there and would not have been seen."
-    )
-    heads = ["Channel", "Smallest share", "As RMS"]
-    return paragraph(lead) + table("Limits of detection", heads, rows, numeric=(1, 2), wide=False)
-
+    for (name, parameter, unit), limits in kinds.items():
+        ordered = sorted(limits, key=lambda x: x.value)
+        ends = [f"{number(x.value)} {unit_words(unit)} at {x.at}".replace("  ", " ") for x in (ordered[0], ordered[-1])]
+        rows.append([escape(words(name)), escape(words(parameter)), *(escape(end) for end in ends)])
+    text = "An effect smaller than this would not have stood out of these recordings."
+    return paragraph(text) + table("Limits of detection", ["Effect", "Parameter", "Best seen", "Worst seen"], rows)
 
 def _card(finding: Finding) -> str:
     name = words(finding.name)

@@ -10,6 +10,7 @@ from ..models.model_file import Model, Placed
 from .assembly import Block, Evaluation
 from .candidates import Variant, candidate_columns, free_parameters, library, smooth_columns, variants
 from .closed_loop import REST
+from .diagnosis import Limit
 from .evidence import Channel, Evidence, Products
 from .experiment import Experiment
 from .fit import Fit, gather
@@ -24,6 +25,9 @@ BLOCK = 1.5
 
 RAW_BLOCKS = 12
 """Blocks of unwhitened samples, each predicted from the others."""
+
+WORTH = 0.05
+"""Least share of its channels' residual energy that an effect must explain to be named."""
 
 NULLS = 200
 
@@ -112,7 +116,7 @@ class Screening:
     judged: tuple[Judged, ...]
     threshold: Mapping[tuple[int, ...], float]
     nameless: Mapping[int, float]
-    limits: Mapping[str, float]
+    limits: tuple[Limit, ...]
     noise: Noise
 
 
@@ -180,7 +184,7 @@ def screen(
 
     judged: list[Judged] = []
     null: dict[tuple[int, ...], Array] = {(c,): np.zeros(NULLS) for c in range(len(model.joints))}
-    limits: dict[str, float] = {}
+    limits: list[Limit] = []
     log_size = np.log(evidence.size)
     for options in pool:
         best: tuple[float, float, Variant, Array, Products, dict[int, Parts]] | None = None
@@ -212,8 +216,11 @@ def screen(
     threshold = {channels: float(np.quantile(x, LEVEL)) for channels, x in null.items()}
     for j in judged:
         if len(j.variant.amplitudes) == 1:
-            name = j.placed.effect.parameters[int(j.variant.amplitudes[0])].name
-            limits[f"{j.placed.key}.{name}"] = evidence.smallest(j.products, threshold[j.channels] + j.price)
+            p = j.placed.effect.parameters[int(j.variant.amplitudes[0])]
+            # Both bars count: a score above noise, and a share of the residual worth a name.
+            needed = max(threshold[j.channels] + j.price, 0.5 * WORTH * sum(_energy(white[c]) for c in j.channels))
+            value = evidence.smallest(j.products, needed)
+            limits.append(Limit(j.placed.effect.name, j.placed.at, p.name, value, assembly.unit(j.placed, p)))
     nameless = {}
     for c, parts in enumerate(smooth):
         products = evidence.products([(c, noise.whiten(c, parts))])
@@ -223,7 +230,11 @@ def screen(
             plain_products = raw.products([(c, np.concatenate(parts) / found.sigma[c])])
             nameless[c] = float(2 * np.sum(raw.fresh_gains(plain_products, -free, free)) / energy[c])
     judged.sort(key=lambda j: -j.score)
-    return Screening(evidence, moving, tuple(at_rest), tuple(judged), threshold, nameless, limits, noise)
+    return Screening(evidence, moving, tuple(at_rest), tuple(judged), threshold, nameless, tuple(limits), noise)
+
+
+def _energy(channel: Channel) -> float:
+    return float(np.sum(channel.residual**2))
 
 
 def reliably_positive(gains: Array) -> bool:

@@ -20,12 +20,9 @@ from .base_parameters import BaseParameters
 from .closed_loop import planned
 from .experiment import Experiment, Scales
 from .fit import Fit, fit
-from .screening import Judged, Noise, Screening, reliably_positive, screen
+from .screening import WORTH, Judged, Noise, Screening, reliably_positive, screen
 
 Array = NDArray[np.float64]
-
-WORTH = 0.05
-"""Least share of its channels' residual energy that an effect must explain to be named."""
 
 ALIKE = 0.98
 """Cosine from which on two effects explain the same."""

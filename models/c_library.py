@@ -36,7 +36,7 @@ def load_library(source: str) -> ctypes.CDLL:
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "snarelab"
     cache.mkdir(mode=0o700, parents=True, exist_ok=True)
     path = cache / f"{hashlib.sha256(identity.encode()).hexdigest()}.so"
-    if not intact(path):
+    if not _intact(path):
         with tempfile.TemporaryDirectory(dir=cache) as folder:
             built = Path(folder) / path.name
             command = [*compiler, *_FLAGS, "-x", "c", "-", "-o", str(built), "-lm"]
@@ -49,7 +49,7 @@ def load_library(source: str) -> ctypes.CDLL:
     return ctypes.CDLL(str(path))
 
 
-def intact(path: Path) -> bool:
+def _intact(path: Path) -> bool:
     """Whether the library is there and ends in its own digest: a torn file may load and then crash."""
     try:
         content = path.read_bytes()

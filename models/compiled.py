@@ -42,17 +42,17 @@ class SampleFunction:
     def __init__(self, function: ca.Function) -> None:
         """Build, or find in the cache (see `load_library`)."""
         inputs = function.sx_in()
-        outputs = function.call(inputs, True, False)
+        outputs = [ca.densify(output) for output in function.call(inputs, True, False)]
         # CasADi stores columns, numpy rows: transposed and dense, a sample's output is written where it belongs.
         # The name is our own: the function's might be one of C's.
-        written = ca.Function("sample", inputs, [ca.densify(output.T) for output in outputs])
+        written = ca.Function("sample", inputs, [output.T for output in outputs])
         self._name = function.name()
         self._names = function.name_in()
         self._sizes = [function.size1_in(i) for i in range(function.n_in())]
         self._shapes = [function.size_out(i) for i in range(function.n_out())]
         # Held here: building a map of the virtual machine takes as long as running it.
         self._map = functools.lru_cache(maxsize=16)(written.map)
-        self._accumulate = functools.lru_cache(maxsize=16)(written.mapaccum)
+        self._accumulate = functools.lru_cache(maxsize=16)(ca.Function("step", inputs, outputs).mapaccum)
         self._loop = _compiled_loop(written)
 
     def __call__(self, *inputs: Array) -> tuple[Array, ...]:
@@ -98,8 +98,10 @@ class SampleFunction:
         InputError
             As a call does.
         """
+        if self._shapes != [(self._sizes[0], 1)]:
+            raise ValueError(f"{self._name}: outputs {self._shapes} are not its first input a sample later")
         (_, *arrays), n_samples = self._checked((start, *inputs))
-        states = np.empty((n_samples + 1, len(start)))
+        states = np.empty((n_samples + 1, self._sizes[0]))
         states[0] = start
         if n_samples:
             # In C, each sample reads the row that the one before it has written.

@@ -92,7 +92,7 @@ def simulate_states(
     Raises
     ------
     InputError
-        If a signal is missing, or there is no steady state to start from.
+        If a signal is missing or does not fit the others, or there is no steady state to start from.
     """
     built = _build(effect)
     p = np.asarray(parameters, dtype=float)
@@ -120,7 +120,7 @@ def evaluate_law(
     Raises
     ------
     InputError
-        If a signal is missing, or there is no steady state to start from.
+        If a signal is missing or does not fit the others, or there is no steady state to start from.
     """
     built = _build(effect)
     signals, p = _signals(effect, built, inputs), np.asarray(parameters, dtype=float)
@@ -134,7 +134,7 @@ def evaluate_law(
 
 
 def prepare(effects: Iterable[Effect]) -> None:
-    """Compile effects ahead of their first use, several at a time; those in the cache cost milliseconds."""
+    """Compile effects ahead of their first use, several at a time; what is in the cache already costs milliseconds."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         list(pool.map(_build, effects))
 

@@ -5,6 +5,7 @@ import threading
 import casadi as ca
 import numpy as np
 import pytest
+
 from snarelab.errors import InputError
 from snarelab.models import c_library, compiled
 from snarelab.models.compiled import CompilerNotice, SampleFunction
@@ -21,6 +22,24 @@ def doubled() -> SampleFunction:
     return SampleFunction(
         ca.Function("sin", [x, shift], [2 * x + shift, x @ ca.DM([[1, 2, 3]])], ["x", "shift"], ["a", "b"])
     )
+
+
+def filtered() -> SampleFunction:
+    """x' = [x1 + u, sin(x0) / 2 + gain]: the state a sample later."""
+    x, u, gain = ca.SX.sym("x", 2), ca.SX.sym("u"), ca.SX.sym("gain")
+    after = ca.vertcat(x[1] + u, ca.sin(x[0]) / 2 + gain)
+    return SampleFunction(ca.Function("filtered", [x, u, gain], [after], ["x", "u", "gain"], ["after"]))
+
+
+def check_filtered():
+    inputs = np.random.default_rng(2).normal(size=(40, 1))
+    expected = [[0.3, -0.2]]
+    for (u,) in inputs:
+        x = expected[-1]
+        expected.append([x[1] + u, np.sin(x[0]) / 2 + 0.1])
+    states = filtered().scan(np.array([0.3, -0.2]), inputs, np.array([0.1]))
+    np.testing.assert_allclose(states, expected, rtol=0, atol=1e-14)
+    np.testing.assert_array_equal(filtered().scan(np.array([1.0, 2.0]), inputs[:0], np.array([0.1])), [[1.0, 2.0]])
 
 
 def check_doubled():
@@ -48,6 +67,21 @@ def test_without_a_working_compiler_there_is_a_notice_and_the_same_answer(tmp_pa
     assert len(caught) == 1
 
 
+def test_scan_in_the_virtual_machine(monkeypatch):
+    monkeypatch.setenv("SNARELAB_CC", "none")
+    compiled._notify.cache_clear()
+    with pytest.warns(CompilerNotice):
+        check_filtered()
+
+
+def test_scan_hands_each_state_to_the_next_sample():
+    check_filtered()
+    with pytest.raises(InputError, match=r"filtered: input 'x' has shape \(3,\)"):
+        filtered().scan(np.zeros(3), np.zeros((5, 1)), np.zeros(1))
+    with pytest.raises(ValueError, match="not its first input a sample later"):
+        doubled().scan(np.zeros(2), np.zeros((5, 1)))
+
+
 def test_a_damaged_library_is_rebuilt(own_cache):
     check_doubled()
     (library,) = own_cache.iterdir()
@@ -56,7 +90,7 @@ def test_a_damaged_library_is_rebuilt(own_cache):
         library.unlink()  # never in place: it is loaded
         library.write_bytes(damage)
         check_doubled()
-        assert c_library.intact(library)
+        assert c_library._intact(library)
     before = library.stat().st_mtime_ns
     check_doubled()
     assert library.stat().st_mtime_ns == before  # found, not built again

@@ -1,14 +1,18 @@
 """The integrator of hidden states: order, stability, start, and what a delay does to a sine."""
 
+import warnings
+from concurrent.futures import ThreadPoolExecutor
+
 import casadi as ca
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 from snarelab.errors import InputError
+from snarelab.models import compiled, hidden_state
 from snarelab.models.effect import Effect, Parameter
-from snarelab.models.effects import get_effect
-from snarelab.models.hidden_state import evaluate_law, simulate_states
+from snarelab.models.effects import effects, get_effect
+from snarelab.models.hidden_state import evaluate_law, prepare, simulate_states
 
 DELAY = get_effect("sensor_delay")
 SPRING = get_effect("joint_elasticity")
@@ -167,3 +171,75 @@ def test_one_sample_is_the_start():
 def test_missing_signal_is_named():
     with pytest.raises(InputError, match="sensor_delay reads the signal 'value'"):
         evaluate_law(DELAY, {"q": np.ones(9)}, np.array([0.01]), 0.01)
+
+
+@pytest.fixture
+def rebuilt():
+    """Effects are built anew in the test and after it."""
+    hidden_state._build.cache_clear()
+    yield
+    hidden_state._build.cache_clear()
+
+
+def everything(effect, n=1500):
+    """Every signal of an effect's place, the one that no law reads missing from the recording."""
+    time = np.arange(n) * 0.005
+    sizes = hidden_state.SIGNALS[effect.at]
+    turns = {name: [[3 + i + j] for j in range(size)] for i, (name, size) in enumerate(sizes.items())}
+    inputs = {name: 2 + np.sin(turn * time).T for name, turn in turns.items()}
+    inputs |= {"qd": np.cos(3 * time), "load": load(time), "temperature": np.full(n, np.nan)}
+    return inputs
+
+
+def usual(effect, scale=1.0):
+    return np.array([scale * (p.zero or 0.7) for p in effect.parameters])
+
+
+@pytest.mark.parametrize("name", effects())
+def test_c_and_the_virtual_machine_agree(name, rebuilt, monkeypatch):
+    effect = get_effect(name)
+    inputs, parameters = everything(effect), usual(effect)
+    in_c = evaluate_law(effect, inputs, parameters, 0.005)
+    states_in_c = simulate_states(effect, inputs, parameters, 0.005) if effect.states else ()
+    monkeypatch.setenv("SNARELAB_CC", "none")
+    hidden_state._build.cache_clear()
+    compiled._notify.cache_clear()
+    with pytest.warns(compiled.CompilerNotice) as caught:
+        in_machine = evaluate_law(effect, inputs, parameters, 0.005)
+    assert len(caught) == 1
+    states_in_machine = simulate_states(effect, inputs, parameters, 0.005) if effect.states else ()
+    assert (in_c.by_signal is None) == (in_machine.by_signal is None)
+    for ours, theirs in zip((*in_c, *states_in_c), (*in_machine, *states_in_machine), strict=True):
+        if ours is not None and theirs is not None:
+            assert np.isfinite(ours).all()
+            np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-12 * np.abs(theirs).max())
+
+
+def test_threads_share_effects():
+    tasks = [(effect, scale) for scale in (0.5, 1.0, 2.0) for effect in (DELAY, SPRING, get_effect("makkar_friction"))]
+
+    def run(task):
+        effect, scale = task
+        return evaluate_law(effect, everything(effect, 12000), usual(effect, scale), 0.005)
+
+    with ThreadPoolExecutor(4) as pool:
+        together = list(pool.map(run, tasks * 4))
+    for result, alone in zip(together, list(map(run, tasks)) * 4, strict=True):
+        np.testing.assert_array_equal(result.values, alone.values)
+        np.testing.assert_array_equal(result.by_parameter, alone.by_parameter)
+
+
+def test_prepared_effects_need_no_compiler_later(rebuilt, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    prepare([DELAY, SPRING, get_effect("viscous_friction")])
+    assert len(list((tmp_path / "snarelab").iterdir())) == 3 + 3 + 1  # law, rate and step of those with states
+    monkeypatch.setenv("SNARELAB_CC", "none")
+    compiled._notify.cache_clear()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        evaluate_law(DELAY, everything(DELAY), usual(DELAY), 0.005)
+
+
+def test_signals_of_different_lengths_are_said():
+    with pytest.raises(InputError, match=r"joint_elasticity_step|joint_elasticity_law"):
+        evaluate_law(SPRING, {"load": np.ones(9), "inertia": np.ones(8)}, np.array([100.0, 1.0]), 0.01)

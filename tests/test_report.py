@@ -14,12 +14,14 @@ from typing import Literal
 import numpy as np
 import pytest
 from matplotlib.image import imread
+
 from snarelab.identification.diagnosis import (
     Candidate,
     ChannelFit,
     Diagnosis,
     Estimate,
     Finding,
+    Limit,
     Location,
     Misfit,
     Moved,
@@ -152,7 +154,7 @@ def missing_physics() -> Diagnosis:
             Moved("inertia.link3.mass", "kg", 3.1234, 3.1239, 0.0021),
         ),
         traces=kept,
-        limits={f"tau.joint{j}": 0.004 * j for j in JOINTS},
+        limits=tuple(Limit("coulomb_friction", f"joint{j}", "level", 0.04 * j, "N*m") for j in JOINTS),
         notes=(
             "Condition number 310: every parameter is excited.",
             "joint6 turns by less than 40°: a spring and an imbalance there would look alike.",

@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 import matplotlib as mpl
 import numpy as np
 import pytest
+
 from snarelab.errors import InputError
 from snarelab.identification.diagnosis import (
     Candidate,
@@ -17,6 +18,7 @@ from snarelab.identification.diagnosis import (
     Diagnosis,
     Estimate,
     Finding,
+    Limit,
     Location,
     Misfit,
     Moved,
@@ -51,7 +53,7 @@ def spelt(text: str) -> Diagnosis:
         candidates=(Candidate(text, text, 0.4, 1.0, True),),
         moved=(Moved(text, text, 1.0, 2.0, 0.1),),
         traces=tuple(traces),
-        limits={text: 0.1},
+        limits=(Limit(text, text, text, 0.1, text),),
         notes=(text,),
         band=20.0,
     )
@@ -105,7 +107,7 @@ def test_draws_what_little_there_is(tmp_path: Path) -> None:
         candidates=(),
         moved=(),
         traces=(trace, replace(trace, channel="empty", measured=nothing)),
-        limits={},
+        limits=(),
         notes=(),
     )
     write_report(bare, tmp_path / "report.html")

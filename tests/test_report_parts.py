@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from snarelab.identification.report_curves import binned
 from snarelab.identification.report_drawing import thinned
 from snarelab.identification.report_words import chance, number, percent, spans, unit_words, with_std, words

@@ -1,0 +1,262 @@
+"""Gains, shares and nulls of a candidate, against regressions done the slow way on stacked matrices."""
+
+import numpy as np
+import pytest
+import scipy.optimize
+import scipy.stats
+from snarelab.identification.evidence import Channel, Evidence
+
+N_PARAMETERS, N_BLOCKS = 5, 6
+FREE = (np.full(2, -np.inf), np.full(2, np.inf))
+
+
+class Problem:
+    """Two channels of different length that share two of five parameters, and a candidate of two columns on both."""
+
+    def __init__(self, seed, sizes=(210, 130), k=2):
+        rng = np.random.default_rng(seed)
+        self.index = [np.array([0, 1, 4]), np.array([2, 4, 3, 1])]
+        self.columns = [rng.normal(size=(n, len(i))) for n, i in zip(sizes, self.index, strict=True)]
+        self.candidate = [rng.normal(size=(n, k)) + 0.3 * x[:, :1] for n, x in zip(sizes, self.columns, strict=True)]
+        self.residual = [rng.normal(size=n) + 0.4 * c.sum(1) for n, c in zip(sizes, self.candidate, strict=True)]
+        self.noise = [rng.normal(size=n) for n in sizes]
+        self.block = [np.sort(rng.integers(0, N_BLOCKS, n)) for n in sizes]
+
+    def evidence(self, n_nulls=20):
+        parts = zip(self.index, self.columns, self.residual, self.noise, self.block, strict=True)
+        return Evidence([Channel(*part) for part in parts], N_PARAMETERS, N_BLOCKS, n_nulls, seed=3)
+
+    def products(self, evidence):
+        return evidence.products(list(enumerate(self.candidate)))
+
+    @property
+    def x(self):
+        stacked = []
+        for i, columns in zip(self.index, self.columns, strict=True):
+            full = np.zeros((len(columns), N_PARAMETERS))
+            full[:, i] = columns
+            stacked.append(full)
+        return np.concatenate(stacked)
+
+    @property
+    def c(self):
+        return np.concatenate(self.candidate)
+
+    @property
+    def y(self):
+        return np.concatenate(self.residual)
+
+    @property
+    def blocks(self):
+        return np.concatenate(self.block)
+
+
+def left(a, y):
+    """Half the squared residual of a regression."""
+    return 0.5 * np.sum((y - a @ np.linalg.lstsq(a, y, rcond=None)[0]) ** 2)
+
+
+def bounded(x, c, y, low, high):
+    """Baseline free and amplitudes between bounds, by scipy: (all coefficients, half the squared residual)."""
+    limits = np.full(x.shape[1], np.inf)
+    a = np.hstack([x, c])
+    found = scipy.optimize.lsq_linear(a, y, (np.r_[-limits, low], np.r_[limits, high]), method="bvls", tol=1e-14)
+    return found.x, 0.5 * np.sum((y - a @ found.x) ** 2)
+
+
+@pytest.fixture(params=range(4))
+def problem(request):
+    return Problem(request.param)
+
+
+def test_gain_is_what_the_regression_gains(problem):
+    evidence = problem.evidence()
+    gain = evidence.gain(problem.products(evidence), *FREE)
+    both = np.hstack([problem.x, problem.c])
+    assert gain.total == pytest.approx(left(problem.x, problem.y) - left(both, problem.y), rel=1e-9)
+    np.testing.assert_allclose(gain.amplitudes, np.linalg.lstsq(both, problem.y, rcond=None)[0][-2:], rtol=1e-8)
+    parts = [2 * left(problem.x, c) / (c @ c) for c in problem.c.T]
+    assert gain.unabsorbed == pytest.approx(min(parts), rel=1e-9)
+
+
+def test_a_candidate_on_one_channel_only():
+    problem = Problem(7)
+    evidence = problem.evidence()
+    gain = evidence.gain(evidence.products([(1, problem.candidate[1])]), *FREE)
+    c = np.concatenate([0 * problem.candidate[0], problem.candidate[1]])
+    wanted = left(problem.x, problem.y) - left(np.hstack([problem.x, c]), problem.y)
+    assert gain.total == pytest.approx(wanted, rel=1e-9)
+
+
+@pytest.mark.parametrize("low", [(-np.inf, 0.0), (0.0, 0.5), (0.45, -0.1)])
+def test_bounded_amplitudes_are_scipys(problem, low):
+    evidence = problem.evidence()
+    bounds = np.array(low), np.array([0.6, 0.2]) + np.maximum(np.array(low), 0.0)
+    bounds[1][0] = max(bounds[1][0], 0.01)
+    gain = evidence.gain(problem.products(evidence), *bounds)
+    found, cost = bounded(problem.x, problem.c, problem.y, *bounds)
+    np.testing.assert_allclose(gain.amplitudes, found[-2:], atol=1e-8)
+    assert gain.total == pytest.approx(left(problem.x, problem.y) - cost, rel=1e-8, abs=1e-8)
+
+
+def test_an_amplitude_of_the_wrong_sign_gains_nothing():
+    problem = Problem(1, k=1)
+    evidence = problem.evidence()
+    gain = evidence.gain(problem.products(evidence), np.array([-np.inf]), np.array([0.0]))
+    assert gain.amplitudes[0] == pytest.approx(0.0, abs=1e-12)
+    assert gain.total == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("bounds", [FREE, (np.array([0.0, -1.0]), np.array([0.3, 0.3]))])
+def test_fresh_gains_are_a_refit_without_the_block(problem, bounds):
+    evidence = problem.evidence()
+    fresh = evidence.fresh_gains(problem.products(evidence), *bounds)
+    x, c, y, blocks = problem.x, problem.c, problem.y, problem.blocks
+    for b in range(N_BLOCKS):
+        own = blocks == b
+        without = np.linalg.lstsq(x[~own], y[~own], rcond=None)[0]
+        beside, _ = bounded(x[~own], c[~own], y[~own], *bounds)
+        before = 0.5 * np.sum((y[own] - x[own] @ without) ** 2)
+        after = 0.5 * np.sum((y[own] - np.hstack([x, c])[own] @ beside) ** 2)
+        assert fresh[b] == pytest.approx(before - after, rel=1e-7, abs=1e-7)
+
+
+def test_fresh_gains_of_chance_are_below_nothing_on_average():
+    """A column of chance fitted elsewhere costs about half a unit in all; fitted to everything it gains about half."""
+    totals = []
+    for seed in range(60):
+        problem = Problem(seed, k=1)
+        problem.residual = problem.noise
+        evidence = problem.evidence()
+        bounds = np.full(1, -np.inf), np.full(1, np.inf)
+        products = problem.products(evidence)
+        totals.append((evidence.fresh_gains(products, *bounds).sum(), evidence.gain(products, *bounds).total))
+    fresh, fitted = np.mean(totals, axis=0)
+    assert fresh < 0
+    assert fitted == pytest.approx(0.5, abs=0.25)
+
+
+@pytest.mark.parametrize("bounds", [FREE, (np.array([0.0, -1.0]), np.array([0.3, 0.3]))])
+def test_shares_are_the_gain_block_by_block(problem, bounds):
+    evidence = problem.evidence()
+    products = problem.products(evidence)
+    gain = evidence.gain(products, *bounds)
+    shares = evidence.shares(products, gain.amplitudes)
+    x, c, y = problem.x, problem.c, problem.y
+    before = y - x @ np.linalg.lstsq(x, y, rcond=None)[0]
+    after = y - np.hstack([x, c]) @ bounded(x, c, y, *bounds)[0]
+    for b in range(N_BLOCKS):
+        own = problem.blocks == b
+        assert shares[b] == pytest.approx(0.5 * np.sum(before[own] ** 2 - after[own] ** 2), rel=1e-7, abs=1e-7)
+    assert shares.sum() == pytest.approx(gain.total, rel=1e-8)
+
+
+def test_null_gains_are_regressions_of_sign_flipped_noise(problem):
+    evidence = problem.evidence(n_nulls=12)
+    found = evidence.null_gains(problem.products(evidence))
+    flipped = np.concatenate(evidence.flipped)
+    ratio = flipped / np.concatenate(problem.noise)[:, None]
+    for b in range(N_BLOCKS):
+        np.testing.assert_allclose(ratio[problem.blocks == b], np.sign(ratio[problem.blocks == b][0])[None], rtol=1e-12)
+    assert len(np.unique(np.round(ratio), axis=1)) == N_BLOCKS or np.ptp(ratio) == 2  # both signs occur
+    both = np.hstack([problem.x, problem.c])
+    wanted = [left(problem.x, e) - left(both, e) for e in flipped.T]
+    np.testing.assert_allclose(found, wanted, rtol=1e-8)
+
+
+@pytest.mark.parametrize("k", [1, 3])
+def test_quantiles_of_the_null_are_chi_squared(k):
+    """Twice the gain on white noise of unit variance is chi squared with k degrees of freedom (Wilks 1938)."""
+    rng, n, blocks = np.random.default_rng(4), 6000, 300
+    x, c = rng.normal(size=(n, 2)), rng.normal(size=(n, k))
+    channel = Channel(np.arange(2), x, rng.normal(size=n), rng.normal(size=n), np.arange(n) * blocks // n)
+    evidence = Evidence([channel], 2, blocks, 20000)
+    nulls = 2 * evidence.null_gains(evidence.products([(0, c)]))
+    for level in (0.5, 0.9, 0.99):
+        assert np.quantile(nulls, level) == pytest.approx(scipy.stats.chi2.ppf(level, k), rel=0.2)
+
+
+def test_likeness_is_the_cosine_after_the_baseline():
+    problem, rng = Problem(5), np.random.default_rng(8)
+    evidence = problem.evidence()
+    a = {0: rng.normal(size=210), 1: rng.normal(size=130)}
+    b = {1: a[1] + 0.5 * rng.normal(size=130) + 3.0 * problem.columns[1][:, 0]}
+    x = problem.x
+    stacked = [np.concatenate([s.get(0, np.zeros(210)), s.get(1, np.zeros(130))]) for s in (a, b)]
+    u, v = (s - x @ np.linalg.lstsq(x, s, rcond=None)[0] for s in stacked)
+    wanted = u @ v / np.linalg.norm(u) / np.linalg.norm(v)
+    assert evidence.likeness(a, b) == pytest.approx(wanted, rel=1e-9)
+    assert evidence.likeness(b, a) == pytest.approx(wanted, rel=1e-9)
+    assert evidence.likeness(b, {1: -2.0 * b[1]}) == pytest.approx(-1.0, rel=1e-9)
+    assert evidence.likeness({0: a[0]}, {1: a[1]}) == pytest.approx(
+        evidence.likeness({1: a[1]}, {0: a[0]}), rel=1e-9
+    )  # through the shared parameters alone
+
+
+def test_smallest_amplitude_gains_what_is_needed():
+    problem = Problem(2, k=1)
+    evidence = problem.evidence()
+    amplitude = evidence.smallest(problem.products(evidence), 7.0)
+    assert left(problem.x, problem.c[:, 0] * amplitude) == pytest.approx(7.0, rel=1e-9)
+
+
+def test_baseline_with_columns_that_depend_on_each_other():
+    problem = Problem(3)
+    whole = Problem(3)
+    whole.columns[0][:, 2] = whole.columns[0][:, 0] - 2 * whole.columns[0][:, 1]
+    whole.columns[1][:, 1] = 0.0  # parameter 4 is then seen through channel 0 only, where it is no news
+    evidence = whole.evidence()
+    gain = evidence.gain(whole.products(evidence), *FREE)
+    both = np.hstack([whole.x, whole.c])
+    assert np.linalg.matrix_rank(whole.x) == N_PARAMETERS
+    assert gain.total == pytest.approx(left(whole.x, whole.y) - left(both, whole.y), rel=1e-8)
+    whole.index = [np.array([0, 1, 4]), np.array([2, 3, 3, 3])]
+    whole.index[1] = np.array([2, 3])
+    whole.columns[1] = problem.columns[1][:, :2]
+    evidence = whole.evidence()
+    assert np.linalg.matrix_rank(whole.x) == N_PARAMETERS - 1
+    gain = evidence.gain(whole.products(evidence), *FREE)
+    both = np.hstack([whole.x, whole.c])
+    assert gain.total == pytest.approx(left(whole.x, whole.y) - left(both, whole.y), rel=1e-8)
+    fresh = evidence.fresh_gains(whole.products(evidence), *FREE)
+    assert np.all(np.isfinite(fresh))
+    assert fresh.sum() < gain.total
+
+
+def test_candidate_columns_that_are_alike_count_once():
+    problem = Problem(4, k=1)
+    evidence = problem.evidence()
+    one = evidence.gain(problem.products(evidence), *(b[:1] for b in FREE))
+    twice = evidence.products([(k, np.hstack([c, 3 * c])) for k, c in enumerate(problem.candidate)])
+    for bounds in (FREE, (np.array([0.0, 0.0]), np.array([0.1, np.inf]))):
+        assert evidence.gain(twice, *bounds).total == pytest.approx(one.total, rel=1e-6)
+    np.testing.assert_allclose(
+        evidence.null_gains(twice), evidence.null_gains(problem.products(evidence)), rtol=1e-6, atol=1e-9
+    )
+
+
+def test_a_column_that_the_baseline_can_mimic_gains_nothing():
+    problem = Problem(6, k=1)
+    problem.candidate = [
+        x[:, i == 4] + 1e-3 * np.random.default_rng(9).normal(size=(len(x), 1))
+        for i, x in zip(problem.index, problem.columns, strict=True)
+    ]
+    evidence = problem.evidence()
+    gain = evidence.gain(problem.products(evidence), *(b[:1] for b in FREE))
+    assert gain.total == 0.0
+    assert gain.unabsorbed < 1e-5
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+def test_units_do_not_matter(scale):
+    problem = Problem(0)
+    evidence = problem.evidence()
+    wanted = evidence.gain(problem.products(evidence), *FREE)
+    sizes = scale ** np.arange(3)
+    problem.columns[0] = problem.columns[0] * sizes
+    problem.columns[1] = problem.columns[1] * np.array([1.0, sizes[2], 1.0, sizes[1]])
+    problem.candidate = [c * [1.0, scale] for c in problem.candidate]
+    evidence = problem.evidence()
+    gain = evidence.gain(problem.products(evidence), *FREE)
+    assert gain.total == pytest.approx(wanted.total, rel=1e-6)
+    np.testing.assert_allclose(gain.amplitudes * [1.0, scale], wanted.amplitudes, rtol=1e-6)
