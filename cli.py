@@ -11,6 +11,7 @@ import sys
 import time
 import warnings
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +23,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; see the module's text for the exit status."""
     parser = _parser()
     given = parser.parse_args(arguments)
-    warnings.showwarning = _notice
     try:
-        given.run(given)
+        with warnings.catch_warnings():
+            warnings.showwarning = _notice
+            given.run(given)
     except InputError as error:
         print(f"snarelab: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
@@ -68,7 +70,9 @@ def _identify(given: argparse.Namespace) -> None:
     from .identification.identify import identify  # engines load only for a command that needs them
     from .models.model_file import load_model, save_model
 
-    _writable(given.json, given.save_model)
+    _writable([given.json, given.save_model], [*given.recordings, given.holdout])
+    if given.holdout and Path(given.holdout).resolve() in [Path(r).resolve() for r in given.recordings]:
+        raise InputError(f"{given.holdout}: the holdout is also a recording to fit; hold out one that the fit does not see")
     model = load_model(given.model)
     with _Progress() as progress:
         found = identify(model, given.recordings, [given.holdout] if given.holdout else (), progress=progress)
@@ -86,7 +90,7 @@ def _diagnose(given: argparse.Namespace) -> None:
     from .identification.report import write_report
     from .models.model_file import load_model, save_model
 
-    _writable(given.json, given.report, given.save_model)
+    _writable([given.json, given.report, given.save_model], [*given.recordings, given.holdout])
     model = load_model(given.model)
     with _Progress() as progress:
         answer = diagnose(model, given.recordings, given.holdout, progress=progress)
@@ -110,15 +114,24 @@ def _simulate(given: argparse.Namespace) -> None:
     from .models.model_file import load_model
     from .recordings import write_recording
 
-    _writable(given.out)
+    _writable([given.out], [given.motion])
     write_recording(simulate(load_model(given.model), given.motion), given.out)
 
 
-def _writable(*paths: str | None) -> None:
-    """Refuse a place that cannot be written before any long work starts."""
-    for path in paths:
-        if path and path != "-" and not (Path(path).absolute().parent.is_dir() and os.access(Path(path).absolute().parent, os.W_OK)):
+def _writable(outputs: Sequence[str | None], recordings: Sequence[str | None]) -> None:
+    """Refuse a place that cannot be written, or holds what is read, before any long work starts."""
+    taken = {Path(r).resolve(): "a recording that is read" for r in recordings if r}
+    for path in outputs:
+        if not path or path == "-":
+            continue
+        place = Path(path).resolve()
+        if not (place.parent.is_dir() and os.access(place.parent, os.W_OK)):
             raise InputError(f"{path}: its folder does not exist or cannot be written; make it first")
+        if place.exists() and not place.is_file():
+            raise InputError(f"{path}: is there and no plain file; name a file, or - for standard output")
+        if place in taken:
+            raise InputError(f"{path}: is also {taken[place]}; write somewhere else")
+        taken[place] = "another output"
 
 
 def _write_json(result: dict[str, Any], path: str) -> None:
@@ -131,7 +144,10 @@ def _write_json(result: dict[str, Any], path: str) -> None:
         scratch.write_text(text, encoding="utf-8")
         scratch.replace(path)
     except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}") from None
+        raise InputError(f"{path}: cannot be written: {error.strerror}; choose another folder") from None
+    finally:
+        with suppress(OSError):
+            scratch.unlink()
 
 
 def _parameter_table(result: dict[str, Any]) -> str:

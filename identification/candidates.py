@@ -35,7 +35,10 @@ class Variant:
     def subsets(self) -> list[NDArray[np.int_]]:
         """Positions of the columns to try together: each amplitude alone, and all of them."""
         every = np.arange(max(len(self.amplitudes), 1))
-        return [every] if len(every) == 1 else [every, *(every[k : k + 1] for k in every)]
+        if len(every) == 1:
+            return [every]
+        singles = [every[k : k + 1] for k in every if self.placed.effect.parameters[self.amplitudes[k]].alone]
+        return [every, *singles]
 
 
 def library(model: Model) -> list[Placed]:

@@ -56,7 +56,8 @@ def whitener(residual: Array, columns: Array, segments: Sequence[slice]) -> tupl
     ridge = 1e-3 * np.sqrt(len(residual)) * np.eye(use.shape[1])
     answer = lstsq(np.vstack([use, ridge]), np.concatenate([residual, np.zeros(len(ridge))]), lapack_driver="gelsy")
     noise = residual - use @ answer[0]  # type: ignore[index]
-    kept = [s for s in segments if s.stop - s.start > 4 * LONGEST]
+    # Long runs tell the memory apart from the ends; short ones serve where there is nothing else.
+    kept = [s for s in segments if s.stop - s.start > 4 * LONGEST] or [s for s in segments if s.stop - s.start > LONGEST]
     best: tuple[float, Array, float] | None = None
     for order in range(LONGEST + 1):
         past = np.concatenate([_lagged(noise[s], order)[LONGEST - order :] for s in kept])

@@ -237,9 +237,9 @@ def _energy(channel: Channel) -> float:
     return float(np.sum(channel.residual**2))
 
 
-def reliably_positive(gains: Array) -> bool:
-    """Mean over blocks left out clearly above zero: one-sided 2.5 %."""
-    return bool(np.mean(gains) > 2.0 * np.std(gains, ddof=1) / np.sqrt(len(gains)))
+def reliably_positive(gains: Array, errors: float = 2.0) -> bool:
+    """Mean over blocks left out above zero by so many standard errors (two: one-sided 2.5 %)."""
+    return bool(np.mean(gains) > errors * np.std(gains, ddof=1) / np.sqrt(len(gains)))
 
 
 def _near_rest(experiment: Experiment, joint: int) -> NDArray[np.bool_]:

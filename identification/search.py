@@ -140,9 +140,15 @@ def _choose(result: Screening) -> list[Judged]:
         if j.explained >= WORTH and reliably_positive(fresh) and _holds_in_motion(result, j):
             passing.append(j)
     keys = {j.placed.key for j in passing}
+    single: dict[int, float] = {}
+    for j in passing:
+        if len(j.channels) == 1:
+            single.setdefault(j.channels[0], j.score)
     chosen: list[Judged] = []
     reached: set[int] = set()
     for j in passing:
+        if len(j.channels) > 1 and sum(single.get(c, 0.0) for c in j.channels) > j.score:
+            continue  # several local effects explain more than one that reaches everywhere
         if any(f"{name}.{j.placed.at}" in keys for name in j.placed.effect.contains):
             continue  # a special case of it passes too, and goes first
         if reached.isdisjoint(j.channels):
@@ -161,18 +167,22 @@ def _holds_in_motion(result: Screening, j: Judged) -> bool:
     energy = sum(float(np.sum(moving.channels[c].residual ** 2)) for c in j.channels)
     fresh = moving.fresh_gains(products, j.variant.low, j.variant.high)
     enough = gain.total - j.price > result.threshold[j.channels] and 2 * gain.total > WORTH * energy
-    return enough and reliably_positive(fresh)
+    return enough and reliably_positive(fresh, 1.0)
 
 
 def _weigh(result: Screening, best: Judged, seed: int) -> Taken:
     """Bootstrap over time blocks: how often does each candidate on these channels beat all others?"""
     evidence = result.evidence
-    rivals = [best]
-    for j in result.judged:
-        # What contains the effect as a special case does not contradict it.
-        wider = best.placed.effect.name in j.placed.effect.contains and j.placed.at == best.placed.at
-        if j is not best and not wider and set(j.channels) & set(best.channels) and j.score > 0.2 * best.score:
-            rivals.append(j)
+    # What contains the effect as a special case does not contradict it, and what explains too little is no rival.
+    rivals = [best] + [
+        j
+        for j in result.judged
+        if j is not best
+        and best.placed.effect.name not in j.placed.effect.contains
+        and set(j.channels) & set(best.channels)
+        and j.explained >= WORTH
+        and j.score > 0.2 * best.score
+    ]
     rivals = rivals[:8]
     gains = np.array([evidence.shares(j.products, j.amplitudes) for j in rivals])
     price = np.array([j.price for j in rivals])

@@ -9,6 +9,7 @@ from ..errors import InputError
 from ..models.model_file import Model
 from ..models.rigid_body import RigidBody
 from .assembly import Assembly
+from .base_parameters import INERTIAL
 from .experiment import load_experiments, scales
 
 
@@ -34,14 +35,18 @@ def simulate(model: Model, motion: str | Path) -> xr.Dataset:
     """
     experiment = load_experiments(model, [motion], RigidBody(model.tree))[0]
     assembly = Assembly(model.tree, model.effects, None, scales([experiment]), model.values)
-    missing = [s.key for s in assembly.slots if s.key not in model.values]
+    needed = [f"{p.key}.{x.name}" for p in model.effects for x in p.effect.parameters]
+    if model.inertia == "free":
+        needed = [f"inertia.{link.name}.{name}" for link in model.tree.links for name in INERTIAL] + needed
+    missing = [key for key in needed if key not in model.values]
     if missing:
         raise InputError(
             f"{model.path}: no value for {missing[0]!r} ({len(missing)} missing); "
             f"write it under [parameters], or let 'snarelab identify --save-model' do it"
         )
     recorded = experiment.motion
-    tau = assembly.torque(experiment, assembly.start)
+    # As they are: bounds refer to the recordings that the values came from, not to this motion.
+    tau = assembly.torque(experiment, np.array([model.values[s.key] for s in assembly.slots]))
     variables = {}
     for name, x in (("q", recorded.q), ("qd", recorded.qd), ("qdd", recorded.qdd), ("tau", tau)):
         for c, joint in enumerate(model.joints):

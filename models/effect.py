@@ -43,6 +43,8 @@ class Parameter:
     relative_to : "", "speed", "travel", "torque" or "rate"
         What the bounds' finite ends and the grid are multiples of: the joint's peak speed, its travel, its peak torque,
         or peak torque per travel; "" for absolute numbers in SI units.
+    alone : bool
+        False where the parameter without the effect's others would be another effect: a spring's rest torque is a bias.
     """
 
     name: str
@@ -53,6 +55,7 @@ class Parameter:
     high: float = float("inf")
     grid: tuple[float, ...] = ()
     relative_to: Literal["", "speed", "travel", "torque", "rate"] = ""
+    alone: bool = True
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,11 @@
 """Model files (TOML): what is believed of a system, read with every mistake named, and written with what was found."""
 
 import difflib
+import json
 import os
 import tomllib
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..recordings.signals import Signal
+from ..recordings.signals import FORMS, Signal, is_signal, joint_of
 from .effect import Effect
 from .effects import get_effect
 from .tree import Tree
@@ -107,7 +109,9 @@ def load_model(path: str | Path) -> Model:
     try:
         raw = tomllib.loads(path.read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: not a TOML file: {error}") from None
+        raise InputError(f"{path}: not a TOML file: {error}; mend that line") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); check the file's permissions") from None
     for key in raw:
         if key not in _KEYS:
             near = difflib.get_close_matches(key, _KEYS, 1)
@@ -123,7 +127,8 @@ def load_model(path: str | Path) -> Model:
         raise InputError(f"{path}: inertia = {inertia!r}; allowed are 'fixed' and 'free'")
     gravity = _numbers(path, raw.get("gravity", [0.0, 0.0, -9.81]), "gravity", 3)
     bandwidth = raw.get("bandwidth")
-    if bandwidth is not None and (isinstance(bandwidth, bool) or not isinstance(bandwidth, int | float) or bandwidth <= 0):
+    number = isinstance(bandwidth, int | float) and not isinstance(bandwidth, bool)
+    if bandwidth is not None and not (number and 0 < bandwidth < np.inf):
         raise InputError(f"{path}: bandwidth = {bandwidth!r}; allowed is a positive number of hertz")
     urdf = path.parent / _text(path, raw, "urdf", "")
     tree = load_urdf(urdf, tuple(gravity))
@@ -135,7 +140,7 @@ def load_model(path: str | Path) -> Model:
         tree,
         inertia,
         _placed(path, raw.get("effects", []), tree),
-        _signals(path, raw.get("signals", {})),
+        _signals(path, raw.get("signals", {}), tree),
         None if bandwidth is None else float(bandwidth),
         _values(path, raw.get("parameters", {})),
     )
@@ -172,7 +177,7 @@ def save_model(model: Model, path: str | Path, note: str) -> None:
         "]",
     ]
     if model.bandwidth is not None:
-        lines.append(f"bandwidth = {model.bandwidth!r}")
+        lines.append(f"bandwidth = {_toml(model.bandwidth)}")
     if model.signals:
         lines += ["", "[signals]"]
         for name, signal in model.signals.items():
@@ -187,14 +192,18 @@ def save_model(model: Model, path: str | Path, note: str) -> None:
         scratch.replace(path)
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror}; choose a folder that exists") from None
+    finally:
+        with suppress(OSError):
+            scratch.unlink()
 
 
 def _toml(value: Any) -> str:
     if isinstance(value, str):
-        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+        # JSON's escapes are TOML's, but for one character that TOML wants escaped too.
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, list):
         return "[" + ", ".join(_toml(v) for v in value) + "]"
-    return repr(value)
+    return repr(float(value)) if isinstance(value, float) else repr(value)  # NumPy's floats show their type
 
 
 def _text(path: Path, raw: Mapping[str, Any], key: str, default: str) -> str:
@@ -224,6 +233,9 @@ def _placed(path: Path, entries: Any, tree: Tree) -> tuple[Placed, ...]:
         except InputError as error:
             raise InputError(f"{path}: {error}") from None
         everywhere = places(effect, tree)
+        extra = set(entry) - {"name", "at", "hold"} if isinstance(entry, dict) else set()
+        if extra:
+            raise InputError(f"{path}: effects: {name} has {sorted(extra)[0]!r}; allowed are name, at, hold")
         at = entry.get("at") if isinstance(entry, dict) else None
         allowed = everywhere
         if effect.at == "sensor":
@@ -242,17 +254,24 @@ def _placed(path: Path, entries: Any, tree: Tree) -> tuple[Placed, ...]:
     return tuple(found)
 
 
-def _signals(path: Path, table: Any) -> dict[str, Signal]:
+def _signals(path: Path, table: Any, tree: Tree) -> dict[str, Signal]:
     if not isinstance(table, dict):
         raise InputError(f"{path}: [signals] must be a table of name = {{ column = ... }}")
-    signals = {}
+    signals, joints = {}, [j.name for j in tree.joints]
     for name, entry in table.items():
+        if not is_signal(name):
+            raise InputError(f"{path}: {name!r} in [signals] is not a signal's name; allowed are {FORMS}")
+        joint = joint_of(name)
+        if joint is not None and joint not in joints:
+            raise InputError(f"{path}: {name!r} in [signals]: the URDF has no such joint, only {', '.join(joints)}")
         fields = {"column": entry} if isinstance(entry, str) else entry
         if not isinstance(fields, dict) or not isinstance(fields.get("column"), str):
             raise InputError(f"{path}: [signals] {name} = {entry!r}; allowed is {{ column = ..., unit = ..., gain = ... }}")
         extra = set(fields) - {"column", "unit", "gain"}
         if extra:
             raise InputError(f"{path}: [signals] {name} has {sorted(extra)[0]!r}; allowed are column, unit, gain")
+        if not isinstance(fields.get("unit"), str | None):
+            raise InputError(f"{path}: [signals] {name} unit = {fields['unit']!r}; allowed is text in quotes")
         gain = fields.get("gain")
         if isinstance(gain, bool) or not isinstance(gain, int | float | str | None):
             raise InputError(f"{path}: [signals] {name} gain = {gain!r}; allowed is a number or a scalar's name")

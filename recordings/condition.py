@@ -32,6 +32,9 @@ NOISE_SHARE = 0.1
 MINIMUM_SAMPLES = 50
 """Fewest samples in the analysis band that a fit is tried on."""
 
+MINIMUM_RUN = 16
+"""Fewest samples in the analysis band that a run between gaps must leave; a noise model remembers up to 12."""
+
 
 @dataclass(frozen=True)
 class Motion:
@@ -142,7 +145,7 @@ def condition(dataset: xr.Dataset, joints: Sequence[str], band: float | None = N
     notes.append(f"analysis band 0 to {band:.3g} Hz ({limit}; every {thinning} samples make one)")
     kernels = _derivative_kernels(min(band, rate / 2.5), rate)
     half = len(kernels[0]) // 2
-    shortest = 2 * half + 1 + 2 * _thin_half(thinning) + 4 * thinning
+    shortest = 2 * half + 1 + 2 * _thin_half(thinning) + MINIMUM_RUN * thinning
     parts, segments, start = [], [], 0
     for t, pq, ptau, ptemp in pieces:
         if len(t) < shortest:

@@ -107,8 +107,7 @@ def test_an_amplitude_of_the_wrong_sign_gains_nothing():
     assert gain.total == pytest.approx(0.0, abs=1e-9)
 
 
-@pytest.mark.parametrize("bounds", [FREE, (np.array([0.0, -1.0]), np.array([0.3, 0.3]))])
-def test_fresh_gains_are_a_refit_without_the_block(problem, bounds):
+def check_fresh(problem, bounds):
     evidence = problem.evidence()
     fresh = evidence.fresh_gains(problem.products(evidence), *bounds)
     x, c, y, blocks = problem.x, problem.c, problem.y, problem.blocks
@@ -119,6 +118,11 @@ def test_fresh_gains_are_a_refit_without_the_block(problem, bounds):
         before = 0.5 * np.sum((y[own] - x[own] @ without) ** 2)
         after = 0.5 * np.sum((y[own] - np.hstack([x, c])[own] @ beside) ** 2)
         assert fresh[b] == pytest.approx(before - after, rel=1e-7, abs=1e-7)
+
+
+@pytest.mark.parametrize("bounds", [FREE, (np.array([0.0, -1.0]), np.array([0.3, 0.3]))])
+def test_fresh_gains_are_a_refit_without_the_block(problem, bounds):
+    check_fresh(problem, bounds)
 
 
 def test_fresh_gains_of_chance_are_below_nothing_on_average():
@@ -157,8 +161,8 @@ def test_null_gains_are_regressions_of_sign_flipped_noise(problem):
     flipped = np.concatenate(evidence.flipped)
     ratio = flipped / np.concatenate(problem.noise)[:, None]
     for b in range(N_BLOCKS):
-        np.testing.assert_allclose(ratio[problem.blocks == b], np.sign(ratio[problem.blocks == b][0])[None], rtol=1e-12)
-    assert len(np.unique(np.round(ratio), axis=1)) == N_BLOCKS or np.ptp(ratio) == 2  # both signs occur
+        np.testing.assert_allclose(np.ptp(ratio[problem.blocks == b], axis=0), 0.0, atol=1e-12)
+    np.testing.assert_allclose(np.unique(np.round(ratio, 9)), [-1.0, 1.0])
     both = np.hstack([problem.x, problem.c])
     wanted = [left(problem.x, e) - left(both, e) for e in flipped.T]
     np.testing.assert_allclose(found, wanted, rtol=1e-8)
@@ -167,10 +171,10 @@ def test_null_gains_are_regressions_of_sign_flipped_noise(problem):
 @pytest.mark.parametrize("k", [1, 3])
 def test_quantiles_of_the_null_are_chi_squared(k):
     """Twice the gain on white noise of unit variance is chi squared with k degrees of freedom (Wilks 1938)."""
-    rng, n, blocks = np.random.default_rng(4), 6000, 300
+    rng, n, blocks = np.random.default_rng(4), 3000, 300
     x, c = rng.normal(size=(n, 2)), rng.normal(size=(n, k))
     channel = Channel(np.arange(2), x, rng.normal(size=n), rng.normal(size=n), np.arange(n) * blocks // n)
-    evidence = Evidence([channel], 2, blocks, 20000)
+    evidence = Evidence([channel], 2, blocks, 5000)
     nulls = 2 * evidence.null_gains(evidence.products([(0, c)]))
     for level in (0.5, 0.9, 0.99):
         assert np.quantile(nulls, level) == pytest.approx(scipy.stats.chi2.ppf(level, k), rel=0.2)
@@ -210,17 +214,13 @@ def test_baseline_with_columns_that_depend_on_each_other():
     both = np.hstack([whole.x, whole.c])
     assert np.linalg.matrix_rank(whole.x) == N_PARAMETERS
     assert gain.total == pytest.approx(left(whole.x, whole.y) - left(both, whole.y), rel=1e-8)
-    whole.index = [np.array([0, 1, 4]), np.array([2, 3, 3, 3])]
-    whole.index[1] = np.array([2, 3])
-    whole.columns[1] = problem.columns[1][:, :2]
+    whole.index[1], whole.columns[1] = np.array([2, 3]), problem.columns[1][:, :2]
     evidence = whole.evidence()
     assert np.linalg.matrix_rank(whole.x) == N_PARAMETERS - 1
     gain = evidence.gain(whole.products(evidence), *FREE)
     both = np.hstack([whole.x, whole.c])
     assert gain.total == pytest.approx(left(whole.x, whole.y) - left(both, whole.y), rel=1e-8)
-    fresh = evidence.fresh_gains(whole.products(evidence), *FREE)
-    assert np.all(np.isfinite(fresh))
-    assert fresh.sum() < gain.total
+    check_fresh(whole, FREE)
 
 
 def test_candidate_columns_that_are_alike_count_once():
@@ -247,7 +247,7 @@ def test_a_column_that_the_baseline_can_mimic_gains_nothing():
     assert gain.unabsorbed < 1e-5
 
 
-@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize("scale", [1e-4, 1e4])
 def test_units_do_not_matter(scale):
     problem = Problem(0)
     evidence = problem.evidence()

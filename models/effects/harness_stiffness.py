@@ -22,7 +22,7 @@ EFFECT = Effect(
     source="Hooke (1678)",
     parameters=(
         Parameter("stiffness", "T/S", "torque per travel", low=0.0),
-        Parameter("torque_at_zero", "T", "torque at position zero"),
+        Parameter("torque_at_zero", "T", "torque at position zero", alone=False),
     ),
     law=_law,
     experiment="hold {at} still at five or more positions across its travel where gravity does not load it, "

@@ -37,10 +37,18 @@ ANSWER = {
             "name": "stribeck_friction",
             "at": "joint2",
             "parameters": {
-                "rise": {"value": 6.0, "unit": "N*m"},
+                "level": {"value": 6.0, "unit": "N*m"},
                 "speed": {"value": 0.1, "unit": "rad/s"},
             },
         },
+        *(
+            {
+                "name": "presliding_hysteresis",
+                "at": joint,
+                "parameters": {"travel": {"value": 1e-4, "unit": "rad"}},
+            }
+            for joint in ("joint1", "joint2", "joint3")
+        ),
         {"name": "sensor_delay", "at": "tau.joint1", "parameters": {"delay": {"value": 0.006, "unit": "s"}}},
     ],
     "known_to_the_model": {"viscous_friction": {"joint1": 6.0, "joint2": 5.0, "joint3": 2.0, "unit": "N*m*s/rad"}},

@@ -1,0 +1,90 @@
+"""The main job on real data: EMPS against its published identification (Janot, Gautier, Brunot 2019)."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+import snarelab.studies
+from snarelab.cli import main
+
+MODELS = Path(snarelab.studies.__file__).parent / "emps"
+
+
+@pytest.fixture(scope="module")
+def identified(emps, tmp_path_factory):
+    out = tmp_path_factory.mktemp("identify") / "out.json"
+    files = [str(MODELS / "published.toml"), str(emps / "DATA_EMPS.mat")]
+    assert main(["identify", *files, "--holdout", str(emps / "DATA_EMPS_PULSES.mat"), "--json", str(out)]) == 0
+    return json.loads(out.read_text())
+
+
+@pytest.fixture(scope="module")
+def folder(emps, tmp_path_factory):
+    """Diagnosis from viscous friction alone, and a second one from the model that it saved."""
+    out = tmp_path_factory.mktemp("diagnose")
+    recordings = [str(emps / "DATA_EMPS.mat"), "--holdout", str(emps / "DATA_EMPS_PULSES.mat")]
+    first = ["--json", str(out / "1.json"), "--report", str(out / "1.html"), "--save-model", str(out / "new.toml")]
+    assert main(["diagnose", str(MODELS / "viscous.toml"), *recordings, *first]) == 0
+    assert main(["diagnose", str(out / "new.toml"), *recordings, "--json", str(out / "2.json")]) == 0
+    return out
+
+
+@pytest.mark.parametrize(
+    ("effect", "at", "name", "published", "unit"),
+    [
+        ("inertia", "carriage", "mass", 95.1089, "kg"),
+        ("viscous_friction", "slide", "coefficient", 203.5034, "N*s/m"),
+        ("coulomb_friction", "slide", "level", 20.3935, "N"),
+        ("sensor_bias", "tau.slide", "offset", -3.1648, "N"),
+    ],
+)
+def test_parameters_are_the_published_ones(identified, effect, at, name, published, unit):
+    (found,) = [p for p in identified["parameters"] if (p["effect"], p["at"], p["name"]) == (effect, at, name)]
+    assert found["value"] == pytest.approx(published, rel=0.005)
+    assert found["unit"] == unit
+    assert 0 < found["std"] < abs(published)
+    assert not found["at_bound"]
+
+
+def test_force_error_is_the_published_one(identified):
+    fit = identified["fit"]["tau.slide"]
+    assert 0.037 < fit["train"]["relative"] <= 0.041  # published: 0.0408
+    assert 0.050 < fit["holdout"]["relative"] <= 0.060  # published: 0.0598
+
+
+def test_names_what_is_missing_in_order(folder):
+    found = json.loads((folder / "1.json").read_text())
+    assert found["verdict"] == "missing_physics"
+    names = [(e["name"], e["at"].removeprefix("q.").removeprefix("tau.")) for e in found["effects"]]
+    assert names[:3] == [("coulomb_friction", "slide"), ("asymmetric_friction", "slide"), ("sensor_delay", "slide")]
+    assert ("makkar_friction", "slide") in names  # the concave part of the friction
+    assert all(e["probability"] > 0.5 for e in found["effects"][:3])
+
+
+def test_ends_well_below_the_published_cross_test_error(folder):
+    found = json.loads((folder / "1.json").read_text())
+    errors = [s["holdout"] for s in found["steps"]]
+    assert errors[0] > 0.17
+    assert errors[3] <= 0.042
+    assert errors[-1] <= 0.029
+    holdout = found["fit"]["tau.slide"]["holdout"]
+    assert holdout["relative_after"] == pytest.approx(errors[-1])
+    assert sum(p["share"] for p in found["location"]) <= 1 + 1e-9
+
+
+def test_the_saved_model_is_adequate(folder):
+    found = json.loads((folder / "2.json").read_text())
+    first = json.loads((folder / "1.json").read_text())
+    assert found["verdict"] == "adequate"
+    assert found["effects"] == []
+    assert found["limits"]
+    # The second fit starts where the first ended: nothing is lost on the way through the file.
+    before = found["fit"]["tau.slide"]["train"]["rms_before"]
+    assert before <= 1.01 * first["fit"]["tau.slide"]["train"]["rms_after"]
+
+
+def test_leaves_a_report(folder):
+    page = (folder / "1.html").read_text()
+    assert "Coulomb friction" in page
+    assert "https://" not in page
