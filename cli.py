@@ -72,7 +72,9 @@ def _identify(given: argparse.Namespace) -> None:
 
     _writable([given.json, given.save_model], [*given.recordings, given.holdout])
     if given.holdout and Path(given.holdout).resolve() in [Path(r).resolve() for r in given.recordings]:
-        raise InputError(f"{given.holdout}: the holdout is also a recording to fit; hold out one that the fit does not see")
+        raise InputError(
+            f"{given.holdout}: the holdout is also a recording to fit; hold out one that the fit does not see"
+        )
     model = load_model(given.model)
     with _Progress() as progress:
         found = identify(model, given.recordings, [given.holdout] if given.holdout else (), progress=progress)
@@ -154,12 +156,17 @@ def _parameter_table(result: dict[str, Any]) -> str:
     lines = [f"{'effect':<26}{'at':<16}{'parameter':<24}{'value':>12}{'std':>11}  unit"]
     for p in result["parameters"]:
         flag = "  (at its bound)" if p["at_bound"] else ""
-        lines.append(f"{p['effect']:<26}{p['at']:<16}{p['name']:<24}{p['value']:>12.5g}{p['std']:>11.2g}  {p['unit']}{flag}")
+        lines.append(
+            f"{p['effect']:<26}{p['at']:<16}{p['name']:<24}{p['value']:>12.5g}{p['std']:>11.2g}  {p['unit']}{flag}"
+        )
     for channel, fit in result["fit"].items():
         for role in ("train", "holdout"):
             if role in fit:
                 f = fit[role]
-                lines.append(f"{channel} {role}: RMS residual {f['rms']:.4g} {fit['unit']}, {100 * f['relative']:.2f} % of the measured")
+                lines.append(
+                    f"{channel} {role}: RMS residual {f['rms']:.4g} {fit['unit']}, "
+                    f"{100 * f['relative']:.2f} % of the measured"
+                )
     lines.append(f"condition number {result['condition']:.3g}")
     return "\n".join(lines)
 
@@ -178,7 +185,9 @@ class _Progress:
 
     def _show(self, text: str) -> None:
         if self._shown:
-            print(f"\r\x1b[2K[{time.monotonic() - self._start:5.1f} s] {text[:100]}", end="", file=sys.stderr, flush=True)
+            print(
+                f"\r\x1b[2K[{time.monotonic() - self._start:5.1f} s] {text[:100]}", end="", file=sys.stderr, flush=True
+            )
 
     def __exit__(self, *_: object) -> None:
         if self._shown:

@@ -7,8 +7,8 @@ The torque of one joint's channel is built from the inside out:
     + joint effects (friction, drive train, harness)
     → sensor effects of the channel, in the order of the model.
 
-Letters: n samples, J joints, P free parameters. A derivative is a list of blocks, one channel and a few parameters each:
-friction of one joint never costs the other channels anything.
+Letters: n samples, J joints, P free parameters. A derivative is a list of blocks, one channel and a few parameters
+each: friction of one joint never costs the other channels anything.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -26,6 +26,7 @@ from .effect_terms import contributions
 from .experiment import Experiment, Scales
 
 Array = NDArray[np.float64]
+
 
 @dataclass(frozen=True)
 class Slot:
@@ -62,8 +63,8 @@ class Block:
 class Evaluation:
     """A model evaluated along one recording.
 
-    ``load`` (n, J) is the rigid-body torque, ``tau`` (n, J) the modelled readings; ``passed`` holds, for each channel with
-    sensor effects, what they do to columns of the torque.
+    ``load`` (n, J) is the rigid-body torque, ``tau`` (n, J) the modelled readings; ``passed`` holds, for each channel
+    with sensor effects, what they do to columns of the torque.
     """
 
     load: Array
@@ -96,6 +97,7 @@ class Assembly:
         scales: Mapping[str, Scales],
         values: Mapping[str, float],
     ) -> None:
+        """Lay out the parameters; raises InputError for a link effect beside identified inertia."""
         self.tree, self.placed, self.base, self.scales = tree, tuple(placed), base, scales
         self._joints = [j.name for j in tree.joints]
         self._links = [link.name for link in tree.links]

@@ -127,9 +127,7 @@ def free_parameters(assembly: Assembly, experiment: Experiment, state: Evaluatio
         parameters,
     )
     moves = np.sum([np.sum(columns**2, axis=0) for _, _, columns in terms], axis=0) > 0
-    amplitudes = {
-        p.name for i, p in enumerate(placed.effect.parameters) if not p.grid and len(variant.amplitudes)
-    }
+    amplitudes = {p.name for i, p in enumerate(placed.effect.parameters) if not p.grid and len(variant.amplitudes)}
     on = {placed.effect.parameters[i].name for i in variant.amplitudes}
     return tuple(
         p.name

@@ -1,10 +1,10 @@
 """Motion that the servo was asked for, told from motion that a disturbance drove: the regressors' bandwidth per joint.
 
 In closed loop a torque that nobody modelled moves a light joint, and the measured acceleration then carries the very
-disturbance that stands in the torque; on a heavy one, encoder noise does the same. Least squares reads either as inertia,
-delay or elasticity (Gautier, Janot, Vandanjon
-2013; the endogeneity of Brunot et al.). The cure here is an instrument that needs no reference signal: each joint's
-motion is low-passed to the band in which what the model cannot explain is no more than a small share of it.
+disturbance that stands in the torque; on a heavy one, encoder noise does the same. Least squares reads either as
+inertia, delay or elasticity (Gautier, Janot, Vandanjon 2013; the endogeneity of Brunot et al.). The cure here is an
+instrument that needs no reference signal: each joint's motion is low-passed to the band in which what the model
+cannot explain is no more than a small share of it.
 """
 
 from collections.abc import Sequence
@@ -21,8 +21,8 @@ from .fit import Fit, gather
 Array = NDArray[np.float64]
 
 DRIVEN = 0.1
-"""Largest share of a joint's snap (second derivative of acceleration: what a late sensor's column is made of) inside the
-band kept that the unexplained torque could account for."""
+"""Largest share of a joint's snap (second derivative of acceleration: what a late sensor's column is made of) inside
+the band kept that the unexplained torque could account for."""
 
 REST = 0.02
 """Share of a joint's peak speed below which friction may stick, and a static law says nothing."""

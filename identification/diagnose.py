@@ -1,12 +1,13 @@
 """From recordings to a verdict: steps 0 to 6 of a diagnosis, for joint-space recordings.
 
-0 condition · 1 fit the baseline · 2 detect · 3 locate · 4 hypothesise · 5 compare and decide (`search`) · 6 confirm once,
-on a recording that nothing before has looked at: an effect stays only if taking it out again makes that recording worse.
+0 condition · 1 fit the baseline · 2 detect · 3 locate · 4 hypothesise · 5 compare and decide (`search`) · 6 confirm
+once, on a recording that nothing before has looked at: an effect stays only if taking it out again makes it worse.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +31,8 @@ CONFIRM = 0.05
 """An effect is confirmed if the held-out residual energy of its channels rises by this share when it is taken out."""
 
 NAMELESS = 0.1
-"""Smooth curves that explain this share of a channel's residual, in blocks they did not see, mean something nameless ..."""
+"""Smooth curves that explain this share of a channel's residual, in blocks they did not see, mean a nameless effect
+..."""
 
 MATERIAL = 0.01
 """... if they also amount to this share of the channel's RMS torque."""
@@ -94,13 +96,16 @@ def diagnose(
     final, inertia = physical(final, train)
     steps = _steps(found, confirmed, final, train, locked)
     answer = _answer(model, found, confirmed, dropped, final, trials, steps, train, locked)
-    return replace(answer, model=replace(answer.model, values={**answer.model.values, **inertial_values(model, inertia)}))
+    return replace(
+        answer, model=replace(answer.model, values={**answer.model.values, **inertial_values(model, inertia)})
+    )
 
 
 def _confirm(
     found: Found, train: Sequence[Experiment], locked: Sequence[Experiment]
 ) -> tuple[list[Taken], Mapping[str, tuple[float, float]]]:
-    """Effects whose removal (all else fitted again) makes the held-out recording worse; errors with and without each."""
+    """Effects whose removal (all else fitted again) makes the held-out recording worse; errors with and without
+    each."""
     with_all, measured = channel_rms(found.fit.assembly, locked, found.fit.theta)
     confirmed, trials = [], {}
     for t in found.taken:
@@ -134,9 +139,7 @@ def _steps(
     for k, name in enumerate(names):
         rest = {t.judged.placed.key for t in confirmed if t.judged.placed.effect.name in names[k + 1 :]}
         if rest:
-            assembly = Assembly(
-                old.tree, [p for p in old.placed if p.key not in rest], old.base, old.scales, values
-            )
+            assembly = Assembly(old.tree, [p for p in old.placed if p.key not in rest], old.base, old.scales, values)
             theta = fit(assembly, train, start=carry(final, assembly), multi_start=False).theta
         else:
             assembly, theta = old, final.theta
@@ -163,8 +166,10 @@ def _answer(
     nameless = {c: x for c, x in found.closing.nameless.items() if x > NAMELESS}
     size = {c: float(np.sqrt(x)) * fits[c].train.relative_after for c, x in nameless.items()}
     words = {
-        c: f"on tau.{joints[c]}, smooth curves over position, speed, load and time together still explain {percent(x)} of "
-        f"the residual in blocks that they were not fitted to ({percent(size[c])} of the channel's torque)"
+        c: (
+            f"on tau.{joints[c]}, smooth curves over position, speed, load and time together still explain "
+            f"{percent(x)} of the residual in blocks that they were not fitted to ({percent(size[c])} of the channel's torque)"
+        )
         for c, x in nameless.items()
     }
     description = "; ".join(text for c, text in words.items() if size[c] >= MATERIAL)
@@ -176,8 +181,8 @@ def _answer(
         remainder = f" {description[:1].upper()}{description[1:]}." if description else ""
     notes = [f"{Path(e.motion.path).name}: {note}" for e in (*train, *locked) for note in e.motion.notes]
     notes += [
-        f"{t.judged.placed.effect.name} at {t.judged.placed.at} passed on the training recordings but made the held-out one "
-        f"no better: not named"
+        f"{t.judged.placed.effect.name} at {t.judged.placed.at} passed on the training recordings but made the "
+        f"held-out one no better: not named"
         for t in dropped
     ]
     notes += [f"too little to speak of: {text}" for c, text in words.items() if size[c] < MATERIAL]
@@ -188,10 +193,7 @@ def _answer(
         for j in sorted(found.opening.judged, key=lambda j: -j.explained)
         if j.explained > 0
     )
-    if findings:
-        location = locate(found.first, final, train)
-    else:
-        location = ()
+    location = locate(found.first, final, train) if findings else ()
     diagnosis = Diagnosis(
         verdict,
         verdict_sentence(findings, fits, remainder),
@@ -224,9 +226,7 @@ def _finding(t: Taken, final: Fit, trials: Mapping[str, tuple[float, float]], jo
     with_it, without_it = trials[placed.key]
     channels = [f"tau.{joints[c]}" for c in t.judged.channels]
     rivals = tuple(
-        Rival(
-            r.placed.effect.name, r.placed.at, r.probability, r.separable, experiment_sentence(placed, r.placed)
-        )
+        Rival(r.placed.effect.name, r.placed.at, r.probability, r.separable, experiment_sentence(placed, r.placed))
         for r in t.rivals
         if r.probability >= 0.005 or not r.separable
     )
@@ -241,11 +241,16 @@ def _fits(
     for experiments in (train, locked):
         before, measured = channel_rms(first.assembly, experiments, first.theta)
         after, _ = channel_rms(final.assembly, experiments, final.theta)
-        pairs.append([Misfit(*map(float, x)) for x in zip(before, after, before / measured, after / measured, strict=True)])
+        pairs.append(
+            [
+                Misfit(float(b), float(a), float(b / m), float(a / m))
+                for b, a, m in zip(before, after, measured, strict=True)
+            ]
+        )
     floors = _noise_floor(train, final)
     return tuple(
-        ChannelFit(f"tau.{j.name}", "N" if j.kind == "prismatic" else "N*m", *misfits, float(floor))
-        for j, *misfits, floor in zip(model.tree.joints, *pairs, floors, strict=True)
+        ChannelFit(f"tau.{j.name}", "N" if j.kind == "prismatic" else "N*m", fitted, held_out, float(floor))
+        for j, fitted, held_out, floor in zip(model.tree.joints, *pairs, floors, strict=True)
     )
 
 
@@ -273,11 +278,10 @@ def _moved(first: Fit, final: Fit) -> tuple[Moved, ...]:
     )
 
 
-def _traces(
-    first: Fit, final: Fit, train: Sequence[Experiment], locked: Sequence[Experiment]
-) -> tuple[Trace, ...]:
+def _traces(first: Fit, final: Fit, train: Sequence[Experiment], locked: Sequence[Experiment]) -> tuple[Trace, ...]:
     found = []
-    for role, experiments in (("train", train), ("holdout", locked)):
+    sets: tuple[tuple[Literal["train", "holdout"], Sequence[Experiment]], ...] = (("train", train), ("holdout", locked))
+    for role, experiments in sets:
         for e in experiments:
             bring = e.motion.to_band
             before, after = (bring(f.assembly.torque(e, f.theta)) for f in (first, final))
@@ -297,5 +301,7 @@ def _excitation(train: Sequence[Experiment]) -> list[str]:
         moving = np.abs(qd) > 0.05 * np.abs(qd).max()
         signs = np.sign(qd[moving])
         reversals = int(np.count_nonzero(np.diff(signs)))
-        notes.append(f"excitation of {joint}: moving {percent(float(np.mean(moving)))} of the time, {reversals} reversals")
+        notes.append(
+            f"excitation of {joint}: moving {percent(float(np.mean(moving)))} of the time, {reversals} reversals"
+        )
     return notes

@@ -1,8 +1,9 @@
 """How much a candidate explains when the whole baseline is fitted again beside it, and whether that is chance.
 
 All in whitened samples, where the log-likelihood gained by adding columns C to a baseline X is ½ sᵀS⁻¹s with
-s = Cᵀ(y − X g), S = CᵀC − CᵀX (XᵀX)⁻¹ XᵀC (the Schur complement; Frisch & Waugh 1933). Products are kept per time block, so
-that leaving a block out, a block bootstrap, and nulls with signs flipped per block (wild bootstrap: Liu 1988) cost nothing.
+s = Cᵀ(y − X g), S = CᵀC − CᵀX (XᵀX)⁻¹ XᵀC (the Schur complement; Frisch & Waugh 1933). Products are kept per time
+block, so that leaving a block out, a block bootstrap, and nulls with signs flipped per block (wild bootstrap: Liu
+1988) cost nothing.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,7 +24,8 @@ ABSORBED_PART = 0.02
 
 @dataclass(frozen=True)
 class Channel:
-    """One whitened channel: baseline columns (n, k) for the parameters ``index``, residual (n,), noise (n,), block (n,)."""
+    """One whitened channel: baseline columns (n, k) for the parameters ``index``, residual (n,), noise (n,), block
+    (n,)."""
 
     index: NDArray[np.int_]
     columns: Array
@@ -71,6 +73,7 @@ class Evidence:
     def __init__(
         self, channels: Sequence[Channel], n_parameters: int, n_blocks: int, n_nulls: int = 200, seed: int = 0
     ) -> None:
+        """Sum the baseline's products per block."""
         rng = np.random.default_rng(seed)
         signs = rng.choice([-1.0, 1.0], (n_blocks, n_nulls))
         self.channels, self.n_blocks = tuple(channels), n_blocks

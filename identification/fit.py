@@ -73,8 +73,8 @@ def fit(
     start : array (P,), optional
         Where to start; the assembly's own start otherwise.
     multi_start : bool
-        Try the grid of every shape parameter and a few random starts. Channels that share no parameter are judged apart,
-        so that each takes its own best start.
+        Try the grid of every shape parameter and a few random starts. Channels that share no parameter are judged
+        apart, so that each takes its own best start.
     seed : int
         Of the random starts.
     progress : callable
@@ -122,7 +122,8 @@ def channel_rms(assembly: Assembly, experiments: Sequence[Experiment], theta: Ar
 
 
 def gather(blocks: Sequence[Block], channel: int) -> tuple[NDArray[np.int_], Array]:
-    """Parameters that a channel depends on (k,) and its derivative by them (n, k), columns of one parameter added up."""
+    """Parameters that a channel depends on (k,) and its derivative by them (n, k), columns of one parameter added
+    up."""
     own = [b for b in blocks if b.channel == channel and len(b.index)]
     if not own:
         return np.zeros(0, int), np.zeros((0, 0))

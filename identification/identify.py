@@ -63,7 +63,9 @@ class Identified:
             "condition": found.condition,
             "band": {"value": self.train[0].motion.band, "unit": "Hz"},
             "starts": {"tried": found.starts, "agreed": found.agreed},
-            "notes": [f"{Path(e.motion.path).name}: {note}" for e in (*self.train, *self.holdout) for note in e.motion.notes],
+            "notes": [
+                f"{Path(e.motion.path).name}: {note}" for e in (*self.train, *self.holdout) for note in e.motion.notes
+            ],
         }
         if self.inertia is not None:
             answer["inertia"] = {

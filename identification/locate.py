@@ -29,7 +29,9 @@ def locate(before: Fit, after: Fit, experiments: Sequence[Experiment]) -> tuple[
     """
     changed = [_change(before.assembly, before.theta, after.assembly, after.theta, e) for e in experiments]
     energy = np.array([np.sum(np.concatenate([x[:, c] for x in changed]) ** 2) for c in range(changed[0].shape[1])])
-    residual = np.array([np.sum(np.concatenate([e.measured for e in experiments])[:, c] ** 2) for c in range(len(energy))])
+    residual = np.array(
+        [np.sum(np.concatenate([e.measured for e in experiments])[:, c] ** 2) for c in range(len(energy))]
+    )
     weight = energy / np.maximum(residual, 1e-300)
     total = weight.sum()
     if total <= 0:
@@ -68,7 +70,8 @@ def _windows(experiment: Experiment, change: Array) -> tuple[tuple[float, float]
 
 
 def _state(experiments: Sequence[Experiment], changed: Sequence[Array], c: int) -> str:
-    """The one condition on the joint's own motion that best concentrates the change: at least a third above its share."""
+    """The one condition on the joint's own motion that best concentrates the change: at least a third above its
+    share."""
     joint = experiments[0].motion.joints[c]
     unit = "m/s" if experiments[0].body.tree.joints[c].kind == "prismatic" else "rad/s"
     place = unit[:-2]

@@ -32,7 +32,8 @@ class Whitener:
     def __call__(self, x: Array, segments: Sequence[slice]) -> Array:
         """Innovations in units of their RMS: (n_band, ...) to (n_white, ...)."""
         taps = np.concatenate([[1.0], -self.coefficients]) / self.sigma
-        return np.concatenate([lfilter(taps, [1.0], x[s], axis=0)[self.lead :] for s in segments])
+        parts = [x[s] for s in segments]  # SciPy refuses to filter no columns; a baseline at its bounds has none
+        return np.concatenate([(lfilter(taps, [1.0], p, axis=0) if p.size else p)[self.lead :] for p in parts])
 
 
 def whitener(residual: Array, columns: Array, segments: Sequence[slice]) -> tuple[Whitener, Array]:
@@ -57,13 +58,15 @@ def whitener(residual: Array, columns: Array, segments: Sequence[slice]) -> tupl
     answer = lstsq(np.vstack([use, ridge]), np.concatenate([residual, np.zeros(len(ridge))]), lapack_driver="gelsy")
     noise = residual - use @ answer[0]  # type: ignore[index]
     # Long runs tell the memory apart from the ends; short ones serve where there is nothing else.
-    kept = [s for s in segments if s.stop - s.start > 4 * LONGEST] or [s for s in segments if s.stop - s.start > LONGEST]
-    best: tuple[float, Array, float] | None = None
+    kept = [s for s in segments if s.stop - s.start > 4 * LONGEST] or [
+        s for s in segments if s.stop - s.start > LONGEST
+    ]
+    best: tuple[float, NDArray, float] | None = None
     for order in range(LONGEST + 1):
         past = np.concatenate([_lagged(noise[s], order)[LONGEST - order :] for s in kept])
         now = np.concatenate([noise[s][LONGEST:] for s in kept])
-        a = np.linalg.lstsq(past, now, rcond=None)[0] if order else np.zeros(0)
-        variance = float(np.mean((now - past @ a) ** 2)) if order else float(np.mean(now**2))
+        a = np.asarray(np.linalg.lstsq(past, now, rcond=None)[0], float) if order else np.zeros(0)
+        variance = float(np.mean((now - past @ a) ** 2))
         score = len(now) * np.log(variance + 1e-300) + order * np.log(len(now))
         if best is None or score < best[0]:
             best = (score, a, variance)

@@ -67,7 +67,8 @@ def where(diagnosis: Diagnosis) -> tuple[str, str, str]:
     if first:
         content += figure(
             residual_over_time(first, diagnosis.location),
-            f"Residual before over time, with the table's windows shaded: {', '.join(trace.channel for trace in first)}.",
+            "Residual before over time, with the table's windows shaded: "
+            f"{', '.join(trace.channel for trace in first)}.",
             "Measurement minus the model as it was. Shaded: the time windows of the table.",
         )
     return "where", "Where", content
@@ -87,6 +88,7 @@ def detection_limits(diagnosis: Diagnosis) -> str:
         rows.append([escape(words(name)), escape(words(parameter)), *(escape(end) for end in ends)])
     text = "An effect smaller than this would not have stood out of these recordings."
     return paragraph(text) + table("Limits of detection", ["Effect", "Parameter", "Best seen", "Worst seen"], rows)
+
 
 def _card(finding: Finding) -> str:
     name = words(finding.name)

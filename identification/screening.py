@@ -1,4 +1,5 @@
-"""One screening: every effect at every place and shape judged on top of a fit, and the noise they are judged against."""
+"""One screening: every effect at every place and shape judged on top of a fit, and the noise they are judged
+against."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -96,7 +97,6 @@ class Noise:
         own = self.whiteners[channel]
         return np.concatenate([own(x, s) for x, s in zip(parts, self.segments, strict=True)])
 
-
     def whiten_mask(self, channel: int, parts: Sequence[NDArray[np.bool_]]) -> NDArray[np.bool_]:
         """Innovations that a marked sample reaches (n_white,)."""
         own = self.whiteners[channel]
@@ -107,7 +107,8 @@ class Noise:
 
 @dataclass(frozen=True)
 class Screening:
-    """Candidates best first, the score that noise alone reaches on each set of channels, and what nameless curves explain."""
+    """Candidates best first, the score that noise alone reaches on each set of channels, and what nameless curves
+    explain."""
 
     evidence: Evidence
     moving: Evidence
@@ -252,9 +253,7 @@ def _with(variant: Variant, subset: NDArray[np.int_]) -> Variant:
     """A variant reduced to some of its amplitudes."""
     if not len(variant.amplitudes):
         return variant
-    return replace(
-        variant, amplitudes=variant.amplitudes[subset], low=variant.low[subset], high=variant.high[subset]
-    )
+    return replace(variant, amplitudes=variant.amplitudes[subset], low=variant.low[subset], high=variant.high[subset])
 
 
 def _columns(
@@ -290,7 +289,8 @@ def _learn(
     pool: Sequence[Sequence[tuple[Variant, dict[int, Parts]]]],
     smooth: Sequence[Parts],
 ) -> Noise:
-    """Noise model of every channel from the saturated model: baseline, smooth curves, a middle variant of each candidate."""
+    """Noise model of every channel from the saturated model: baseline, smooth curves, a middle variant of each
+    candidate."""
     columns: list[list[Array]] = [[np.concatenate(parts)] for parts in smooth]
     for options in pool:
         for c, parts in options[len(options) // 2][1].items():

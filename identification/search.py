@@ -62,9 +62,7 @@ class Found:
     instruments: tuple[Experiment, ...]
 
 
-def assemble(
-    model: Model, base: BaseParameters | None, scales: Mapping[str, Scales]
-) -> Assembly:
+def assemble(model: Model, base: BaseParameters | None, scales: Mapping[str, Scales]) -> Assembly:
     """Parameters and torque of a model, started from the values it has."""
     return Assembly(model.tree, model.effects, base, scales, model.values)
 
@@ -104,10 +102,11 @@ def search(
         instruments = planned(found, experiments, instruments)
         result = screen(model, found, experiments, instruments, noise, seed)
         opening, noise = opening or result, result.noise
-        chosen = _choose(result) if number <= MOST_ROUNDS else []
+        passing = _passing(result) if number <= MOST_ROUNDS else []
+        chosen = _choose(passing)
         if not chosen:
             break
-        taken += [_weigh(result, j, seed) for j in chosen]
+        taken += [_weigh(result, j, passing, seed) for j in chosen]
         start = {key: value for j in chosen for key, value in j.start().items()}
         model = model.with_effects([j.placed for j in chosen], start)
         progress("refitting with " + ", ".join(f"{j.placed.effect.name} at {j.placed.at}" for j in chosen))
@@ -130,25 +129,29 @@ def without(found: Fit, placed: Placed) -> Assembly:
     return Assembly(old.tree, rest, old.base, old.scales, old.values(found.theta))
 
 
-def _choose(result: Screening) -> list[Judged]:
-    """The best candidate that passes, and beside it the best on every channel that no better candidate reaches."""
+def _passing(result: Screening) -> list[Judged]:
+    """Candidates that pass every test, best first."""
     passing = []
     for j in result.judged:
-        if j.score <= result.threshold[j.channels]:
+        if j.score <= result.threshold[j.channels] or j.explained < WORTH:
             continue
         fresh = result.evidence.fresh_gains(j.products, j.variant.low, j.variant.high)
-        if j.explained >= WORTH and reliably_positive(fresh) and _holds_in_motion(result, j):
+        if reliably_positive(fresh) and _holds_in_motion(result, j):
             passing.append(j)
-    keys = {j.placed.key for j in passing}
     single: dict[int, float] = {}
     for j in passing:
         if len(j.channels) == 1:
             single.setdefault(j.channels[0], j.score)
+    # Where several local effects explain more than one that reaches everywhere, they are the simpler story.
+    return [j for j in passing if len(j.channels) == 1 or sum(single.get(c, 0.0) for c in j.channels) <= j.score]
+
+
+def _choose(passing: Sequence[Judged]) -> list[Judged]:
+    """The best candidate, and beside it the best on every channel that no better candidate reaches."""
+    keys = {j.placed.key for j in passing}
     chosen: list[Judged] = []
     reached: set[int] = set()
     for j in passing:
-        if len(j.channels) > 1 and sum(single.get(c, 0.0) for c in j.channels) > j.score:
-            continue  # several local effects explain more than one that reaches everywhere
         if any(f"{name}.{j.placed.at}" in keys for name in j.placed.effect.contains):
             continue  # a special case of it passes too, and goes first
         if reached.isdisjoint(j.channels):
@@ -158,7 +161,8 @@ def _choose(result: Screening) -> list[Judged]:
 
 
 def _holds_in_motion(result: Screening, j: Judged) -> bool:
-    """Does it still pass with the samples near rest left out? Stuck friction poses as delay, elasticity and Stribeck."""
+    """Does it still pass with the samples near rest left out? Stuck friction poses as delay, elasticity and
+    Stribeck."""
     if j.placed.effect.at_rest:
         return True
     moving = result.moving
@@ -170,17 +174,16 @@ def _holds_in_motion(result: Screening, j: Judged) -> bool:
     return enough and reliably_positive(fresh, 1.0)
 
 
-def _weigh(result: Screening, best: Judged, seed: int) -> Taken:
+def _weigh(result: Screening, best: Judged, passing: Sequence[Judged], seed: int) -> Taken:
     """Bootstrap over time blocks: how often does each candidate on these channels beat all others?"""
     evidence = result.evidence
-    # What contains the effect as a special case does not contradict it, and what explains too little is no rival.
+    # What contains the effect as a special case does not contradict it.
     rivals = [best] + [
         j
-        for j in result.judged
+        for j in passing
         if j is not best
         and best.placed.effect.name not in j.placed.effect.contains
         and set(j.channels) & set(best.channels)
-        and j.explained >= WORTH
         and j.score > 0.2 * best.score
     ]
     rivals = rivals[:8]

@@ -51,4 +51,6 @@ def simulate(model: Model, motion: str | Path) -> xr.Dataset:
     for name, x in (("q", recorded.q), ("qd", recorded.qd), ("qdd", recorded.qdd), ("tau", tau)):
         for c, joint in enumerate(model.joints):
             variables[f"{name}.{joint}"] = ("time", np.ascontiguousarray(x[:, c]))
-    return xr.Dataset(variables, coords={"time": recorded.time}, attrs={"path": str(motion), "notes": list(recorded.notes)})
+    return xr.Dataset(
+        variables, coords={"time": recorded.time}, attrs={"path": str(motion), "notes": list(recorded.notes)}
+    )

@@ -4,11 +4,7 @@ from collections.abc import Sequence
 
 from ..models.model_file import Placed
 from .diagnosis import ChannelFit, Finding
-
-
-def spoken(name: str) -> str:
-    """An effect's name without underscores."""
-    return name.replace("_", " ")
+from .report_words import words
 
 
 def percent(share: float) -> str:
@@ -22,10 +18,12 @@ def evidence_sentence(
 ) -> str:
     """What an effect explains, and what happens on the held-out recording when it is taken out again."""
     where = " and ".join(channels) if len(channels) < 3 else f"{len(channels)} channels"
+    what = placed.effect.sentence
     return (
-        f"{placed.effect.sentence}: it explains {percent(explained)} of what the model so far left over on {where}, and "
+        f"{what[:1].upper()}{what[1:]}: it explains {percent(explained)} of what the model so far left over on "
+        f"{where}; "
         f"taking it out again raises the error on the held-out recording from {percent(relative_with)} "
-        f"to {percent(relative_without)}"
+        f"to {percent(relative_without)}."
     )
 
 
@@ -40,15 +38,18 @@ def experiment_sentence(placed: Placed, rival: Placed) -> str:
 
 def verdict_sentence(findings: Sequence[Finding], fit: Sequence[ChannelFit], remainder: str) -> str:
     """The first sentence of the report."""
-    worst = max(fit, key=lambda f: f.holdout.relative_before)
+    worst = max(fit, key=lambda f: f.holdout.relative_before - f.holdout.relative_after)
+    if not findings:
+        worst = max(fit, key=lambda f: f.holdout.relative_before)
     before, after = percent(worst.holdout.relative_before), percent(worst.holdout.relative_after)
     if findings:
         by_name: dict[str, list[str]] = {}
         for f in findings:
             by_name.setdefault(f.name, []).append(f.at)
-        named = [f"{spoken(name)} at {_listed(places)}" for name, places in by_name.items()]
+        named = [f"{words(name)} at {_listed(places)}" for name, places in by_name.items()]
         return (
-            f"The model leaves out {_listed(named)}. With that added, the error of {worst.channel} on the recording that "
+            f"The model leaves out {_listed(named)}. With that added, the error of {worst.channel} on the "
+            f"recording that "
             f"the fit never saw falls from {before} to {after}.{remainder}"
         )
     if remainder:

@@ -80,10 +80,10 @@ class Effect:
         ``law(s, p) -> ca.SX``. ``s`` maps signal names to symbols, ``p`` parameter names to symbols.
         Joint signals: ``q qd qdd`` [S, S/s, S/s²], ``load`` [T] the rigid-body torque at the joint, ``inertia``
         [T·s²/S] the joint's own entry of the mass matrix, ``time`` [s], ``temperature`` [°C],
-        ``speed_scale`` [S/s] the joint's peak speed in the recordings that the model was fitted to, saved with the model.
-        Link: ``s["phi"]``, 10 numbers (m, m·cx, m·cy, m·cz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz) about the link's frame, and
-        ``s["tip"]``, 3 numbers [m]: the next joint's origin, or the centre of mass of a last link; returns 10.
-        Sensor: ``value`` (true value), ``time``, and the joint signals of its joint.
+        ``speed_scale`` [S/s] the joint's peak speed in the recordings that the model was fitted to, saved with the
+        model. Link: ``s["phi"]``, 10 numbers (m, m·cx, m·cy, m·cz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz) about the link's
+        frame, and ``s["tip"]``, 3 numbers [m]: the next joint's origin, or the centre of mass of a last link;
+        returns 10. Sensor: ``value`` (true value), ``time``, and the joint signals of its joint.
         A state is read as ``s[state_name]``.
     states : tuple of str
         Names of hidden states, all starting at rest (zero rate).

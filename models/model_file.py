@@ -29,7 +29,8 @@ _KEYS = ("name", "system", "urdf", "gravity", "inertia", "effects", "signals", "
 class Placed:
     """An effect and the one place it acts at: a joint, a link, or a sensor channel such as ``tau.joint1``.
 
-    Parameters named in ``hold`` are not identified: the recordings did not ask for them, or another effect carries them.
+    Parameters named in ``hold`` are not identified: the recordings did not ask for them, or another effect carries
+    them.
     """
 
     effect: Effect
@@ -149,7 +150,8 @@ def load_model(path: str | Path) -> Model:
 def save_model(model: Model, path: str | Path, note: str) -> None:
     """Write a model file that `load_model` reads back, all or nothing.
 
-    ``effects`` lists an effect by its name alone where it acts at every place, as ``{ name, at, hold }`` where it does not.
+    ``effects`` lists an effect by its name alone where it acts at every place, as ``{ name, at, hold }`` where it
+    does not.
     """
     path = Path(path)
     urdf = os.path.relpath(model.urdf, path.parent)
@@ -238,7 +240,8 @@ def _placed(path: Path, entries: Any, tree: Tree) -> tuple[Placed, ...]:
             raise InputError(f"{path}: effects: {name} has {sorted(extra)[0]!r}; allowed are name, at, hold")
         at = entry.get("at") if isinstance(entry, dict) else None
         allowed = everywhere
-        if effect.at == "sensor":
+        if effect.at == "sensor" and effect.states:
+            # A late position shows as an early torque; what else an encoder does would be read as torque.
             allowed += tuple(f"q.{j.name}" for j in tree.joints)
         if at is not None and at not in allowed:
             raise InputError(f"{path}: {name} at {at!r}; this model has {', '.join(allowed)}")
@@ -266,7 +269,9 @@ def _signals(path: Path, table: Any, tree: Tree) -> dict[str, Signal]:
             raise InputError(f"{path}: {name!r} in [signals]: the URDF has no such joint, only {', '.join(joints)}")
         fields = {"column": entry} if isinstance(entry, str) else entry
         if not isinstance(fields, dict) or not isinstance(fields.get("column"), str):
-            raise InputError(f"{path}: [signals] {name} = {entry!r}; allowed is {{ column = ..., unit = ..., gain = ... }}")
+            raise InputError(
+                f"{path}: [signals] {name} = {entry!r}; allowed is {{ column = ..., unit = ..., gain = ... }}"
+            )
         extra = set(fields) - {"column", "unit", "gain"}
         if extra:
             raise InputError(f"{path}: [signals] {name} has {sorted(extra)[0]!r}; allowed are column, unit, gain")

@@ -5,12 +5,14 @@ Three linear-phase FIR filters, so that every sample is either exact or left out
 1. Position is differentiated by the derivative of a windowed sinc: flat to the analysis band's edge, known bandwidth,
    exact for constants, ramps and parabolas (the moment conditions are enforced).
 2. Measured and modelled torques, and every column of the model's Jacobian, pass the *same* low-pass and are thinned to
-   twice the band (parallel filtering: Gautier 1997; Janot, Vandanjon, Gautier 2014). What aliases does so alike in both.
+   twice the band (parallel filtering: Gautier 1997; Janot, Vandanjon, Gautier 2014). What aliases does so alike in
+   both.
 3. Samples whose filter window leaves the recording, or touches a gap, are dropped, never padded.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import xarray as xr
@@ -87,7 +89,7 @@ class Motion:
     def band_segments(self) -> tuple[slice, ...]:
         """Where each segment stands in the output of `to_band`."""
         stops = np.cumsum([0] + [_thinned_length(s.stop - s.start, self.thinning) for s in self.segments])
-        return tuple(slice(int(a), int(b)) for a, b in zip(stops[:-1], stops[1:], strict=True))
+        return tuple(slice(int(a), int(b)) for a, b in pairwise(stops))
 
 
 def condition(dataset: xr.Dataset, joints: Sequence[str], band: float | None = None) -> Motion:
@@ -162,8 +164,22 @@ def condition(dataset: xr.Dataset, joints: Sequence[str], band: float | None = N
             f"{path}: too few samples: {len(stamps)} rows leave {kept} in the {band:.3g} Hz analysis band, at least "
             f"{MINIMUM_SAMPLES} are needed; record longer, or close the gaps"
         )
-    columns = [np.concatenate(c) for c in zip(*parts, strict=True)]
-    return Motion(path, tuple(joints), period, band, *columns, tuple(segments), thinning, tuple(notes))
+    time, q, qd, qdd, tau, temperature = (np.concatenate(c) for c in zip(*parts, strict=True))
+    return Motion(
+        path,
+        tuple(joints),
+        period,
+        band,
+        time,
+        q,
+        qd,
+        qdd,
+        tau,
+        temperature,
+        tuple(segments),
+        thinning,
+        tuple(notes),
+    )
 
 
 def _uniform_pieces(
@@ -200,7 +216,8 @@ def _uniform_pieces(
         notes.append(f"{len(pieces)} runs between gaps are fitted side by side; nothing is interpolated across a gap")
     if jitter > 0.02:
         notes.append(
-            f"sampling is uneven (stamps up to {jitter:.2g} periods off an even clock): cubic splines put it on an even "
+            f"sampling is uneven (stamps up to {jitter:.2g} periods off an even clock): cubic splines put it on "
+            f"an even "
             f"{1 / period:.4g} Hz clock inside each run"
         )
     if other_rates:

@@ -1,7 +1,7 @@
 """The main job on real data: a servo axis (EMPS) whose model knows viscous friction only.
 
-Fits the published model and compares its parameters; then starts from viscous friction alone and lets the diagnosis name
-what is missing; then diagnoses the model that came out. Recordings: Janot, Gautier, Brunot (2019), looked for in
+Fits the published model and compares its parameters; then starts from viscous friction alone and lets the diagnosis
+name what is missing; then diagnoses the model that came out. Recordings: Janot, Gautier, Brunot (2019), looked for in
 ``$SNARELAB_RECORDINGS``, beside the project, and at their publisher. Without them a bundled recording, made by another
 engine than ours, is diagnosed instead.
 """
@@ -22,7 +22,12 @@ from ..recordings import find_recording
 HERE = Path(__file__).parent
 OUT = Path("build/studies/emps")
 
-PUBLISHED = {"mass": (95.1089, "kg"), "coefficient": (203.5034, "N*s/m"), "level": (20.3935, "N"), "offset": (-3.1648, "N")}
+PUBLISHED = {
+    "mass": (95.1089, "kg"),
+    "coefficient": (203.5034, "N*s/m"),
+    "level": (20.3935, "N"),
+    "offset": (-3.1648, "N"),
+}
 """IDIM-LS on DATA_EMPS (Janot, Gautier, Brunot 2019)."""
 
 PUBLISHED_ERROR = {"train": 0.040834, "holdout": 0.059824}
@@ -47,7 +52,10 @@ def main() -> int:
     found = answer.diagnosis
     _say(_table(answer))
     last = found.steps[-1]
-    quantities += [_quantity("relative_error_fitted", "1", None, last.train), _quantity("relative_error_held_out", "1", None, last.holdout)]
+    quantities += [
+        _quantity("relative_error_fitted", "1", None, last.train),
+        _quantity("relative_error_held_out", "1", None, last.holdout),
+    ]
     quantities.append({**_quantity("named", "", None, 0.0), "ours": [f"{e.name} at {e.at}" for e in found.effects]})
     saved = OUT / "model.toml"
     save_model(answer.model, saved, found.sentence)

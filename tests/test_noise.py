@@ -116,6 +116,7 @@ def test_columns_are_filtered_like_signals():
     together = found(x, WHOLE)
     np.testing.assert_allclose(together @ [1.0, 2.0, -1.0], found(x @ [1.0, 2.0, -1.0], WHOLE), atol=1e-9)
     np.testing.assert_array_equal(together[:, 1], found(x[:, 1], WHOLE))
+    assert found(NOTHING, WHOLE).shape == (N - LONGEST, 0)
 
 
 @pytest.mark.parametrize("length", [40, 20])

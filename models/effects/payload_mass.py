@@ -1,7 +1,7 @@
 """Payload mass: a point mass that the model does not know of, carried at the link's far end.
 
-Where it sits is fitted too, as an offset from the far end. The far end ``s["tip"]`` (3 numbers [m], in the link's frame) is the origin of the next joint; for the last link, which
-has none, it is the link's centre of mass.
+Where it sits is fitted too, as an offset from the far end. The far end ``s["tip"]`` (3 numbers [m], in the link's
+frame) is the origin of the next joint; for the last link, which has none, it is the link's centre of mass.
 """
 
 import casadi as ca
@@ -24,7 +24,9 @@ EFFECT = Effect(
     source="Atkeson, An and Hollerbach (1986)",
     parameters=(
         Parameter("mass", "kg", "mass at the link's far end", low=0.0),
-        Parameter("x", "m", "its place from the far end, along the link frame's x axis", low=-1.0, high=1.0, grid=(0.0,)),
+        Parameter(
+            "x", "m", "its place from the far end, along the link frame's x axis", low=-1.0, high=1.0, grid=(0.0,)
+        ),
         Parameter("y", "m", "the same along y", low=-1.0, high=1.0, grid=(0.0,)),
         Parameter("z", "m", "the same along z", low=-1.0, high=1.0, grid=(0.0,)),
     ),

@@ -1,0 +1,99 @@
+"""Write ``docs/effects.md`` from the effects themselves: ``python docs/make_effects.py``.
+
+A test compares the committed page with `page`, so that the page cannot go stale.
+"""
+
+import re
+from pathlib import Path
+
+from snarelab.models.effect import Effect, Parameter
+from snarelab.models.effects import FAMILIES, effects
+
+PAGE = Path(__file__).with_name("effects.md")
+
+PLANNED = {
+    "drive train": ("backlash",),
+    "structure and mass": ("link_torsion", "link_bending"),
+    "suspension rig": ("slide_friction", "sling_tension_error", "suspension_sway", "hang_point_clearance"),
+    "free-floating base": ("external_torque", "flexible_appendage", "propellant_slosh", "wheel_friction"),
+    "snare and contact": (
+        "contact_friction",
+        "contact_damping",
+        "contact_stiffness",
+        "cable_damping",
+        "cable_pretension",
+        "umbilical_stiffness",
+    ),
+}
+"""Names that the vocabulary reserves. One that has become an effect is no longer shown as planned."""
+
+HEAD = """\
+# Effects
+
+An effect is a piece of physics with a name, a place and a law. The same name is used in model files, in the code, in
+results and in reports. This page is written from the code by `python docs/make_effects.py`.
+
+- **Where** is the kind of place that an effect acts at. A *joint* or a *link* is named as in the URDF. A *sensor* is a
+  channel, such as `tau.joint1`.
+- A joint effect gives the torque that the drive must supply on top of the rigid body's. A link effect changes the
+  link's ten inertial parameters `phi`. A sensor effect turns the true value into what the channel reads.
+- Units are those of a rotary joint. For a sliding joint read N for N·m, and m for rad. U is the channel's own unit.
+- `q`, `qd` and `qdd` are the joint's position, speed and acceleration. `load` is the rigid-body torque at the joint,
+  from the model. `sgn` is the direction of motion, smoothed over 0.1 % of the joint's peak speed.
+- *Shape* marks a parameter in which the law is nonlinear. Its starting values come from a grid.
+- An effect *contains* those that are special cases of it. They are named first, and it only for what is then left.
+
+How to add one: [adding-an-effect.md](adding-an-effect.md).
+"""
+
+EXPERIMENTS = """\
+## An experiment for each
+
+The motion or measurement that shows the effect apart from others. Reports propose it where two effects cannot be told
+apart. *X* stands for the effect's place.
+
+| effect | experiment |
+| --- | --- |
+"""
+
+
+def page() -> str:
+    """The whole page."""
+    parts = [HEAD]
+    for family in FAMILIES:
+        members = [e for e in effects().values() if e.family == family]
+        planned = [f"`{name}`" for name in PLANNED.get(family, ()) if name not in effects()]
+        parts.append(f"## {family[:1].upper()}{family[1:]}\n")
+        if members:
+            heads = "| effect | where | law | parameters | source |\n| --- | --- | --- | --- | --- |"
+            parts.append("\n".join([heads, *map(_row, members)]) + "\n")
+        if planned:
+            parts.append(f"Not yet: {', '.join(planned)}.\n")
+    parts.append(EXPERIMENTS + "\n".join(map(_experiment, effects().values())) + "\n")
+    return "\n".join(parts)
+
+
+def _row(effect: Effect) -> str:
+    contains = f"<br>Contains {', '.join(f'`{name}`' for name in effect.contains)}." if effect.contains else ""
+    law = f"`{effect.equation}`{contains}"
+    parameters = "<br>".join(map(_parameter, effect.parameters))
+    return _cells(f"`{effect.name}`<br>{effect.sentence}", effect.at, law, parameters, effect.source)
+
+
+def _parameter(p: Parameter) -> str:
+    unit = re.sub(r"\bT\b", "N·m", re.sub(r"\bS\b", "rad", p.unit))
+    unit = unit.replace("*", "·").replace("^2", "²").replace("^3", "³")
+    shape = ", shape" if p.grid else ""
+    return f"`{p.name}` [{'–' if unit == '1' else unit}]{shape}: {p.meaning}"
+
+
+def _experiment(effect: Effect) -> str:
+    return _cells(f"`{effect.name}`", effect.experiment.format(at="*X*"))
+
+
+def _cells(*cells: str) -> str:
+    return f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |"
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")
