@@ -168,7 +168,8 @@ def _answer(
     words = {
         c: (
             f"on tau.{joints[c]}, smooth curves over position, speed, load and time together still explain "
-            f"{percent(x)} of the residual in blocks that they were not fitted to ({percent(size[c])} of the channel's torque)"
+            f"{percent(x)} of the residual in blocks that they were not fitted to "
+            f"({percent(size[c])} of the channel's torque)"
         )
         for c, x in nameless.items()
     }

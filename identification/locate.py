@@ -24,15 +24,15 @@ MOST_WINDOWS = 6
 def locate(before: Fit, after: Fit, experiments: Sequence[Experiment]) -> tuple[Location, ...]:
     """Channels by their share of what the added physics explains, with time windows of the first recording and a state.
 
-    Energy is that of (torque with − torque without the added physics), in units of each channel's residual before, so
-    that newtons and newton metres compare.
+    Energy is that of (torque with − torque without the added physics), in units of each channel's measured torque,
+    so that newtons and newton metres compare.
     """
     changed = [_change(before.assembly, before.theta, after.assembly, after.theta, e) for e in experiments]
     energy = np.array([np.sum(np.concatenate([x[:, c] for x in changed]) ** 2) for c in range(changed[0].shape[1])])
-    residual = np.array(
+    measured = np.array(
         [np.sum(np.concatenate([e.measured for e in experiments])[:, c] ** 2) for c in range(len(energy))]
     )
-    weight = energy / np.maximum(residual, 1e-300)
+    weight = energy / np.maximum(measured, 1e-300)
     total = weight.sum()
     if total <= 0:
         return ()
@@ -56,6 +56,8 @@ def _windows(experiment: Experiment, change: Array) -> tuple[tuple[float, float]
     time = experiment.motion.to_band(experiment.motion.time)
     number = ((time - time[0]) / WINDOW).astype(int)
     energy = np.bincount(number, change**2)
+    if not energy.any():
+        return ()
     order = np.argsort(-energy)
     count = int(np.searchsorted(np.cumsum(energy[order]), SHOWN * energy.sum())) + 1
     chosen = np.zeros(len(energy) + 2, bool)

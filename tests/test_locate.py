@@ -175,6 +175,12 @@ def test_several_recordings_are_weighed_together(body):
     assert share["tau.joint1"] == pytest.approx(0.5 / (0.5 + 0.09), abs=0.01)
 
 
+def test_no_window_where_the_first_recording_shows_nothing(body):
+    still = np.stack([np.zeros(N), waves()[:, 1]], 1)
+    answer = found([experiment(body, still), experiment(body, waves())], {("viscous_friction", "joint1"): [1.0]})
+    assert answer[0].time_windows == ()
+
+
 def test_gaps_do_not_disturb_the_windows(body):
     qd = waves()
     qd[:, 0] = np.where((TIME > 110.2) & (TIME < 110.4), 1.0, 1e-9)
