@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..models.effects import effects
+from ..models.hidden_state import prepare
 from ..models.model_file import Model
 from ..models.rigid_body import RigidBody
 from .assembly import Assembly
@@ -76,6 +78,7 @@ def diagnose(
     if Path(holdout).resolve() in [Path(r).resolve() for r in recordings]:
         raise InputError(f"{holdout}: the holdout is also a recording to fit; hold out one that the fit does not see")
     progress("reading and conditioning the recordings")
+    prepare(effects().values())
     body = RigidBody(model.tree)
     train = load_experiments(model, recordings, body)
     band = min(e.motion.band for e in train)

@@ -75,20 +75,20 @@ class Evidence:
     ) -> None:
         """Sum the baseline's products per block."""
         rng = np.random.default_rng(seed)
-        signs = rng.choice([-1.0, 1.0], (n_blocks, n_nulls))
+        self.signs = rng.choice([-1.0, 1.0], (n_blocks, n_nulls))
         self.channels, self.n_blocks = tuple(channels), n_blocks
-        self.flipped = [c.noise[:, None] * signs[c.block] for c in channels]
         self.matrix = np.zeros((n_blocks, n_parameters, n_parameters))
         self.right = np.zeros((n_blocks, n_parameters))
         self.energy = np.zeros(n_blocks)
-        self.nulls = np.zeros((n_parameters, n_nulls))
-        for c, flipped in zip(channels, self.flipped, strict=True):
+        noise = np.zeros((n_parameters, n_blocks))
+        for c in channels:
             for b, rows in self._rows(c):
                 x = c.columns[rows]
                 self.matrix[b][np.ix_(c.index, c.index)] += x.T @ x
                 self.right[b, c.index] += x.T @ c.residual[rows]
                 self.energy[b] += c.residual[rows] @ c.residual[rows]
-            self.nulls[c.index] += c.columns.T @ flipped
+                noise[c.index, b] += x.T @ c.noise[rows]
+        self.nulls = noise @ self.signs
         self.size = sum(len(c.residual) for c in channels)
         self._total = _Solver(self.matrix.sum(0))
         self._fitted = self._total.solve(self.right.sum(0))
@@ -105,7 +105,7 @@ class Evidence:
         own = np.zeros((self.n_blocks, k, k))
         cross = np.zeros((self.n_blocks, self.matrix.shape[1], k))
         right = np.zeros((self.n_blocks, k))
-        nulls = np.zeros((k, self.nulls.shape[1]))
+        noise = np.zeros((k, self.n_blocks))
         for number, values in columns:
             c = self.channels[number]
             for b, rows in self._rows(c):
@@ -113,8 +113,8 @@ class Evidence:
                 own[b] += part.T @ part
                 cross[b, c.index] += c.columns[rows].T @ part
                 right[b] += part.T @ c.residual[rows]
-            nulls += values.T @ self.flipped[number]
-        return Products(own, cross, right, nulls)
+                noise[:, b] += part.T @ c.noise[rows]
+        return Products(own, cross, right, noise @ self.signs)
 
     def gain(self, p: Products, low: Array, high: Array) -> Gain:
         """Log-likelihood gained on all blocks by the candidate, amplitudes between bounds, baseline fitted again."""

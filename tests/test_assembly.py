@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+
+from bench.arm import random_arm
 from snarelab.errors import InputError
 from snarelab.identification.assembly import Assembly
 from snarelab.identification.base_parameters import base_parameters
@@ -11,8 +13,6 @@ from snarelab.models.model_file import Placed
 from snarelab.models.rigid_body import RigidBody
 from snarelab.models.urdf import load_urdf
 from snarelab.recordings.condition import Motion
-
-from bench.arm import random_arm
 
 PERIOD = 5e-3
 JOINTS = ("joint1", "joint2", "joint3")
@@ -25,7 +25,7 @@ def placed(*entries):
 
 def motion(kinds, n=1200, segments=None, thinning=3, first=0):
     """Sines of every joint, exact; samples ``first`` to ``first + n`` of one endless motion."""
-    t = PERIOD * np.arange(first, first + n)
+    t = np.asarray(PERIOD * np.arange(first, first + n), np.float64)
     size = np.array([0.15 if kind == "prismatic" else 0.8 for kind in kinds])
     q, qd, qdd = np.zeros((3, n, len(kinds)))
     for k, (amplitude, frequency) in enumerate([(1.0, 0.37), (0.4, 0.9), (0.1, 2.3)]):
@@ -92,7 +92,16 @@ def errors(found, wanted):
     return np.linalg.norm(found - wanted, axis=(0, 1)) / np.maximum(size, 1e-6)
 
 
-INSIDE = {"delay": 0.011, "speed": 0.2, "mass": 1.7, "x": 0.05, "y": -0.03, "z": 0.12, "coefficient": 0.08, "level": 3.0}
+INSIDE = {
+    "delay": 0.011,
+    "speed": 0.2,
+    "mass": 1.7,
+    "x": 0.05,
+    "y": -0.03,
+    "z": 0.12,
+    "coefficient": 0.08,
+    "level": 3.0,
+}
 """Values away from zero, where every parameter has a say."""
 
 MANY = placed(
@@ -122,7 +131,9 @@ def inside(assembly):
     """A parameter vector strictly between the bounds, with nothing at zero."""
     rng = np.random.default_rng(5)
     start = np.array([INSIDE.get(s.name, 0.0) or s.start for s in assembly.slots])
-    start = start + np.where(start == 0, rng.uniform(0.05, 0.15, len(start)), 0.1 * start * rng.uniform(-1, 1, len(start)))
+    start = start + np.where(
+        start == 0, rng.uniform(0.05, 0.15, len(start)), 0.1 * start * rng.uniform(-1, 1, len(start))
+    )
     return np.clip(start, np.nan_to_num(assembly.low) * 0.999, np.nan_to_num(assembly.high) * 0.999)
 
 

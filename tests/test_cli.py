@@ -12,11 +12,11 @@ import numpy as np
 import pandas as pd
 import pytest
 import scipy.io
+
 import snarelab
 import snarelab.identification.identify
-from snarelab.cli import main
-
 from bench.arm import random_arm
+from snarelab.cli import main
 
 MODEL = 'name = "arm"\nsystem = "arm"\nurdf = "arm.urdf"\neffects = ["viscous_friction"]\n'
 
@@ -150,7 +150,14 @@ MISTAKES = {
     "three rows": (edited(lambda f: f[:3]), ("bad.csv", "too few samples", "3 rows")),
     "one row": (edited(lambda f: f[:1]), ("bad.csv", "1 rows")),
     "no two channels at once": (
-        edited(lambda f: f.assign(**{"q.joint1": f["q.joint1"].where(f.index % 2 == 0), "tau.joint1": f["tau.joint1"].where(f.index % 2 == 1)})),
+        edited(
+            lambda f: f.assign(
+                **{
+                    "q.joint1": f["q.joint1"].where(f.index % 2 == 0),
+                    "tau.joint1": f["tau.joint1"].where(f.index % 2 == 1),
+                }
+            )
+        ),
         ("bad.csv", "too few samples"),
     ),
     "stray text": (edited(stray), ("bad.csv", "'tau.joint2'", "row 43", "overload")),
@@ -168,7 +175,10 @@ MISTAKES = {
         ("bad.toml", "'viscuos_friction'", "nearest: viscous_friction", "coulomb_friction", "sensor_delay"),
     ),
     "broken TOML": (model(MODEL + "[signals\n"), ("bad.toml", "not a TOML file", "line 5")),
-    "joint in signals": (model(MAPPED.replace('"tau.joint1"', '"tau.joint7"')), ("bad.toml", "'tau.joint7'", "joint1, joint2")),
+    "joint in signals": (
+        model(MAPPED.replace('"tau.joint1"', '"tau.joint7"')),
+        ("bad.toml", "'tau.joint7'", "joint1, joint2"),
+    ),
     "missing URDF": (model(MODEL.replace("arm.urdf", "amr.urdf")), ("amr.urdf", "no such file")),
     "unphysical URDF": (unphysical, ("bad.urdf", "'link2'", "nearest", "ixx=")),
     "bandwidth": (model(MODEL + "bandwidth = 45\n"), ("train.csv", "45 Hz", "100 samples a second", "<= 40 Hz")),
@@ -219,7 +229,9 @@ def test_two_outputs_in_one_place_are_refused(folder, capfd):
     refused(capfd, [*arguments("identify")[:-1], "out.json"], "out.json", "another output")
 
 
-@pytest.mark.parametrize("given", [[], ["identify"], ["diagnose", "arm.toml", "train.csv"], ["diagnoze"], ["simulate", "a"]])
+@pytest.mark.parametrize(
+    "given", [[], ["identify"], ["diagnose", "arm.toml", "train.csv"], ["diagnoze"], ["simulate", "a"]]
+)
 def test_a_command_that_is_not_complete(folder, capfd, given):
     with pytest.raises(SystemExit) as stopped:
         main(given)
@@ -254,7 +266,7 @@ def test_identify_writes_what_is_asked_and_says_it(folder, capfd):
 
 
 def test_the_program_itself(folder):
-    """As a user starts it: JSON alone on standard output, nothing on standard error of a pipe; one line for a mistake."""
+    """As a user starts it: JSON alone on standard output, nothing on a piped standard error; one line for a mistake."""
     environment = {**os.environ, "OMP_NUM_THREADS": "1"}
     command = [sys.executable, "-m", "snarelab.cli", "identify", "arm.toml"]
     good = subprocess.run([*command, "train.csv", "--json", "-"], capture_output=True, text=True, env=environment)
@@ -264,6 +276,27 @@ def test_the_program_itself(folder):
     assert (bad.returncode, bad.stdout) == (2, "")
     assert bad.stderr.startswith("snarelab: none.csv: ")
     assert bad.stderr.count("\n") == 1
+
+
+def test_diagnose_of_a_recording_in_pieces(folder, capfd):
+    """JSON alone on standard output. Every second a sample is missing, and the torque is no arm's: a hard case to get
+    through, with joints whose friction ends at its bound.
+    """
+    frame = table(0, seconds=25.0)
+    frame.loc[::104, "q.joint1"] = np.nan
+    frame.to_csv("gaps.csv", index=False)
+    given = arguments("diagnose", recording="gaps.csv")
+    given[given.index("out.json")] = "-"
+    assert main(given) == 0
+    out, err = capfd.readouterr()
+    assert err == ""
+    found = json.loads(out)
+    assert found["verdict"] in ("missing_physics", "adequate", "unknown_effect")
+    assert set(found["fit"]) == {"tau.joint1", "tau.joint2"}
+    assert "<html" in (folder / "out.html").read_text(encoding="utf-8")[:500]
+    names = {"arm.urdf", "arm.toml", "train.csv", "hold.csv", "gaps.csv"}
+    assert {p.name for p in folder.iterdir()} == names | {"new.toml", "out.html"}
+    assert main(["simulate", "new.toml", "--motion", "hold.csv", "--out", "sim.parquet"]) == 0
 
 
 def test_progress_on_a_terminal_is_one_line_that_goes_away(folder, monkeypatch):

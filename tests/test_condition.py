@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+
 from snarelab.errors import InputError
 from snarelab.recordings.condition import MINIMUM_SAMPLES, Motion, condition
 

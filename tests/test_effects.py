@@ -140,8 +140,8 @@ def sprung_link(s, stiffness, damping):
     return -np.column_stack([twist, twist_rate, rate(TIME, [twist, twist_rate])[1]])
 
 
-def with_point(s, mass):
-    points = np.concatenate([s["points"], s["tip"][:, None]], axis=1)
+def with_point(s, mass, *place):
+    points = np.concatenate([s["points"], s["tip"][:, None] + np.array(place)], axis=1)
     return inertial_parameters(np.pad(s["masses"], ((0, 0), (0, 1)), constant_values=mass), points)
 
 
@@ -173,7 +173,7 @@ REFERENCES = {
     "rotor_inertia": Reference({"inertia": 0.4}, lambda s, inertia: np.gradient(inertia * s["qd"], DT, edge_order=2)),
     "torque_ripple": Reference({"cosine": 0.3, "sine": 0.5, "period": 0.21}, ripple),
     "joint_elasticity": Reference({"stiffness": 3000.0, "damping": 15.0}, sprung_link),
-    "payload_mass": Reference({"mass": 1.7}, with_point),
+    "payload_mass": Reference({"mass": 1.7, "x": 0.05, "y": -0.1, "z": 0.15}, with_point),
     "com_offset": Reference({"x": 0.2, "y": -0.1, "z": 0.3}, with_shift),
     "inertia_error": Reference(dict(zip(TEN, inertial_parameters(*EXTRA), strict=True)), extra_bodies),
     "harness_stiffness": Reference({"stiffness": 6.0, "torque_at_zero": 2.4}, spring),

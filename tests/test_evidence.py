@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import scipy.optimize
 import scipy.stats
+
 from snarelab.identification.evidence import Channel, Evidence
 
 N_PARAMETERS, N_BLOCKS = 5, 6
@@ -158,7 +159,7 @@ def test_shares_are_the_gain_block_by_block(problem, bounds):
 def test_null_gains_are_regressions_of_sign_flipped_noise(problem):
     evidence = problem.evidence(n_nulls=12)
     found = evidence.null_gains(problem.products(evidence))
-    flipped = np.concatenate(evidence.flipped)
+    flipped = np.concatenate([c.noise[:, None] * evidence.signs[c.block] for c in evidence.channels])
     ratio = flipped / np.concatenate(problem.noise)[:, None]
     for b in range(N_BLOCKS):
         np.testing.assert_allclose(np.ptp(ratio[problem.blocks == b], axis=0), 0.0, atol=1e-12)

@@ -1,11 +1,15 @@
 """The bounded minimiser, against scipy's and against minima that are known."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 import scipy.optimize
+
 from snarelab.identification.least_squares import Normal, minimise
 
 INF = np.inf
+reference: Any = scipy.optimize.least_squares
 
 
 def normal(residual, jacobian):
@@ -74,9 +78,7 @@ def test_rosenbrock_with_active_bounds(low, high):
     x, y = np.meshgrid(np.linspace(low[0], high[0], 301), np.linspace(low[1], high[1], 301))
     k = np.argmin((10 * (y - x**2)) ** 2 + (1 - x) ** 2)
     start = np.clip([x.flat[k], y.flat[k]], low + 1e-9, high - 1e-9)
-    wanted = scipy.optimize.least_squares(
-        rosenbrock, start, rosenbrock_jacobian, bounds=(low, high), xtol=1e-14, ftol=1e-14, gtol=1e-14
-    )
+    wanted = reference(rosenbrock, start, rosenbrock_jacobian, bounds=(low, high), xtol=1e-14, ftol=1e-14, gtol=1e-14)
     assert found.settled
     assert found.normal.cost == pytest.approx(wanted.cost, rel=1e-5)
     np.testing.assert_allclose(found.theta, wanted.x, atol=1e-4)
@@ -90,7 +92,7 @@ def test_exponentials_as_scipy(seed):
     truth, residual, jacobian = decays(np.random.default_rng(seed))
     start, low, high = truth * 1.6, np.zeros(4), np.full(4, 10.0)
     found = minimise(normal(residual, jacobian), start, low, high, max_steps=200, tolerance=1e-13)
-    wanted = scipy.optimize.least_squares(
+    wanted = reference(
         residual, start, jacobian, bounds=(low, high), x_scale="jac", xtol=1e-13, ftol=1e-13, gtol=1e-13, max_nfev=2000
     )
     assert found.settled
@@ -105,7 +107,7 @@ def test_exponentials_with_a_bound_in_the_way(seed):
     start = np.minimum(truth, 0.9 * high)
     evaluate = normal(residual, jacobian)
     found = minimise(evaluate, start, low, high, max_steps=300, tolerance=1e-13)
-    wanted = scipy.optimize.least_squares(
+    wanted = reference(
         residual, start, jacobian, bounds=(low, high), x_scale="jac", xtol=1e-13, ftol=1e-13, gtol=1e-13, max_nfev=5000
     )
     assert found.normal.cost <= wanted.cost * (1 + 1e-6)

@@ -4,6 +4,8 @@ import re
 
 import numpy as np
 import pytest
+
+from bench.arm import random_arm
 from snarelab.identification.assembly import Assembly
 from snarelab.identification.experiment import Experiment, scales
 from snarelab.identification.fit import Fit
@@ -14,10 +16,8 @@ from snarelab.models.rigid_body import RigidBody
 from snarelab.models.urdf import load_urdf
 from snarelab.recordings.condition import Motion
 
-from bench.arm import random_arm
-
 PERIOD, N = 5e-3, 4000  # 20 s
-TIME = 100.0 + PERIOD * np.arange(N)
+TIME = np.asarray(100.0 + PERIOD * np.arange(N), np.float64)
 
 
 @pytest.fixture(scope="module")
@@ -32,15 +32,13 @@ def body(tmp_path_factory):
     raise AssertionError("no such arm in 100 draws")
 
 
-def experiment(body, qd, q=None, tau=10.0, segments=None):
+def experiment(body, qd, q=None, tau: float | np.ndarray = 10.0, segments=None):
     """A recording with these rates (n, 2); positions are free, since friction does not ask for them."""
     q = np.cumsum(qd, axis=0) * PERIOD if q is None else q
     torque = np.broadcast_to(tau, qd.shape) * np.sqrt(2) * np.sin(7 * TIME)[:, None]
     none = np.full_like(qd, np.nan)
     parts = segments or (slice(0, N),)
-    recorded = Motion(
-        "run.csv", ("joint1", "joint2"), PERIOD, 100 / 3, TIME, q, qd, 0 * qd, torque, none, parts, 3, ()
-    )
+    recorded = Motion("run.csv", ("joint1", "joint2"), PERIOD, 100 / 3, TIME, q, qd, 0 * qd, torque, none, parts, 3, ())
     return Experiment(recorded, body)
 
 

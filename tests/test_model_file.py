@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
+from bench.arm import random_arm
 from snarelab.errors import InputError
 from snarelab.models.effects import get_effect
 from snarelab.models.model_file import Placed, load_model, places, save_model
 from snarelab.recordings import Signal
-
-from bench.arm import random_arm
 
 GOOD = 'name = "arm"\nsystem = "arm"\nurdf = "arm.urdf"\n'
 
@@ -48,7 +48,9 @@ def test_defaults(folder):
 
 
 def test_an_effect_named_alone_acts_everywhere(folder):
-    effects = 'effects = ["viscous_friction", "payload_mass", "sensor_bias", { name = "sensor_delay", at = "q.joint2" }]'
+    effects = (
+        'effects = ["viscous_friction", "payload_mass", "sensor_bias", { name = "sensor_delay", at = "q.joint2" }]'
+    )
     model = load_model(written(folder, GOOD + effects))
     assert [p.key for p in model.effects] == [
         "viscous_friction.joint1",
@@ -69,7 +71,9 @@ def test_a_folder_is_no_model_file(tmp_path):
     refused(tmp_path, "no such model file")
 
 
-@pytest.mark.parametrize(("text", "word"), [("name = arm\n", "line 1"), (GOOD + "[signals\n", "line 4"), ('a = "', "TOML")])
+@pytest.mark.parametrize(
+    ("text", "word"), [("name = arm\n", "line 1"), (GOOD + "[signals\n", "line 4"), ('a = "', "TOML")]
+)
 def test_broken_toml(folder, text, word):
     refused(written(folder, text), "not a TOML file", word)
 
@@ -89,7 +93,7 @@ def test_missing_urdf_file(folder):
     ("line", "words"),
     [
         ('efects = ["viscous_friction"]', ("unknown key 'efects'", "did you mean 'effects'", "bandwidth")),
-        ('xyzzy = 1', ("unknown key 'xyzzy'", "allowed are name, system")),
+        ("xyzzy = 1", ("unknown key 'xyzzy'", "allowed are name, system")),
         ("gravity = [0.0, 9.81]", ("gravity = [0.0, 9.81]", "list of 3 numbers")),
         ("gravity = 9.81", ("gravity = 9.81", "list of 3 numbers")),
         ('gravity = [0, 0, "down"]', ("gravity", "list of 3 numbers")),
@@ -106,7 +110,10 @@ def test_missing_urdf_file(folder):
         ('effects = "viscous_friction"', ("effects = 'viscous_friction'", "list of effect names")),
         ("effects = [3]", ("effects has 3", "name = ..., at = ...")),
         ("effects = [{ at = 'joint1' }]", ("effects has {'at': 'joint1'}", "name = ..., at = ...")),
-        ('effects = ["viscous_fricton"]', ("unknown effect 'viscous_fricton'", "nearest: viscous_friction", "sensor_gain")),
+        (
+            'effects = ["viscous_fricton"]',
+            ("unknown effect 'viscous_fricton'", "nearest: viscous_friction", "sensor_gain"),
+        ),
         ('effects = ["joy"]', ("unknown effect 'joy'", "known effects: ", "payload_mass")),
         ('effects = [{ name = "viscous_friction", at = "joint3" }]', ("'joint3'", "joint1, joint2")),
         ('effects = [{ name = "viscous_friction", at = "link1" }]', ("'link1'", "joint1, joint2")),
@@ -114,9 +121,15 @@ def test_missing_urdf_file(folder):
         ('effects = [{ name = "viscous_friction", at = ["joint1"] }]', ("['joint1']", "joint1, joint2")),
         ('effects = [{ name = "payload_mass", at = "joint1" }]', ("'joint1'", "link1, link2")),
         ('effects = [{ name = "sensor_bias", at = "joint1" }]', ("'joint1'", "tau.joint1, tau.joint2")),
-        ('effects = [{ name = "sensor_bias", at = "q.joint1" }]', ("'q.joint1'", "this model has tau.joint1, tau.joint2")),
+        (
+            'effects = [{ name = "sensor_bias", at = "q.joint1" }]',
+            ("'q.joint1'", "this model has tau.joint1, tau.joint2"),
+        ),
         ('effects = [{ name = "sensor_delay", at = "qd.joint1" }]', ("tau.joint1, tau.joint2, q.joint1, q.joint2",)),
-        ('effects = [{ name = "viscous_friction", place = "joint1" }]', ("viscous_friction has 'place'", "name, at, hold")),
+        (
+            'effects = [{ name = "viscous_friction", place = "joint1" }]',
+            ("viscous_friction has 'place'", "name, at, hold"),
+        ),
         ('effects = [{ name = "stribeck_friction", hold = ["sped"] }]', ("hold = ['sped']", "level, speed")),
         ('effects = [{ name = "stribeck_friction", hold = "speed" }]', ("hold = 'speed'", "level, speed")),
         ('effects = ["viscous_friction", "viscous_friction"]', ("viscous_friction.joint1", "listed twice")),

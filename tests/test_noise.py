@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import scipy.signal
+
 from snarelab.identification.noise import LONGEST, whitener
 
 N = 6000
@@ -13,7 +14,7 @@ NOTHING = np.zeros((N, 0))
 def process(coefficients, sigma=1.0, n=N, seed=0):
     """x[n] = a1 x[n-1] + a2 x[n-2] + ... + sigma * innovation, settled."""
     e = sigma * np.random.default_rng(seed).normal(size=n + 500)
-    return scipy.signal.lfilter([1.0], np.r_[1.0, -np.asarray(coefficients)], e)[500:]
+    return np.asarray(scipy.signal.lfilter([1.0], np.r_[1.0, -np.asarray(coefficients)], e))[500:]
 
 
 def spectrum(coefficients, sigma, frequency):

@@ -5,21 +5,21 @@ import json
 import numpy as np
 import pandas as pd
 import pytest
+
+from bench.arm import random_arm
 from snarelab.cli import main
 from snarelab.errors import InputError
 from snarelab.identification.simulate import simulate
 from snarelab.models.model_file import load_model
 from snarelab.models.rigid_body import RigidBody
 from snarelab.models.urdf import load_urdf
-from snarelab.recordings import read_recording
+from snarelab.recordings import JointKind, read_recording
 from snarelab.recordings.condition import condition
 
-from bench.arm import random_arm
-
-KINDS = {"joint1": "revolute", "joint2": "prismatic"}
+KINDS: dict[str, JointKind] = {"joint1": "revolute", "joint2": "prismatic"}
 FRICTION = '["viscous_friction", "coulomb_friction", "sensor_bias"]'
-MORE = """["viscous_friction", { name = "stribeck_friction", at = "joint1" }, { name = "sensor_delay", at = "q.joint2" },
- { name = "coulomb_friction", at = "joint2", hold = ["level"] }]
+MORE = """["viscous_friction", { name = "stribeck_friction", at = "joint1" },
+ { name = "sensor_delay", at = "q.joint2" }, { name = "coulomb_friction", at = "joint2", hold = ["level"] }]
 [parameters]
 "coulomb_friction.joint2.level" = 4.0"""
 
