@@ -27,6 +27,7 @@ from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import MultibodyForces
+
 from snarelab.models.inertia import Array, from_central
 from snarelab.models.rigid_body import RigidBody
 from snarelab.models.tree import Tree

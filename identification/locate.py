@@ -5,10 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from .assembly import Assembly
 from .diagnosis import Location
 from .experiment import Experiment
-from .fit import Fit
 
 Array = NDArray[np.float64]
 
@@ -21,17 +19,20 @@ SHOWN = 0.5
 MOST_WINDOWS = 6
 
 
-def locate(before: Fit, after: Fit, experiments: Sequence[Experiment]) -> tuple[Location, ...]:
-    """Channels by their share of what the added physics explains, with time windows of the first recording and a state.
+def locate(experiments: Sequence[Experiment], explained: Sequence[Array]) -> tuple[Location, ...]:
+    """Channels by their share of the misfit, with time windows of the first recording, and a state of motion.
 
-    Energy is that of (torque with − torque without the added physics), in units of each channel's measured torque,
-    so that newtons and newton metres compare.
+    Parameters
+    ----------
+    experiments : sequence of Experiment
+        Training recordings.
+    explained : sequence of array (n_band, J)
+        Of each recording: the torque that the added physics makes, or the residual that has no name.
+
+    Energies are shares of each channel's measured energy, so that newtons and newton metres compare.
     """
-    changed = [_change(before.assembly, before.theta, after.assembly, after.theta, e) for e in experiments]
-    energy = np.array([np.sum(np.concatenate([x[:, c] for x in changed]) ** 2) for c in range(changed[0].shape[1])])
-    measured = np.array(
-        [np.sum(np.concatenate([e.measured for e in experiments])[:, c] ** 2) for c in range(len(energy))]
-    )
+    energy = np.sum(np.concatenate(list(explained)) ** 2, axis=0)
+    measured = np.sum(np.concatenate([e.measured for e in experiments]) ** 2, axis=0)
     weight = energy / np.maximum(measured, 1e-300)
     total = weight.sum()
     if total <= 0:
@@ -42,13 +43,9 @@ def locate(before: Fit, after: Fit, experiments: Sequence[Experiment]) -> tuple[
         if share < 0.01:
             break
         joint = experiments[0].motion.joints[c]
-        windows = _windows(experiments[0], changed[0][:, c])
-        found.append(Location(f"tau.{joint}", share, windows, _state(experiments, changed, c)))
+        windows = _windows(experiments[0], explained[0][:, c])
+        found.append(Location(f"tau.{joint}", share, windows, _state(experiments, explained, c)))
     return tuple(found)
-
-
-def _change(a: Assembly, theta_a: Array, b: Assembly, theta_b: Array, experiment: Experiment) -> Array:
-    return experiment.motion.to_band(b.torque(experiment, theta_b) - a.torque(experiment, theta_a))
 
 
 def _windows(experiment: Experiment, change: Array) -> tuple[tuple[float, float], ...]:

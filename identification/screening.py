@@ -15,14 +15,11 @@ from .diagnosis import Limit
 from .evidence import Channel, Evidence, Products
 from .experiment import Experiment
 from .fit import Fit, gather
-from .noise import Whitener, whitener
+from .saturated import Noise, learn
 
 Array = NDArray[np.float64]
 Parts = list[Array]
 """One array an experiment."""
-
-BLOCK = 1.5
-"""[s] Shortest time block: longer than the residual remembers."""
 
 RAW_BLOCKS = 12
 """Blocks of unwhitened samples, each predicted from the others."""
@@ -84,28 +81,6 @@ class Judged:
 
 
 @dataclass(frozen=True)
-class Noise:
-    """Whitener and innovations of every channel, learnt once from the saturated model, and the time blocks."""
-
-    whiteners: tuple[Whitener, ...]
-    innovations: tuple[Array, ...]
-    blocks: NDArray[np.int_]
-    segments: tuple[tuple[slice, ...], ...]
-
-    def whiten(self, channel: int, parts: Parts) -> Array:
-        """Columns of one channel, all experiments, as innovations (n_white, k)."""
-        own = self.whiteners[channel]
-        return np.concatenate([own(x, s) for x, s in zip(parts, self.segments, strict=True)])
-
-    def whiten_mask(self, channel: int, parts: Sequence[NDArray[np.bool_]]) -> NDArray[np.bool_]:
-        """Innovations that a marked sample reaches (n_white,)."""
-        own = self.whiteners[channel]
-        reach = len(own.coefficients) + 1
-        spread = [np.convolve(x, np.ones(reach))[: len(x)] > 0 for x in parts]
-        return np.concatenate([m[s][own.lead :] for m, p in zip(spread, self.segments, strict=True) for s in p])
-
-
-@dataclass(frozen=True)
 class Screening:
     """Candidates best first, the score that noise alone reaches on each set of channels, and what nameless curves
     explain."""
@@ -162,7 +137,7 @@ def screen(
         [smooth_columns(e, s, c) for e, s in zip(instruments, states, strict=True)] for c in range(len(model.joints))
     ]
     if noise is None:
-        noise = _learn(experiments, residuals, baseline, pool, smooth)
+        noise = learn(experiments, [r for r, _ in residuals], _saturated(baseline, pool, smooth))
     white, plain, awake, at_rest = [], [], [], []
     for c, parts in enumerate(baseline):
         index, own = parts[0][0], [r[:, c] for r, _ in residuals]
@@ -282,33 +257,17 @@ def _baseline(
     return channels
 
 
-def _learn(
-    experiments: Sequence[Experiment],
-    residuals: Sequence[tuple[Array, list[Block]]],
+def _saturated(
     baseline: Sequence[Sequence[tuple[NDArray[np.int_], Array]]],
     pool: Sequence[Sequence[tuple[Variant, dict[int, Parts]]]],
     smooth: Sequence[Parts],
-) -> Noise:
-    """Noise model of every channel from the saturated model: baseline, smooth curves, a middle variant of each
-    candidate."""
-    columns: list[list[Array]] = [[np.concatenate(parts)] for parts in smooth]
+) -> list[Array]:
+    """Everything that could explain each channel: baseline, smooth curves, a middle variant of each candidate."""
+    columns = [
+        [np.concatenate([x for _, x in own]), np.concatenate(parts)]
+        for own, parts in zip(baseline, smooth, strict=True)
+    ]
     for options in pool:
         for c, parts in options[len(options) // 2][1].items():
             columns[c].append(np.concatenate(parts))
-    segments = tuple(e.motion.band_segments() for e in experiments)
-    offsets = np.cumsum([0] + [len(r) for r, _ in residuals])
-    joined = [slice(s.start + o, s.stop + o) for o, parts in zip(offsets, segments, strict=False) for s in parts]
-    learnt = []
-    for c, own in enumerate(columns):
-        everything = np.concatenate([np.concatenate([x for _, x in baseline[c]]), *own], axis=1)
-        learnt.append(whitener(np.concatenate([r[:, c] for r, _ in residuals]), everything, joined))
-    lead = learnt[0][0].lead
-    blocks, count = [], 0
-    for e, parts in zip(experiments, segments, strict=True):
-        n = sum(max(0, s.stop - s.start - lead) for s in parts)
-        most = max(4, 24 // len(experiments))
-        pieces = int(np.clip(n / (2 * e.motion.band) / BLOCK, 2, most))
-        blocks.append(count + np.minimum(np.arange(n) * pieces // max(n, 1), pieces - 1))
-        count += pieces
-    whiteners, innovations = zip(*learnt, strict=True)
-    return Noise(whiteners, innovations, np.concatenate(blocks), segments)
+    return [np.concatenate(own, axis=1) for own in columns]

@@ -20,7 +20,8 @@ from .base_parameters import BaseParameters
 from .closed_loop import planned
 from .experiment import Experiment, Scales
 from .fit import Fit, fit
-from .screening import WORTH, Judged, Noise, Screening, reliably_positive, screen
+from .saturated import Noise
+from .screening import WORTH, Judged, Screening, reliably_positive, screen
 
 Array = NDArray[np.float64]
 

@@ -6,6 +6,7 @@ import http.server
 import threading
 
 import pytest
+
 from snarelab.errors import InputError
 from snarelab.recordings import find, find_recording
 

@@ -8,7 +8,6 @@ import pytest
 from bench.arm import random_arm
 from snarelab.identification.assembly import Assembly
 from snarelab.identification.experiment import Experiment, scales
-from snarelab.identification.fit import Fit
 from snarelab.identification.locate import MOST_WINDOWS, locate
 from snarelab.models.effects import get_effect
 from snarelab.models.model_file import Placed
@@ -47,17 +46,17 @@ def waves():
 
 
 def found(experiments, effects):
-    """`locate` between a model without and one with effects, ``{(name, joint): parameters}``."""
+    """`locate` for what effects add to the rigid body's torque; ``{(name, joint): parameters}``."""
 
     def made(entries):
         placed = [Placed(get_effect(name), at) for name, at in entries]
         assembly = Assembly(experiments[0].body.tree, placed, None, scales(experiments), {})
         theta = np.array([x for values in entries.values() for x in values], float)
         assert len(theta) == len(assembly.slots)
-        size = len(theta)
-        return Fit(assembly, theta, 0 * theta, np.zeros((size, size)), np.ones(2), 1.0, np.zeros(size, bool))
+        return [assembly.torque(e, theta) for e in experiments]
 
-    return locate(made({}), made(effects), experiments)
+    added = zip(experiments, made({}), made(effects), strict=True)
+    return locate(experiments, [e.motion.to_band(after - before) for e, before, after in added])
 
 
 def test_nothing_added_stands_nowhere(body):

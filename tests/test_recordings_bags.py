@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
+
 from snarelab.errors import InputError
 from snarelab.recordings import Signal, read_recording
 

@@ -5,6 +5,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import scipy.io
+
 from snarelab.errors import InputError
 from snarelab.recordings import Signal, nearest, read_recording
 

@@ -7,6 +7,7 @@ import h5py
 import numpy as np
 import pytest
 import scipy.io
+
 from snarelab.recordings import Signal, read_recording
 
 TIME = np.array([0.0, 0.1, 0.2, 0.3])

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import scipy.io
 import scipy.sparse
+
 from snarelab.errors import InputError
 from snarelab.recordings import read_recording
 from snarelab.recordings.matlab_structure import check_structure

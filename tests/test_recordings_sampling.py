@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+
 from snarelab.recordings import sampling
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+
 from snarelab.errors import InputError
 from snarelab.recordings import Signal, read_recording, write_recording
 

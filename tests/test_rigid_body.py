@@ -10,6 +10,7 @@ from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, InitializeAutoDif
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import MultibodyForces, MultibodyForces_
+
 from snarelab.errors import InputError
 from snarelab.models import compiled
 from snarelab.models.compiled import CompilerNotice

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from snarelab.errors import InputError
 from snarelab.models.inertia import is_physical, to_central
 from snarelab.models.tree import Joint, Link, Tree

@@ -1,0 +1,196 @@
+"""The documentation says what the code does: effects, links, targets, models, results and thresholds."""
+
+import json
+import re
+import runpy
+import shutil
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from snarelab.cli import main
+from snarelab.identification.diagnosis import (
+    Candidate,
+    ChannelFit,
+    Diagnosis,
+    Estimate,
+    Finding,
+    Limit,
+    Location,
+    Misfit,
+    Moved,
+    Rival,
+    Step,
+)
+from snarelab.models.effects import FAMILIES, effects
+from snarelab.models.model_file import load_model
+
+ROOT = Path(__file__).resolve().parents[1]
+README, DOCS = ROOT / "README.md", ROOT / "docs"
+PAGES = [README, ROOT / "CHANGELOG.md", *sorted(DOCS.glob("*.md"))]
+BUNDLED = ROOT / "studies" / "bundled"
+
+
+def text(name):
+    return (DOCS / name).read_text(encoding="utf-8")
+
+
+def blocks(language, pages=PAGES):
+    pattern = re.compile(rf"^```{language}\n(.*?)^```", re.MULTILINE | re.DOTALL)
+    return [(page.name, block) for page in pages for block in pattern.findall(page.read_text(encoding="utf-8"))]
+
+
+def anchors(page):
+    """What GitHub makes of a page's headings."""
+    headings = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def rows(markdown, head):
+    """Cells of the table whose first line begins with ``head``."""
+    lines = markdown[markdown.index(head) :].split("\n\n")[0].splitlines()[2:]
+    return [[cell.strip() for cell in line.strip("| ").split("|")] for line in lines]
+
+
+def test_page_of_effects_is_what_the_code_gives():
+    given = runpy.run_path(str(DOCS / "make_effects.py"))["page"]()
+    assert text("effects.md") == given, "docs/effects.md is stale: run python docs/make_effects.py"
+
+
+def test_page_of_effects_shows_every_parameter():
+    for effect in effects().values():
+        (row,) = [line for line in text("effects.md").splitlines() if line.startswith(f"| `{effect.name}`<br>")]
+        assert all(f"`{parameter.name}` [" in row for parameter in effect.parameters)
+        assert effect.source in row
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_relative_link_leads_somewhere(page):
+    for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text(encoding="utf-8")):
+        if target.startswith("https://"):
+            continue
+        path, _, anchor = target.partition("#")
+        place = (page.parent / path).resolve() if path else page
+        assert place.exists(), f"{page.name}: {target}"
+        assert not anchor or anchor in anchors(place), f"{page.name}: {target}"
+
+
+def test_every_make_target_mentioned_exists():
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    studies = re.findall(r"^STUDIES := (.*)$", makefile, re.MULTILINE)[0].split()
+    known = {*re.findall(r"^([a-z]+):", makefile, re.MULTILINE), *(f"study-{name}" for name in studies)}
+    mentioned = set()
+    for page in PAGES:
+        code = re.findall(r"`([^`\n]+)`|^(make .*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+        for line in (a or b for a, b in code):
+            if line.startswith("make "):
+                mentioned |= {word for word in line.partition("#")[0].split()[1:] if "=" not in word}
+    assert mentioned - {"study-NAME"} <= known
+    assert {"demo", "test", "study-emps"} <= mentioned
+
+
+@pytest.mark.parametrize(("page", "block"), blocks("toml"))
+def test_every_model_shown_loads(page, block, tmp_path):
+    given = tomllib.loads(block)
+    shutil.copy(BUNDLED / "arm3.urdf", tmp_path)
+    model = tmp_path / "arm3.toml"
+    model.write_text(block if "urdf" in given else f'urdf = "arm3.urdf"\n{block}', encoding="utf-8")
+    loaded = load_model(model)
+    assert len(loaded.signals) == len(given.get("signals", {}))
+    assert all(key.split(".")[0] in {*effects(), "inertia", "speed_scale"} for key in loaded.values)
+
+
+def keys(value):
+    """Every key in a JSON value, but for those that begin with x_: stand-ins for names of channels and parameters."""
+    if isinstance(value, list):
+        return set().union(*map(keys, value))
+    if not isinstance(value, dict):
+        return set()
+    own = {key for key in value if not key.startswith("x_")}
+    return own.union(*map(keys, value.values()))
+
+
+def described(page):
+    return set(re.findall(r"\w+", " ".join(re.findall(r"^\| (`[^|]*`) \|", page, re.MULTILINE))))
+
+
+def test_every_field_of_a_diagnosis_is_described():
+    misfit = Misfit(1.0, 0.5, 0.1, 0.05)
+    rival = Rival("sensor_bias", "tau.joint1", 0.1, True, "turn the load round")
+    diagnosis = Diagnosis(
+        "missing_physics",
+        "a sentence",
+        "",
+        "arm3",
+        (Finding("viscous_friction", "joint1", 0.9, {"x_coefficient": Estimate(1.0, 0.1, "1")}, "it is", (rival,)),),
+        (Location("tau.joint1", 1.0, ((0.0, 1.0),), "throughout"),),
+        (ChannelFit("x_channel", "N*m", misfit, misfit, 0.1),),
+        (Step("model as given", 0.1, 0.1),),
+        (Candidate("viscous_friction", "joint1", 0.5, 10.0, True),),
+        (Moved("inertia.link1.mass", "kg", 1.0, 2.0, 0.1),),
+        (),
+        (Limit("viscous_friction", "joint1", "coefficient", 0.1, "N*m*s/rad"),),
+        ("a note",),
+        40.0,
+    )
+    page = text("commands.md")
+    found = keys(diagnosis.to_json())
+    assert len(found) > 35
+    missing = found - described(page[page.index("## Diagnosis (JSON)") :])
+    assert not missing, f"docs/commands.md does not describe {missing}"
+
+
+def test_every_field_of_an_identification_is_described(tmp_path):
+    shutil.copy(BUNDLED / "arm3.urdf", tmp_path)
+    model, out = tmp_path / "arm3.toml", tmp_path / "out.json"
+    model.write_text('urdf = "arm3.urdf"\ninertia = "free"\neffects = ["viscous_friction"]\n')
+    recordings = [str(BUNDLED / "holdout.csv"), "--holdout", str(BUNDLED / "train.csv")]
+    assert main(["identify", str(model), *recordings, "--json", str(out)]) == 0
+    found = json.loads(out.read_text())
+    links = found["inertia"]["links"]
+    # Lists in place of what is keyed by names of channels and links.
+    found |= {"fit": [*found["fit"].values()], "inertia": found["inertia"] | {"links": [*links.values()]}}
+    page = text("commands.md")
+    section = page[page.index("## Identification (JSON)") : page.index("## Diagnosis (JSON)")]
+    inertial = set(next(iter(links.values())))
+    assert all(f"`{name}`" in section for name in inertial)
+    missing = keys(found) - described(section) - inertial
+    assert not missing, f"docs/commands.md does not describe {missing}"
+
+
+def test_readme_says_what_can_be_named():
+    table = rows(README.read_text(encoding="utf-8"), "| family | can be named |")
+    assert [row[0] for row in table] == list(FAMILIES)
+    assert {name for row in table for name in re.findall(r"`(\w+)`", row[1])} == set(effects())
+    for family, now, *planned in table:
+        assert all(effects()[name].family == family for name in re.findall(r"`(\w+)`", now))
+        assert not set(re.findall(r"`(\w+)`", " ".join(planned))) & set(effects())
+
+
+def test_thresholds_are_those_of_the_code():
+    table = rows(text("method.md"), "| constant | value |")
+    assert len(table) > 10
+    sources = [path for folder in ("recordings", "identification") for path in (ROOT / folder).glob("*.py")]
+    code = "\n".join(path.read_text(encoding="utf-8") for path in sources)
+    for name, value, _ in table:
+        defined = re.findall(rf"^{name.strip('`')} = (.*)$", code, re.MULTILINE)
+        assert list(map(float, defined)) == [float(value)], (
+            f"{name} in docs/method.md is {value}, in the code {defined}"
+        )
+
+
+def test_commands_and_options_are_those_of_the_program(capsys):
+    page = text("commands.md")
+    usage = page[page.index("```\n") : page.index("**identify**")]
+    for command in ("identify", "diagnose", "simulate"):
+        with pytest.raises(SystemExit):
+            main([command, "--help"])
+        options = set(re.findall(r"--[a-z-]+", capsys.readouterr().out)) - {"--help"}
+        (line,) = [line for line in usage.splitlines() if line.startswith(f"snarelab {command}")]
+        assert set(re.findall(r"--[a-z-]+", line)) == options
+
+
+def test_results_shown_on_two_pages_are_the_same():
+    head = "| model | error, fitted |"
+    assert rows(README.read_text(encoding="utf-8"), head) == rows(text("study-emps.md"), head)
