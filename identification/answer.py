@@ -21,7 +21,7 @@ NAMELESS = 0.1
 """Smooth curves that explain this share of a channel's residual, in blocks they did not see, mean a nameless effect
 ..."""
 
-MATERIAL = 0.01
+MATERIAL = 0.015
 """... if they also amount to this share of the channel's RMS torque."""
 
 

@@ -106,18 +106,14 @@ INSIDE = {
 }
 """Values away from zero, where every parameter has a say."""
 
-MANY = placed(
-    *(
-        entry.split("@")
-        for entry in """
+_MANY = """
 viscous_friction@joint1 viscous_friction@joint3 coulomb_friction@joint1 stribeck_friction@joint1
 asymmetric_friction@joint2 load_dependent_friction@joint2 load_dependent_friction@joint3
 position_dependent_friction@joint2 harness_stiffness@joint3 rotor_inertia@joint2 torque_ripple@joint1
 presliding_hysteresis@joint3 sensor_gain@tau.joint1 sensor_delay@tau.joint2 sensor_gain@tau.joint2
 sensor_bias@tau.joint2 sensor_delay@q.joint3 sensor_drift@tau.joint3
-""".split()
-    )
-)
+"""
+MANY = placed(*(entry.split("@") for entry in _MANY.split()))
 LINKS = placed(("payload_mass", "link3"), ("com_offset", "link2"), ("inertia_error", "link1"))
 
 

@@ -175,9 +175,7 @@ def test_thresholds_are_those_of_the_code():
     code = "\n".join(path.read_text(encoding="utf-8") for path in sources)
     for name, value, _ in table:
         defined = re.findall(rf"^{name.strip('`')} = (.*)$", code, re.MULTILINE)
-        assert list(map(float, defined)) == [float(value)], (
-            f"{name} in docs/method.md is {value}, in the code {defined}"
-        )
+        assert list(map(float, defined)) == [float(value)], f"{name} in docs/method.md, {defined} in the code"
 
 
 def test_commands_and_options_are_those_of_the_program(capsys):
