@@ -13,7 +13,7 @@ import warnings
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from . import __version__
 from .errors import InputError
@@ -36,8 +36,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
+class _OneLineParser(argparse.ArgumentParser):
+    """Says what is wrong with the arguments in one line; ``--help`` has the rest."""
+
+    def error(self, message: str) -> NoReturn:
+        """Exit with status 2."""
+        self.exit(2, f"{self.prog}: {message}; see {self.prog} --help\n")
+
+
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="snarelab", description=__doc__.splitlines()[0] if __doc__ else None)
+    parser = _OneLineParser(prog="snarelab", description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--version", action="version", version=__version__)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
@@ -71,10 +79,6 @@ def _identify(given: argparse.Namespace) -> None:
     from .models.model_file import load_model, save_model
 
     _writable([given.json, given.save_model], [*given.recordings, given.holdout])
-    if given.holdout and Path(given.holdout).resolve() in [Path(r).resolve() for r in given.recordings]:
-        raise InputError(
-            f"{given.holdout}: the holdout is also a recording to fit; hold out one that the fit does not see"
-        )
     model = load_model(given.model)
     with _Progress() as progress:
         found = identify(model, given.recordings, [given.holdout] if given.holdout else (), progress=progress)

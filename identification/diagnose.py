@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
 from ..models.effects import effects
 from ..models.hidden_state import prepare
 from ..models.model_file import Model
@@ -20,7 +19,7 @@ from .answer import report_on
 from .assembly import Assembly
 from .base_parameters import base_parameters
 from .diagnosis import Diagnosis, Step
-from .experiment import Experiment, load_experiments, scales
+from .experiment import Experiment, demand_apart, demand_torque, load_experiments, scales
 from .fit import Fit, channel_rms, fit
 from .identify import inertial_values, physical
 from .search import Found, Taken, carry, search, without
@@ -66,14 +65,14 @@ def diagnose(
     InputError
         Whatever is wrong with the recordings, or a holdout that is one of them.
     """
-    if Path(holdout).resolve() in [Path(r).resolve() for r in recordings]:
-        raise InputError(f"{holdout}: the holdout is also a recording to fit; hold out one that the fit does not see")
+    demand_apart(recordings, holdout)
     progress("reading and conditioning the recordings")
     prepare(effects().values())
     body = RigidBody(model.tree)
     train = load_experiments(model, recordings, body)
     band = min(e.motion.band for e in train)
     locked = load_experiments(model, [holdout], body, band)
+    demand_torque([*train, *locked])
     base = base_parameters(body) if model.inertia == "free" else None
     found = search(model, base, scales(train), train, progress=progress, seed=seed)
     progress("confirming on the held-out recording")

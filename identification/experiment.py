@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import InputError
 from ..models.model_file import Model
 from ..models.rigid_body import RigidBody
 from ..recordings import JointKind, read_recording
@@ -90,6 +91,23 @@ def load_experiments(
     if any(m.band > 1.01 * narrowest for m in motions):
         motions = [condition(d, model.joints, narrowest) for d in datasets]
     return [Experiment(m, body) for m in motions]
+
+
+def demand_apart(recordings: Sequence[str | Path], holdout: str | Path) -> None:
+    """Refuse a held-out recording that is fitted too (InputError)."""
+    if Path(holdout).resolve() in [Path(r).resolve() for r in recordings]:
+        raise InputError(f"{holdout}: the holdout is also a recording to fit; hold out one that the fit does not see")
+
+
+def demand_torque(experiments: Sequence[Experiment]) -> None:
+    """Refuse a torque channel that reads zero throughout: nothing can be fitted to it (InputError)."""
+    for e in experiments:
+        for joint, tau in zip(e.motion.joints, e.motion.tau.T, strict=True):
+            if not tau.any():
+                raise InputError(
+                    f"{e.motion.path}: 'tau.{joint}' is zero in every row; record the torque, or map its column under "
+                    f"[signals] in the model file"
+                )
 
 
 def scales(experiments: Sequence[Experiment]) -> Mapping[str, Scales]:

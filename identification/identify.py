@@ -13,7 +13,7 @@ from ..models.rigid_body import RigidBody
 from .assembly import Assembly
 from .base_parameters import INERTIAL, BaseParameters, base_parameters
 from .consistent_inertia import ConsistentInertia, consistent_inertia
-from .experiment import Experiment, load_experiments, scales
+from .experiment import Experiment, demand_apart, demand_torque, load_experiments, scales
 from .fit import Fit, channel_rms, fit
 
 
@@ -104,11 +104,14 @@ def identify(
     InputError
         Whatever is wrong with a recording, or effects that the identified inertia already holds.
     """
+    for recording in holdout:
+        demand_apart(recordings, recording)
     progress("reading and conditioning the recordings")
     body = RigidBody(model.tree)
     train = load_experiments(model, recordings, body)
     band = min(e.motion.band for e in train)
     locked = load_experiments(model, holdout, body, band) if holdout else []
+    demand_torque([*train, *locked])
     base = base_parameters(body) if model.inertia == "free" else None
     assembly = Assembly(model.tree, model.effects, base, scales(train), model.values)
     found = fit(assembly, train, progress=progress, seed=seed)

@@ -140,6 +140,7 @@ MISTAKES = {
         ("bad.csv", "'q.joint1 [kg]'", "does not fit", "rad"),
     ),
     "unknown unit": (edited(lambda f: f.rename(columns={"tau.joint1": "tau.joint1 [Nmm!]"})), ("bad.csv", "Nmm!")),
+    "all zero": (edited(lambda f: f.assign(**{"tau.joint1": 0.0})), ("bad.csv", "'tau.joint1'", "zero in every row")),
     "all NaN": (edited(lambda f: f.assign(**{"tau.joint1": np.nan})), ("bad.csv", "'tau.joint1'", "no number")),
     "joint without signal": (
         edited(lambda f: f.drop(columns=["q.joint2", "tau.joint2"])),
@@ -236,7 +237,9 @@ def test_a_command_that_is_not_complete(folder, capfd, given):
     with pytest.raises(SystemExit) as stopped:
         main(given)
     assert stopped.value.code == 2
-    assert "usage: snarelab" in capfd.readouterr().err
+    said = capfd.readouterr().err
+    assert said.count("\n") == 1
+    assert said.endswith("--help\n")
 
 
 def test_version(capfd):
