@@ -140,7 +140,6 @@ MISTAKES = {
         ("bad.csv", "'q.joint1 [kg]'", "does not fit", "rad"),
     ),
     "unknown unit": (edited(lambda f: f.rename(columns={"tau.joint1": "tau.joint1 [Nmm!]"})), ("bad.csv", "Nmm!")),
-    "all zero": (edited(lambda f: f.assign(**{"tau.joint1": 0.0})), ("bad.csv", "'tau.joint1'", "zero in every row")),
     "all NaN": (edited(lambda f: f.assign(**{"tau.joint1": np.nan})), ("bad.csv", "'tau.joint1'", "no number")),
     "joint without signal": (
         edited(lambda f: f.drop(columns=["q.joint2", "tau.joint2"])),
@@ -191,6 +190,12 @@ MISTAKES = {
 def test_a_mistake_gives_one_line_and_nothing_else(folder, capfd, command, mistake):
     make, words = MISTAKES[mistake]
     refused(capfd, arguments(command, **make()), *words)
+
+
+@pytest.mark.parametrize("command", ["identify", "diagnose"])
+def test_a_torque_channel_of_zeros(folder, capfd, command):
+    make = edited(lambda f: f.assign(**{"tau.joint1": 0.0}))
+    refused(capfd, arguments(command, **make()), "bad.csv", "'tau.joint1'", "zero in every row")
 
 
 @pytest.mark.parametrize("command", ["identify", "diagnose"])
