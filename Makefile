@@ -7,11 +7,11 @@ STUDIES := emps
 .PHONY: help demo test check bench clean $(STUDIES:%=study-%)
 
 help:            ## what can be made
-	@sed -n 's/^\([a-z%-]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
+	@sed -n -e 's/^\$$(STUDIES.*## /  make study-NAME\t/p' -e 's/^\([a-z]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
 
 demo: study-emps ## set up, then the main job: name the physics that a viscous model of EMPS leaves out
 
-study-%: .venv/installed ## run one study: report and numbers in build/studies/NAME
+$(STUDIES:%=study-%): study-%: .venv/installed ## run one study: report and numbers in build/studies/NAME
 	$(BIN)/python -m snarelab.studies.$(subst -,_,$*)
 
 test: .venv/installed ## set up, then the tests
