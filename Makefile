@@ -1,7 +1,7 @@
 # Each target sets up .venv by itself and does nothing where nothing changed. PYTHON picks the interpreter (3.11 or newer).
 PYTHON ?= python3
 BIN := .venv/bin
-SOURCES := $(shell git ls-files '*.py' '*.toml' '*.urdf' '*.csv' 2>/dev/null | grep -v -e '^tests/' -e '^bench/')
+SOURCES := $(shell git ls-files '*.py' '*.toml' '*.urdf' '*.csv' '*.json' 2>/dev/null | grep -v -e '^tests/' -e '^bench/')
 STUDIES := emps
 
 .PHONY: help demo test check bench clean $(STUDIES:%=study-%)
@@ -20,9 +20,10 @@ test: .venv/installed ## set up, then the tests
 check: .venv/installed ## formatting, lint and types
 	$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/pyright
 
-bench: .venv/bench ## ratios against named rivals, measured in one run
+bench: .venv/installed ## ratios against named rivals, measured in one run
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/torque.py
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/friction_fit.py
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/diagnosis.py
 
 clean:           ## remove what was built; the environment too
 	rm -rf .venv build *.egg-info
@@ -34,9 +35,6 @@ clean:           ## remove what was built; the environment too
 	touch $@
 
 .venv/installed: .venv/tools $(SOURCES)
+	rm -rf build/lib build/bdist.*
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --force-reinstall .
-	touch $@
-
-.venv/bench: .venv/installed
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt '.[bench]'
 	touch $@

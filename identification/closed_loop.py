@@ -16,7 +16,8 @@ from scipy.signal import butter, sosfiltfilt, welch
 
 from .candidates import smooth_columns
 from .experiment import Experiment
-from .fit import Fit, gather
+from .fit import Fit
+from .problem import gather
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.optimize import lsq_linear
 
 Array = NDArray[np.float64]
@@ -59,18 +59,21 @@ def minimise(
     """
     theta = np.clip(start, low, high)
     here = normal(theta)
+    if not np.isfinite(here.cost):
+        return Solution(theta, here, 0, False)
     damping = 1e-6
+    scale = np.zeros(len(theta))
     for step in range(1, max_steps + 1):
-        scale = np.sqrt(np.maximum(np.diag(here.matrix), 1e-300))
-        move = _bounded_step(here, scale, damping, low - theta, high - theta)
+        # The largest influence so far (Moré 1978): a parameter that loses its influence stays, it does not run away.
+        scale = np.maximum(scale, np.sqrt(np.diag(here.matrix)))
+        move = bounded_step(here, scale, damping, low - theta, high - theta)
         gain = -(here.gradient @ move + 0.5 * move @ here.matrix @ move)
         if gain <= tolerance * here.cost:
             return Solution(theta, here, step, True)
-        trial = np.clip(theta + move, low, high)  # rounding may lead past a bound
-        there = normal(trial)
+        there = normal(np.clip(theta + move, low, high))
         ratio = (here.cost - there.cost) / gain if np.isfinite(there.cost) else -1.0
         if ratio > 1e-4:
-            theta, here = trial, there
+            theta, here = np.clip(theta + move, low, high), there
             damping = max(damping * (0.1 if ratio > 0.7 else 0.5), 1e-12)
         elif damping > 1e8:
             return Solution(theta, here, step, True)
@@ -79,17 +82,24 @@ def minimise(
     return Solution(theta, here, max_steps, False)
 
 
-def _bounded_step(here: Normal, scale: Array, damping: float, low: Array, high: Array) -> Array:
-    """Minimise the damped quadratic model inside the bounds; in parameters scaled to unit curvature."""
-    matrix = here.matrix / np.outer(scale, scale) + (damping + 1e-14) * np.eye(len(scale))
-    factor, lower = cho_factor(matrix, lower=True)
-    free = -cho_solve((factor, lower), here.gradient / scale)
-    if np.all(free >= low * scale) and np.all(free <= high * scale):
-        return free / scale
-    triangle = np.tril(factor).T
-    target = np.linalg.solve(triangle.T, -here.gradient / scale)
-    box = (np.minimum(low * scale, 0.0), np.maximum(high * scale, 0.0))
-    pinned = box[0] == box[1]
-    if pinned.any():
-        box = (box[0] - 1e-12 * pinned, box[1] + 1e-12 * pinned)
-    return np.clip(lsq_linear(triangle, target, bounds=box, method="bvls").x / scale, low, high)
+def bounded_step(here: Normal, scale: Array, damping: float, low: Array, high: Array) -> Array:
+    """Minimise the quadratic model of the cost, damped by ``damping * scale**2``, between bounds on the step.
+
+    Parameters with ``scale`` 0 (no influence) or with ``low == high`` stay where they are.
+    """
+    move = np.zeros(len(scale))
+    free = (scale > 0) & (low < high)
+    if not free.any():
+        return move
+    unit, low, high = scale[free], low[free], high[free]
+    matrix = here.matrix[np.ix_(free, free)] / np.outer(unit, unit) + (damping + 1e-14) * np.eye(len(unit))
+    gradient = here.gradient[free] / unit
+    factor = cho_factor(matrix, lower=True)
+    step = -cho_solve(factor, gradient)
+    low, high = low * unit, high * unit
+    if np.any(step < low) or np.any(step > high):
+        triangle = np.tril(factor[0])
+        target = -solve_triangular(triangle, gradient, lower=True)
+        step = np.clip(lsq_linear(triangle.T, target, bounds=(low, high), method="bvls").x, low, high)
+    move[free] = step / unit
+    return move

@@ -14,7 +14,8 @@ from .closed_loop import REST
 from .diagnosis import Limit
 from .evidence import Channel, Evidence, Products
 from .experiment import Experiment
-from .fit import Fit, gather
+from .fit import Fit
+from .problem import gather
 from .saturated import Noise, learn
 
 Array = NDArray[np.float64]

@@ -44,9 +44,7 @@ def recording(body, friction, still=()):
     tau = body.torque(q, qd, qdd) + friction(qd)
     temperature = np.full_like(q, 20.0)
     band = 1 / (2 * THINNING * PERIOD)
-    motion = Motion(
-        "run.csv", JOINTS, PERIOD, band, t, q, qd, qdd, tau, temperature, (slice(0, N),), THINNING, ()
-    )
+    motion = Motion("run.csv", JOINTS, PERIOD, band, t, q, qd, qdd, tau, temperature, (slice(0, N),), THINNING, ())
     return Experiment(motion, body)
 
 
@@ -116,7 +114,7 @@ def test_the_optimum_is_the_best_that_scipy_finds_from_many_starts(body):
 
 
 def test_many_starts_reach_the_best_makkar_curve(body):
-    """The friction curve is compared: the parameters mean little."""
+    """The friction curve is compared: the parameters mean little, and two of the law's terms may have swapped roles."""
     rng = np.random.default_rng(1)
     noise = 0.05 * rng.normal(size=(N, 2))
     truth = np.array([[4.0, 0.02, 12.0, 3.0, 0.05, 1.0], [2.0, 0.01, 20.0, 1.0, 0.6, 0.3]])
@@ -125,7 +123,7 @@ def test_many_starts_reach_the_best_makkar_curve(body):
     found = fit(model, [run])
     assert found.starts >= found.agreed >= 1
     floor = np.sqrt(np.mean(run.motion.to_band(noise) ** 2, axis=0))
-    np.testing.assert_allclose(found.sigma, floor, rtol=0.01)
+    np.testing.assert_allclose(found.sigma, floor, rtol=0.02)
     for joint in range(2):
         v = np.linspace(-1, 1, 400) * np.abs(run.motion.qd[:, joint]).max()
         wanted = makkar(v, truth[joint])

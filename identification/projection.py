@@ -1,0 +1,121 @@
+"""Least squares for models that are linear in most of their parameters: variable projection on normal equations.
+
+The search runs over the shape parameters s alone; for every s the amplitudes a are solved between their bounds. Where
+amplitude and shape trade off along a curved valley, as they do in friction curves, this gets to the end where a search
+over both crawls (Golub & Pereyra 1973). A step is Kaufman's (1975): the Schur complement of the normal equations.
+Amplitudes for a new s are foretold to first order, so that a point takes one pass over the samples or two.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .least_squares import Normal, Solution, bounded_step, minimise
+
+Array = NDArray[np.float64]
+
+WORTH_A_PASS = 1e-8
+"""Share of the cost that solving the amplitudes must promise before the model is evaluated again there."""
+
+_RIDGE = 1e-10
+
+
+def minimise_projected(
+    normal: Callable[[Array], Normal],
+    start: Array,
+    low: Array,
+    high: Array,
+    shapes: NDArray[np.bool_],
+    *,
+    max_steps: int = 60,
+    tolerance: float = 1e-8,
+) -> Solution:
+    """Minimise ½‖r(theta)‖² between bounds; as `least_squares.minimise`, for r linear in all but some parameters.
+
+    Parameters
+    ----------
+    normal : callable
+        ``theta (n_parameters,) -> Normal``.
+    start, low, high : array (n_parameters,)
+    shapes : array (n_parameters,) of bool
+        Parameters that r is not linear in. Linearity in the others is used for speed, not trusted: what is
+        returned was evaluated.
+    max_steps : int
+        Most steps in the shapes.
+    tolerance : float
+        Settled when a step's predicted gain falls below this share of the cost.
+    """
+    if not shapes.any():
+        return minimise(normal, start, low, high, max_steps=max_steps, tolerance=tolerance)
+    search = _Search(normal, np.clip(start, low, high), low, high, shapes)
+    found = minimise(search, start[shapes], low[shapes], high[shapes], max_steps=max_steps, tolerance=tolerance)
+    return Solution(search.theta, search.here, found.steps, found.settled)
+
+
+def project(
+    normal: Callable[[Array], Normal],
+    theta: Array,
+    low: Array,
+    high: Array,
+    shapes: NDArray[np.bool_],
+    scale: Array | float = 0.0,
+) -> tuple[Array, float, Normal]:
+    """Solve the amplitudes, shapes held: parameters (n_parameters,), cost there, normal equations at ``theta``.
+
+    ``scale`` is the most influence that each parameter is known to have: one that lost nearly all of it stays.
+    """
+    here = normal(theta)
+    if not np.isfinite(here.cost):
+        return theta, np.inf, here
+    room = np.where(shapes, 0.0, low - theta), np.where(shapes, 0.0, high - theta)
+    move = bounded_step(here, np.maximum(scale, np.sqrt(np.diag(here.matrix))), _RIDGE, *room)
+    cost = here.cost + float(here.gradient @ move + 0.5 * move @ here.matrix @ move)
+    return np.clip(theta + move, low, high), cost, here
+
+
+class _Search:
+    """The reduced problem as a function of the shapes; keeps the best point it has been asked for."""
+
+    def __init__(
+        self, normal: Callable[[Array], Normal], start: Array, low: Array, high: Array, shapes: NDArray[np.bool_]
+    ) -> None:
+        self._normal, self._low, self._high, self._shapes = normal, low, high, shapes
+        self.theta, self.here = start, Normal(np.inf, np.zeros(len(start)), np.zeros((len(start), len(start))))
+        self._follow = np.zeros((len(start), np.count_nonzero(shapes)))
+        self._scale = np.zeros(len(start))
+
+    def __call__(self, shape: Array) -> Normal:
+        foretold = self.theta + self._follow @ (shape - self.theta[self._shapes])
+        foretold[self._shapes] = shape
+        foretold = np.clip(foretold, self._low, self._high)
+        theta, cost, here = project(self._normal, foretold, self._low, self._high, self._shapes, self._scale)
+        if not np.isfinite(cost):
+            return Normal(np.inf, np.zeros(len(shape)), np.zeros((len(shape), len(shape))))
+        self._scale = np.maximum(self._scale, np.sqrt(np.diag(here.matrix)))
+        if here.cost - cost > WORTH_A_PASS * cost:
+            there = self._normal(theta)
+            theta, here = (theta, there) if there.cost < here.cost else (foretold, here)
+        else:
+            theta = foretold
+        free = ~self._shapes & (theta > self._low) & (theta < self._high)
+        reduced, follow = _schur(here, free, self._shapes, self._scale)
+        if here.cost < self.here.cost:
+            self.theta, self.here = theta, here
+            self._follow = np.zeros_like(self._follow)
+            self._follow[free] = follow
+        return reduced
+
+
+def _schur(here: Normal, free: NDArray[np.bool_], shapes: NDArray[np.bool_], scale: Array) -> tuple[Normal, Array]:
+    """Normal equations of the shapes with free amplitudes following, and how they follow (n_free, n_shapes)."""
+    scale = np.where(scale > 0, scale, np.inf)[free]  # amplitudes without influence stay
+    own = here.matrix[np.ix_(free, free)] / np.outer(scale, scale) + _RIDGE * np.eye(len(scale))
+    cross = here.matrix[np.ix_(free, shapes)] / scale[:, None]
+    solved = np.linalg.solve(own, np.column_stack([cross, here.gradient[free] / scale]))
+    follow, rest = solved[:, :-1], solved[:, -1]
+    gradient = here.gradient[shapes] - cross.T @ rest
+    matrix = here.matrix[np.ix_(shapes, shapes)] - cross.T @ follow
+    # Rounding must not turn a direction that amplitudes mimic wholly into one of negative curvature.
+    matrix = matrix + 1e-12 * np.diag(np.diag(here.matrix)[shapes])
+    return Normal(here.cost, gradient, 0.5 * (matrix + matrix.T)), -follow / scale[:, None]

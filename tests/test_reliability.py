@@ -1,0 +1,65 @@
+"""The reliability curve: fitted without falling, read without certainty, and its bank done once only."""
+
+import json
+from functools import partial
+
+import numpy as np
+import pytest
+
+from bench.reliability import curve, fill, run_case
+from snarelab.identification.reliability import probability
+
+
+def least_squares_by_hand(values, weights):
+    """Isotonic fit by its min-max formula (Barlow et al. 1972): no pooling at all."""
+    n = len(values)
+    mean = [
+        [np.average(values[a : b + 1], weights=weights[a : b + 1]) if b >= a else 0.0 for b in range(n)]
+        for a in range(n)
+    ]
+    return [max(min(mean[a][b] for b in range(k, n)) for a in range(k + 1)) for k in range(n)]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_curve_is_the_isotonic_fit_of_smoothed_frequencies(seed):
+    rng = np.random.default_rng(seed)
+    margin = np.repeat(rng.random(12), 10)
+    right = rng.random(120) < 0.3 + 0.5 * margin
+    shuffled = rng.permutation(120)
+    knots, found = curve(margin[shuffled], right[shuffled], group=10)
+    groups = np.unique(margin)
+    assert knots == pytest.approx(groups)
+    frequency = [(right[margin == m].sum() + 1) / 12 for m in groups]
+    assert found == pytest.approx(least_squares_by_hand(frequency, np.full(12, 12.0)))
+
+
+def test_equal_margins_share_a_knot_and_small_groups_join():
+    knots, found = curve([0.2, 1.0, 1.0, 1.0, 1.0, 1.0, 0.5, 0.4], [0, 1, 1, 1, 1, 1, 0, 1], group=3)
+    assert knots == pytest.approx([1.1 / 3, 1.0])
+    assert found == pytest.approx([2 / 5, 6 / 7])
+
+
+def test_nothing_wrong_in_a_bank_is_not_certainty():
+    _, found = curve(np.ones(8), np.ones(8))
+    assert found == pytest.approx([0.9])
+
+
+def test_stored_curve_never_falls_and_is_never_certain():
+    found = np.array([probability(m) for m in np.linspace(0.0, 1.0, 501)])
+    assert np.all(np.diff(found) >= 0)
+    assert found[0] > 0
+    assert found[-1] < 1
+    assert found[-1] > 0.5  # the package's names are worth more than a coin
+
+
+def test_bank_goes_on_where_it_stopped(tmp_path):
+    path, told = tmp_path / "bank.jsonl", []
+    run = partial(run_case, seconds=6.0, holdout=6.0)
+    (first,) = fill(path, 1, 7, 1, run, told.append)
+    path.write_text(path.read_text() + '{"case": 1, "ki')  # stopped while it wrote
+    both = fill(path, 2, 7, 1, run, told.append)
+    assert both[0] == first
+    assert [r["kind"] for r in both] == ["coulomb_friction", "stribeck_friction"]
+    assert [json.loads(line) for line in path.read_text().splitlines()] == both
+    assert fill(path, 2, 7, 1, run, told.append) == both
+    assert len(told) == 2
