@@ -114,7 +114,7 @@ def main() -> int:
     solvers: dict[str, Callable[[], Array]] = {
         "ours": lambda: fit(model, [run], start=start, multi_start=False).theta,
         "scipy, two-point": lambda: least_squares(residual, start, bounds=bounds).x,
-        "scipy, analytic": lambda: least_squares(residual, start, jacobian, bounds, x_scale="jac").x,
+        "scipy, analytic": lambda: least_squares(residual, start, jacobian, bounds, x_scale="jac").x,  # pyright: ignore[reportArgumentType]
     }
     fit(model, [run], start=start, multi_start=False)  # the laws are compiled outside the timing, for all
     turns = [{name: timed(solve) for name, solve in solvers.items()} for _ in range(REPETITIONS)]

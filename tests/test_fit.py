@@ -31,7 +31,7 @@ def body(tmp_path_factory):
 
 def recording(body, friction, still=()):
     """Sines on two joints, torque of the rigid body plus ``friction(qd)`` (n, 2); ``still`` joints stand."""
-    t = PERIOD * np.arange(N)
+    t = np.asarray(PERIOD * np.arange(N), np.float64)
     q, qd, qdd = np.zeros((3, N, 2))
     for size, frequency in ((0.8, 0.11), (0.3, 0.31), (0.1, 0.73)):
         w = 2 * np.pi * frequency * np.array([1.0, 1.17])
