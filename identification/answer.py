@@ -12,6 +12,7 @@ from .diagnosis import Candidate, ChannelFit, Diagnosis, Estimate, Finding, Misf
 from .experiment import Experiment
 from .fit import Fit, channel_rms
 from .locate import locate
+from .reliability import probability as reliability
 from .search import Found, Taken
 from .wording import evidence_sentence, experiment_sentence, percent, verdict_sentence
 
@@ -126,13 +127,17 @@ def _finding(t: Taken, final: Fit, trials: Mapping[str, tuple[float, float]], jo
     }
     with_it, without_it = trials[placed.key]
     channels = [f"tau.{joints[c]}" for c in t.judged.channels]
+    # How often a name with this margin was right on the bank, shared out as the bootstrap was.
+    right = reliability(t.probability)
     rivals = tuple(
-        Rival(r.placed.effect.name, r.placed.at, r.probability, r.separable, experiment_sentence(placed, r.placed))
+        Rival(
+            r.placed.effect.name, r.placed.at, r.probability * right, r.separable, experiment_sentence(placed, r.placed)
+        )
         for r in t.rivals
         if r.probability >= 0.005 or not r.separable
     )
     sentence = evidence_sentence(placed, t.judged.explained, channels, with_it, without_it)
-    return Finding(placed.effect.name, placed.at, t.probability, parameters, sentence, rivals)
+    return Finding(placed.effect.name, placed.at, t.probability * right, parameters, sentence, rivals)
 
 
 def _fits(

@@ -2,7 +2,9 @@
 
 One pass over the samples gives cost, gradient and normal matrix; the (n_samples, n_parameters) Jacobian need never
 stand in memory at once, which is what makes it quicker than a general solver where samples are many and parameters few
-(Levenberg 1944; Marquardt 1963). Bounds are kept by solving each step's quadratic program (Stark & Parker 1995, BVLS).
+(Levenberg 1944; Marquardt 1963). Where residuals stay large, the curvature that the normal matrix lacks is learnt from
+the steps, and used while it foretells them better. Bounds are kept by solving each step's quadratic program (Stark &
+Parker 1995, BVLS).
 """
 
 from collections.abc import Callable
@@ -63,23 +65,49 @@ def minimise(
         return Solution(theta, here, 0, False)
     damping = 1e-6
     scale = np.zeros(len(theta))
+    bend, bent = np.zeros_like(here.matrix), False
     for step in range(1, max_steps + 1):
         # The largest influence so far (Moré 1978): a parameter that loses its influence stays, it does not run away.
         scale = np.maximum(scale, np.sqrt(np.diag(here.matrix)))
-        move = bounded_step(here, scale, damping, low - theta, high - theta)
-        gain = -(here.gradient @ move + 0.5 * move @ here.matrix @ move)
+        model = Normal(here.cost, here.gradient, here.matrix + bend) if bent else here
+        try:
+            move = bounded_step(model, scale, damping, low - theta, high - theta)
+        except np.linalg.LinAlgError:
+            bent = False  # not convex: the plain model always is
+            continue
+        gain = -(here.gradient @ move + 0.5 * move @ model.matrix @ move)
         if gain <= tolerance * here.cost:
             return Solution(theta, here, step, True)
-        there = normal(np.clip(theta + move, low, high))
+        trial = np.clip(theta + move, low, high)  # rounding may lead past a bound
+        there = normal(trial)
         ratio = (here.cost - there.cost) / gain if np.isfinite(there.cost) else -1.0
         if ratio > 1e-4:
-            theta, here = np.clip(theta + move, low, high), there
+            move = trial - theta
+            bend = _secant(bend, there.gradient - here.gradient, there.matrix, move)
+            miss = there.cost - here.cost - here.gradient @ move - 0.5 * move @ here.matrix @ move
+            bent = abs(miss - 0.5 * move @ bend @ move) < abs(miss)
+            theta, here = trial, there
             damping = max(damping * (0.1 if ratio > 0.7 else 0.5), 1e-12)
+        elif bent:
+            bent = False
         elif damping > 1e8:
             return Solution(theta, here, step, True)
         else:
             damping = max(damping, 1e-8) * 10
     return Solution(theta, here, max_steps, False)
+
+
+def _secant(bend: Array, change: Array, matrix: Array, move: Array) -> Array:
+    """Curvature that the normal matrix lacks, from how the gradient changed over a step (Dennis, Gay & Welsch 1981)."""
+    along = float(change @ move)
+    if along <= 0:
+        return bend
+    wanted = change - matrix @ move
+    size = abs(float(move @ bend @ move))
+    share = min(1.0, abs(float(move @ wanted)) / size) if size > 0 else 1.0
+    miss = wanted - share * bend @ move
+    pair = np.outer(miss, change) / along
+    return share * bend + pair + pair.T - (miss @ move) * np.outer(change, change) / along**2
 
 
 def bounded_step(here: Normal, scale: Array, damping: float, low: Array, high: Array) -> Array:
