@@ -18,7 +18,7 @@ test: .venv/installed ## set up, then the tests
 	$(BIN)/python -m pytest -n 2
 
 check: .venv/installed ## formatting, lint and types
-	$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/pyright
+	$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/pyright --pythonpath $(BIN)/python
 
 bench: .venv/installed ## ratios against named rivals, measured in one run
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/torque.py

@@ -15,8 +15,8 @@ from .least_squares import Normal, Solution, bounded_step, minimise
 
 Array = NDArray[np.float64]
 
-WORTH_A_PASS = 1e-8
-"""Share of the cost that solving the amplitudes must promise before the model is evaluated again there."""
+WORTH_A_PASS = 0.2
+"""Share of the progress made that solving the amplitudes must promise before the model is evaluated again there."""
 
 _RIDGE = 1e-10
 
@@ -93,7 +93,8 @@ class _Search:
         if not np.isfinite(cost):
             return Normal(np.inf, np.zeros(len(shape)), np.zeros((len(shape), len(shape))))
         self._scale = np.maximum(self._scale, np.sqrt(np.diag(here.matrix)))
-        if here.cost - cost > WORTH_A_PASS * cost:
+        progress = self.here.cost - cost if np.isfinite(self.here.cost) else 0.0
+        if here.cost - cost > WORTH_A_PASS * abs(progress):
             there = self._normal(theta)
             theta, here = (theta, there) if there.cost < here.cost else (foretold, here)
         else:
