@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import lstsq
 from scipy.signal import lfilter
 
 Array = NDArray[np.float64]
@@ -55,8 +54,8 @@ def whitener(residual: Array, columns: Array, segments: Sequence[slice]) -> tupl
     scale = np.sqrt(np.mean(columns**2, axis=0))
     use = columns[:, scale > 0] / scale[scale > 0]
     ridge = 1e-3 * np.sqrt(len(residual)) * np.eye(use.shape[1])
-    answer = lstsq(np.vstack([use, ridge]), np.concatenate([residual, np.zeros(len(ridge))]), lapack_driver="gelsy")
-    noise = residual - use @ answer[0]  # type: ignore[index]
+    padded = np.concatenate([residual, np.zeros(len(ridge))])
+    noise = residual - use @ np.linalg.lstsq(np.vstack([use, ridge]), padded, rcond=None)[0]
     # Long runs tell the memory apart from the ends; short ones serve where there is nothing else.
     kept = [s for s in segments if s.stop - s.start > 4 * LONGEST] or [
         s for s in segments if s.stop - s.start > LONGEST

@@ -102,7 +102,7 @@ def test_threads_that_build_the_same_library_do_not_clash(own_cache):
     def build():
         try:
             check_doubled()
-        except Exception as fault:
+        except Exception as fault:  # a thread's fault must reach the test, whatever it is
             faults.append(fault)
 
     threads = [threading.Thread(target=build) for _ in range(6)]
