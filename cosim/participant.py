@@ -1,0 +1,96 @@
+"""What takes part in a co-simulation, in FMI's words: variables, initialise, set, step, get, save, restore.
+
+A participant is one file in ``cosim/participants`` with a subclass of `Participant`. Inputs and outputs cross as one
+vector each, in the order of `Participant.variables`, so that the master's loop is a few array copies; parameters are
+given once, by name, at initialisation.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+Causality = Literal["input", "output", "parameter"]
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One scalar that a participant shows.
+
+    Parameters
+    ----------
+    name : str
+        Unique in the participant; recordings' column names where one fits (``q.joint1``, ``pos.pin.x``).
+    causality : "input", "output" or "parameter"
+    unit : str
+        pint's spelling (``N*m``, ``rad/s``); ``1`` for a plain number.
+    start : float
+        Value before the first step (inputs), default (parameters), or what `Participant.outputs` gives at first.
+    description : str
+        What it is, with its frame, in a few words.
+    minimum, maximum : float
+        Bounds [unit].
+    depends : tuple of str or None
+        For an output: the inputs that change it at once, without a step (direct feed-through). Empty: none.
+        None: unknown, which counts as all.
+    """
+
+    name: str
+    causality: Causality
+    unit: str
+    start: float = 0.0
+    description: str = ""
+    minimum: float = -np.inf
+    maximum: float = np.inf
+    depends: tuple[str, ...] | None = ()
+
+
+class Participant(ABC):
+    """A simulation that advances by macro steps.
+
+    Life: construct, `initialize` once, then `set_inputs`, `step`, `outputs` again and again, then `close`.
+    ``state = save()`` and ``restore(state)`` give exactly the same future, bit for bit, also in another instance of the
+    same participant; `can_restore` says whether they exist. A step that fails raises `StepError` and leaves the
+    participant so that `restore` still works.
+    """
+
+    name: str
+    variables: tuple[Variable, ...]
+    can_restore: bool = False
+
+    @abstractmethod
+    def initialize(self, time: float = 0.0, parameters: Mapping[str, float] | None = None) -> None:
+        """Build the model at a time [s] with parameters by name; raises InputError for an unknown one."""
+
+    @abstractmethod
+    def set_inputs(self, values: np.ndarray) -> None:
+        """Take every input, shape (n_inputs,), in the order of ``variables``."""
+
+    @abstractmethod
+    def step(self, time: float, size: float) -> None:
+        """Advance from ``time`` by ``size`` [s] with the inputs held; raises `StepError`."""
+
+    @abstractmethod
+    def outputs(self) -> np.ndarray:
+        """Every output now, shape (n_outputs,), in the order of ``variables``."""
+
+    def save(self) -> Any:
+        """Everything that decides the future; to be treated as opaque."""
+        raise NotImplementedError(f"{self.name}: cannot save its state")
+
+    def restore(self, state: Any) -> None:
+        """Return to a saved state, exactly."""
+        raise NotImplementedError(f"{self.name}: cannot restore a state")
+
+    def close(self) -> None:
+        """Give back processes, files and memory; no call follows."""
+
+    def names(self, causality: Causality) -> tuple[str, ...]:
+        """Names of the variables of one causality, in order."""
+        return tuple(v.name for v in self.variables if v.causality == causality)
+
+
+class StepError(RuntimeError):
+    """A step that could not be taken: participant, time, reason and mend in one line."""

@@ -1,0 +1,1 @@
+"""Participants, one a file: whatever can be stepped by the co-simulation master."""

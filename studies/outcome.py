@@ -1,0 +1,69 @@
+"""What a study leaves behind for scripts: ``result.json``, and the same numbers as a table for people."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+FOLDER = Path("build/studies")
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One number of a study beside the paper's.
+
+    Parameters
+    ----------
+    name, unit : str
+    ours : float, str or list of str
+    kind : "calibrated", "predicted" or "reference"
+        Calibrated: a free parameter was set to meet the paper's number. Reference: there is nothing to compare with.
+    paper : float or None
+    low, high : float or None
+        Interval of ours, where one is known.
+    """
+
+    name: str
+    unit: str
+    ours: float | str | list[str]
+    kind: Literal["calibrated", "predicted", "reference"]
+    paper: float | None = None
+    low: float | None = None
+    high: float | None = None
+
+
+def write_result(
+    study: str, quantities: Sequence[Quantity], seconds: float, extra: Mapping[str, Any] | None = None
+) -> Path:
+    """Write ``build/studies/<study>/result.json``, whole or not at all; returns its path."""
+    folder = FOLDER / study
+    folder.mkdir(parents=True, exist_ok=True)
+    content = {
+        "study": study,
+        "command": f"make study-{study}",
+        "seconds": round(seconds, 1),
+        "quantities": [asdict(q) for q in quantities],
+        **(extra or {}),
+    }
+    path, part = folder / "result.json", folder / "result.json.part"
+    part.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    part.replace(path)
+    return path
+
+
+def table(quantities: Sequence[Quantity]) -> str:
+    """The quantities for a terminal: name, paper, ours, interval, kind."""
+    lines = [f"  {'quantity':<32}{'paper':>12}{'ours':>14}  {'interval':<24}{'unit':<8}kind"]
+    for q in quantities:
+        ours = (
+            f"{q.ours:.6g}"
+            if isinstance(q.ours, int | float)
+            else q.ours
+            if isinstance(q.ours, str)
+            else ", ".join(q.ours)
+        )
+        paper = "" if q.paper is None else f"{q.paper:g}"
+        interval = "" if q.low is None or q.high is None else f"{q.low:.4g} to {q.high:.4g}"
+        lines.append(f"  {q.name:<32}{paper:>12}{ours:>14}  {interval:<24}{q.unit:<8}{q.kind}")
+    return "\n".join(lines)
