@@ -84,7 +84,7 @@ class Participant(ABC):
         """Return to a saved state, exactly."""
         raise NotImplementedError(f"{self.name}: cannot restore a state")
 
-    def close(self) -> None:
+    def close(self) -> None:  # noqa: B027  most participants hold nothing to give back
         """Give back processes, files and memory; no call follows."""
 
     def names(self, causality: Causality) -> tuple[str, ...]:
