@@ -1,4 +1,4 @@
-"""The command line: ``snarelab identify | diagnose | simulate``.
+"""The command line: ``snarelab identify | diagnose | simulate | tolerance``.
 
 Exit status 0: it ran, whatever the verdict. 2: unusable input, one line on standard error, nothing written.
 1: a fault of the program.
@@ -17,6 +17,7 @@ from typing import Any, NoReturn
 
 from . import __version__
 from .errors import InputError
+from .tolerance.command import add_parser as add_tolerance
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -71,6 +72,8 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("--motion", required=True, metavar="RECORDING", help="recording whose motion is followed")
     p.add_argument("--out", required=True, metavar="RECORDING", help="where to write it (.csv or .parquet)")
     p.set_defaults(run=_simulate)
+
+    add_tolerance(commands)
     return parser
 
 

@@ -1,0 +1,100 @@
+"""The boundary of success against a shape that is known in closed form."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.stats import beta, qmc
+
+from snarelab.tolerance.boundary import fit_boundary
+from snarelab.tolerance.capture import Axis, Capture, Outcome
+from snarelab.tolerance.study import Study, Success
+from snarelab.tolerance.summary import envelopes, sensitivities, success_probability, worst_reach
+
+SEMI_AXES = np.array([0.06, 0.05, 0.20])
+CENTRE = np.array([0.0, 0.01, 0.0])
+
+
+def error(point):
+    return 0.010 * np.linalg.norm((point - CENTRE) / SEMI_AXES, axis=-1) ** 2
+
+
+def outcome(values) -> Outcome:
+    e = float(error(np.array([values[n] for n in ("radial_y", "radial_z", "pitch")])))
+    return Outcome(e < 0.013, e, 2.6, 5.0, 100.0)  # farther out, the pin escapes: a jump, as in a real capture
+
+
+def make_study(tmp_path) -> Study:
+    axes = [Axis(n, u, n, 0.0, -1.0, 1.0) for n, u in (("radial_y", "m"), ("radial_z", "m"), ("pitch", "rad"))]
+    ranges = {"radial_y": (-0.12, 0.12), "radial_z": (-0.1, 0.1), "pitch": (-0.4, 0.4)}
+    capture = Capture("ellipsoid", tuple(axes), outcome)
+    return Study(tmp_path, "e", capture, 1, "adaptive", 8, 256, 0.02, ranges, {}, Success(0.010, 1e3), {}, 1)
+
+
+def margins(study, unit):
+    return np.array([study.success.margin(outcome(study.values(p))) for p in study.scaled(unit)])
+
+
+@pytest.fixture(scope="module")
+def adaptive(tmp_path_factory):
+    study = make_study(tmp_path_factory.mktemp("study"))
+    unit, widths = np.vstack([[0.5, 0.5, 0.5], qmc.Sobol(3, rng=1).random(8)[1:]]), []
+    while True:
+        boundary = fit_boundary(unit, margins(study, unit))
+        widths.append(boundary.width())
+        if max(widths[-2:]) <= study.width or len(unit) >= 256:
+            return study, boundary, len(unit)
+        unit = np.vstack([unit, boundary.next_cases(8, len(unit))])
+
+
+def test_boundary_stands_where_the_closed_form_has_it(adaptive):
+    study, boundary, _ = adaptive
+    unit = np.random.default_rng(0).random((4000, 3))
+    truth = error(study.scaled(unit)) < 0.010
+    wrong = (boundary.probability(unit) > 0.5) != truth
+    p = boundary.probability(unit)
+    sure = (p < 0.05) | (p > 0.95)
+    assert np.mean(wrong) < 0.02
+    assert np.mean(wrong[sure]) < 0.02
+
+
+def test_a_quarter_of_the_cases_that_plain_sobol_needs(adaptive):
+    study, boundary, cases = adaptive
+    unit = qmc.Sobol(3, rng=1).random_base2(10)
+    plain = fit_boundary(unit[: 4 * cases], margins(study, unit[: 4 * cases]))
+    assert 4 * cases <= len(unit)
+    assert boundary.width() <= study.width < plain.width()
+
+
+def test_envelope_and_its_interval(adaptive):
+    study, boundary, _ = adaptive
+    ends = envelopes(study, boundary)
+    # Along y at z = 0 the ellipsoid ends at 0.06 sqrt(1 - (0.01 / 0.05)^2).
+    expected = {
+        "radial_y": (-0.05879, 0.05879),
+        "radial_z": (-0.04, 0.06),
+        "pitch": (-0.19596, 0.19596),
+    }
+    for name, (down, up) in expected.items():
+        for end, truth in zip(ends[name], (down, up), strict=True):
+            assert end.value == pytest.approx(truth, abs=0.05 * (study.ranges[name][1] - study.ranges[name][0]))
+            assert abs(end.low) <= abs(end.value) <= abs(end.high)
+    assert worst_reach(study, boundary, ("radial_y", "radial_z")).value == pytest.approx(0.04, abs=0.006)
+
+
+def test_an_axis_that_does_not_matter_has_no_sensitivity(adaptive):
+    study, *_ = adaptive
+    unit = qmc.Sobol(2, rng=2).random(64)
+    boundary = fit_boundary(unit, np.clip(0.5 - 2 * np.abs(unit[:, 0] - 0.5), -1, 1))
+    two = Study(**{**vars(study), "ranges": {"radial_y": (-0.12, 0.12), "radial_z": (-0.1, 0.1)}})
+    found = sensitivities(two, boundary)
+    assert found.loc["radial_y", "total"] > 0.9
+    assert abs(float(np.asarray(found.loc["radial_z", "total"]))) < 0.05
+
+
+@pytest.mark.parametrize(("won", "total"), [(0, 60), (57, 60), (60, 60)])
+def test_clopper_pearson_against_the_beta_quantiles(won, total):
+    table = pd.DataFrame({"margin": [0.1] * won + [-1.0] * (total - won)})
+    found = success_probability(table)
+    low = beta.ppf(0.025, won, total - won + 1) if won else 0.0
+    high = beta.ppf(0.975, won + 1, total - won) if won < total else 1.0
+    assert (found.low, found.high) == pytest.approx((low, high), abs=1e-9)

@@ -1,0 +1,116 @@
+"""Study files and results folders: every mistake is one line that names it."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from snarelab.errors import InputError
+from snarelab.tolerance.capture import Axis, Capture, Outcome
+from snarelab.tolerance.results import Results
+from snarelab.tolerance.study import Success, load_study
+
+GOOD = """
+capture = "own_capture:CAPTURE"
+[ranges]
+radial_y = [-0.1, 0.1]
+[fixed]
+friction = 0.2
+[success]
+radial_error = 0.01
+strength = 800.0
+[box]
+radial_y = [-0.02, 0.02]
+cases = 10
+"""
+
+
+@pytest.fixture
+def write(tmp_path: Path, monkeypatch):
+    module = type(sys)("own_capture")
+    axes = (Axis("radial_y", "m", "", 0.0, -0.5, 0.5), Axis("friction", "1", "", 0.1, 0.0, 1.0))
+    module.CAPTURE = Capture("own", axes, lambda values: Outcome(True, 0.0, 1.0, 1.0, 1.0))  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "own_capture", module)
+
+    def save(text: str) -> Path:
+        path = tmp_path / "study.toml"
+        path.write_text(text)
+        return path
+
+    return save
+
+
+def test_a_good_study(write):
+    study = load_study(write(GOOD))
+    assert study.ranges == {"radial_y": (-0.1, 0.1)}
+    assert study.values(study.scaled(np.array([[0.75]]))[0]) == pytest.approx({"radial_y": 0.05, "friction": 0.2})
+    assert study.box_cases == 10
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("[-0.1, 0.1]", "[0.1, -0.1]", r"\[ranges\] radial_y = \[0.1, -0.1\] is empty; low must be below high"),
+        ("[-0.1, 0.1]", "[-0.9, 0.1]", "the model holds for -0.5 to 0.5 m"),
+        ("radial_y = [-0.1, 0.1]", "", r"\[ranges\] is empty; name at least one of radial_y, friction"),
+        ("radial_y = [-0.1, 0.1]", "radial_z = [-0.1, 0.1]", "unknown key 'radial_z'.*did you mean 'radial_y'"),
+        ("radial_error = 0.01", "radial_error = 0", "radial_error = 0; no case could ever meet it"),
+        ("strength = 800.0", "", r"\[success\] strength is missing"),
+        ("[fixed]", "[fixed]\nradial_y = 0.0", r"radial_y stands in \[ranges\] and in \[fixed\]; keep one"),
+        ("friction = 0.2", "friction = 2.0", "allowed is 0 to 1 1"),
+        ("[-0.02, 0.02]", "[-0.2, 0.02]", r"\[box\] radial_y = \[-0.2, 0.02\] is not within \[ranges\]"),
+        ("own_capture:CAPTURE", "no_such", "allowed are ground"),
+        ("own_capture:CAPTURE", "nowhere:CAPTURE", "cannot be loaded"),
+        ("capture =", "batch = 0\ncapture =", "batch = 0; allowed is a whole number from 1"),
+        ("capture =", "sampling = 'grid'\ncapture =", "sampling = 'grid'; allowed are adaptive, sobol"),
+        ("capture =", "seed = [\ncapture =", "not a TOML file"),
+    ],
+)
+def test_a_mistake_is_named(write, old, new, message):
+    assert old in GOOD
+    with pytest.raises(InputError, match=message) as caught:
+        load_study(write(GOOD.replace(old, new, 1)))
+    assert "\n" not in str(caught.value)
+
+
+def test_results_of_another_study_are_refused(write, tmp_path):
+    out = tmp_path / "out"
+    study = load_study(write(GOOD))
+    Results(out, study).add("space", 0, study.values(np.array([0.0])), Outcome(True, 0.0, 1.0, 1.0, 1.0))
+    assert len(Results(out, load_study(write(GOOD)))) == 1
+    with pytest.raises(InputError, match=r"another study \(seed was 1, is 2\)"):
+        Results(out, load_study(write("seed = 2\n" + GOOD)))
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "letter.txt").touch()
+    with pytest.raises(InputError, match="holds no tolerance results"):
+        Results(tmp_path / "other", study)
+
+
+def test_a_full_disk_loses_nothing(write, tmp_path, monkeypatch):
+    study = load_study(write(GOOD))
+    results = Results(tmp_path / "out", study)
+    good = Outcome(True, 0.0, 1.0, 1.0, 1.0)
+    results.add("space", 0, study.values(np.array([0.0])), good)
+
+    def full(self, path, **_):
+        Path(path).write_bytes(b"half")
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("pandas.DataFrame.to_parquet", full)
+        with pytest.raises(InputError, match="No space left on device; finished cases are safe; make room"):
+            results.add("space", 1, study.values(np.array([0.01])), good)
+    again = Results(tmp_path / "out", study)
+    assert again.done("space", 0)
+    assert not again.done("space", 1)
+    assert not list((tmp_path / "out").rglob("*.part"))
+
+
+def test_margin_says_how_far_from_failure():
+    success = Success(radial_error=0.010, strength=800.0)
+    assert success.margin(Outcome(True, 0.004, 1.0, 1.0, 100.0)) == pytest.approx(0.6)
+    assert success.margin(Outcome(True, 0.004, 1.0, 1.0, 760.0)) == pytest.approx(0.05)
+    assert success.margin(Outcome(True, 0.015, 1.0, 1.0, 100.0)) == pytest.approx(-0.5)
+    assert success.margin(Outcome(False, 0.001, 1.0, 1.0, 100.0)) == -1
+    assert success.margin(Outcome.failed("diverged")) == -1

@@ -1,0 +1,100 @@
+"""What a tolerance study varies and runs: one kind of capture, its variables, and what comes out of a case."""
+
+import importlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from ..errors import InputError
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One quantity that a study may vary.
+
+    Parameters
+    ----------
+    name, unit, meaning : str
+    nominal : float
+        The value of a study that does not vary it [unit].
+    low, high : float
+        What the model is valid for [unit].
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    nominal: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one simulated capture gave.
+
+    Parameters
+    ----------
+    enclosed : bool
+        The pin is inside the closed snare at the end.
+    radial_error : float
+        Distance of the pin's axis from the snare's at the end [m].
+    first_contact : float
+        Time of first contact [s]; NaN where there was none.
+    peak_force : float
+        Largest contact force on the pin [N].
+    peak_tension : float
+        Largest cable tension [N].
+    reason : str
+        Empty, or why the case has no result: a step that diverged, a worker that was lost.
+    """
+
+    enclosed: bool
+    radial_error: float
+    first_contact: float
+    peak_force: float
+    peak_tension: float
+    reason: str = ""
+
+    @classmethod
+    def failed(cls, reason: str) -> "Outcome":
+        """A case without a result: a recorded outcome, and no success."""
+        return cls(False, float("nan"), float("nan"), float("nan"), float("nan"), reason)
+
+
+@dataclass(frozen=True)
+class Capture:
+    """A kind of capture: its axes, and the function that runs one case in a worker process.
+
+    ``run`` takes a value for every axis by name. It must give the same outcome for the same values, and may raise
+    ArithmeticError or RuntimeError where the simulation breaks down.
+    """
+
+    name: str
+    axes: tuple[Axis, ...]
+    run: Callable[[Mapping[str, float]], Outcome]
+
+    def axis(self, name: str) -> Axis:
+        """The axis of that name; raises KeyError."""
+        return {a.name: a for a in self.axes}[name]
+
+
+BUILT_IN = {"ground": "snarelab.tolerance.ground:CAPTURE"}
+
+
+def find_capture(name: str) -> Capture:
+    """A built-in capture by its name, or one of the user's own as ``package.module:NAME``.
+
+    Raises InputError where there is none.
+    """
+    module, _, attribute = BUILT_IN.get(name, name).partition(":")
+    if not attribute:
+        raise InputError(f"capture = {name!r}; allowed are {', '.join(BUILT_IN)}, or your own as 'package.module:NAME'")
+    try:
+        found = getattr(importlib.import_module(module), attribute)
+    except (ImportError, AttributeError) as error:
+        raise InputError(f"capture = {name!r} cannot be loaded: {error}; put its folder on PYTHONPATH") from None
+    if not isinstance(found, Capture):
+        raise InputError(
+            f"capture = {name!r} is a {type(found).__name__}; it must be a snarelab.tolerance.capture.Capture"
+        )
+    return found

@@ -1,0 +1,52 @@
+"""``snarelab tolerance``: run a study of capture tolerances, or go on with one."""
+
+import argparse
+import sys
+
+
+def add_parser(commands: argparse._SubParsersAction) -> None:
+    """Add the command to the command line."""
+    p = commands.add_parser("tolerance", help="find over which misalignments a capture succeeds")
+    p.add_argument("study", metavar="STUDY.toml")
+    p.add_argument(
+        "--out", required=True, metavar="RESULTS", help="folder of the results; a run that was killed goes on"
+    )
+    p.add_argument(
+        "--scheduler", metavar="ADDRESS", help="a running Dask scheduler; without it, processes of this machine"
+    )
+    p.add_argument("--jobs", type=_positive, default=2, metavar="N", help="processes of this machine (default 2)")
+    p.set_defaults(run=run)
+
+
+def run(given: argparse.Namespace) -> None:
+    """Run it; raises InputError for unusable input."""
+    from .report import summarise
+    from .results import Results
+    from .run import run_study
+    from .study import load_study
+
+    study = load_study(given.study)
+    results = Results(given.out, study)
+    shown = sys.stderr.isatty()
+
+    def say(text: str) -> None:
+        if shown:
+            print(f"\r\x1b[2K{text[:100]}", end="", file=sys.stderr, flush=True)
+
+    try:
+        run_study(study, results, jobs=given.jobs, scheduler=given.scheduler, say=say)
+    except KeyboardInterrupt:
+        print(f"\nsnarelab: interrupted; {len(results)} cases are kept, the same command goes on", file=sys.stderr)
+        sys.exit(130)
+    say("summing up")
+    content = summarise(study, results)
+    if shown:
+        print("\r\x1b[2K", end="", file=sys.stderr)
+    print(f"{content['sentence']}\nReport: {results.folder / 'report.html'}")
+
+
+def _positive(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"{value}; allowed is a whole number from 1")
+    return value

@@ -1,0 +1,147 @@
+"""A tolerance study's results as numbers for scripts and one page for people."""
+
+from collections import Counter
+from typing import Any
+
+import numpy as np
+
+from .. import __version__
+from ..identification.report_page import figure, page, paragraph, table
+from .pictures import envelope_bars, probability_maps, sensitivity_bars, width_curve
+from .results import Results
+from .run import space_boundary
+from .study import Study
+from .summary import Interval, envelopes, sensitivities, success_probability, worst_reach
+
+RADIAL = ("radial_y", "radial_z")
+ANGLES = ("roll", "pitch", "yaw")
+
+
+def summarise(study: Study, results: Results) -> dict[str, Any]:
+    """Write ``result.json``, ``cases.parquet`` and ``report.html`` into the results folder; returns the numbers.
+
+    Keys: ``cases``, ``failed`` (cases without a result), ``width``, ``probability`` over the ranges and
+    ``probability_box``, ``envelope`` an axis, ``envelope_radial`` [m] and ``envelope_angle`` [rad] over the worst
+    direction, ``sensitivity``, ``sentence``.
+    """
+    space = results.table("space")
+    boundary = space_boundary(study, results)
+    ends, indices = envelopes(study, boundary), sensitivities(study, boundary)
+    content: dict[str, Any] = {
+        "study": study.name,
+        "capture": study.capture.name,
+        "cases": len(results),
+        "failed": len(_failures(results)),
+        "width": boundary.width(),
+        "probability": vars(success_probability(space)) if study.sampling != "adaptive" else None,
+        "envelope": {n: {"down": _plain(d), "up": _plain(u)} for n, (d, u) in ends.items()},
+        "sensitivity": indices.reset_index().to_dict("records"),
+    }
+    for key, axes in (("envelope_radial", RADIAL), ("envelope_angle", ANGLES)):
+        varied = tuple(a for a in axes if a in study.ranges)
+        if varied:
+            content[key] = _plain(worst_reach(study, boundary, varied))
+    if study.box:
+        content["probability_box"] = vars(success_probability(results.table("box")))
+    content["sentence"] = _sentence(study, content)
+    results.write_table()
+    results.write("result.json", content)
+    results.write("report.html", _page(study, results, content, ends, indices))
+    return content
+
+
+def _sentence(study: Study, content: dict[str, Any]) -> str:
+    words = [f"{study.name}: {content['cases']} captures"]
+    if "probability_box" in content:
+        p = content["probability_box"]
+        low, high = 100 * p["low"], 100 * p["high"]
+        words.append(f"inside the box {100 * p['value']:.0f} % succeed (95 % interval {low:.1f} to {high:.1f} %)")
+    for key, factor, unit, what in (
+        ("envelope_radial", 1e3, "mm", "radial error in the worst direction"),
+        ("envelope_angle", 180 / np.pi, "deg", "tilt in the worst direction"),
+    ):
+        e = content.get(key)
+        if e and e["value"] is not None:
+            words.append(f"{what} up to {factor * e['value']:.1f} {unit}")
+    worst = max(content["sensitivity"], key=lambda s: s["total"])
+    words.append(f"{worst['axis']} matters most")
+    return "; ".join(words) + "."
+
+
+def _page(study: Study, results: Results, content: dict[str, Any], ends: dict, indices: Any) -> str:
+    space = results.table("space")
+    rows = [
+        [
+            name,
+            f"{d.value:.4g}",
+            f"{d.high:.4g} to {d.low:.4g}",
+            f"{u.value:.4g}",
+            f"{u.low:.4g} to {u.high:.4g}",
+            study.capture.axis(name).unit,
+        ]
+        for name, (d, u) in ends.items()
+    ]
+    envelope = table(
+        "How far each axis may go from nominal, the others at nominal. Interval: 95 % to 5 % probability of success.",
+        ["axis", "down to", "interval", "up to", "interval", "unit"],
+        rows,
+        numeric=(1, 2, 3, 4),
+    )
+    counts, widths = _widths(study, results)
+    reasons = "; ".join(f"{n} x {why}" for why, n in Counter(_failures(results)).items()) or "none"
+    boundary = space_boundary(study, results)
+    sections = [
+        (
+            "envelope",
+            "Envelope",
+            figure(
+                envelope_bars(study, ends), "Envelope of each axis", "Bars: success; black: the interval of each end."
+            )
+            + envelope,
+        ),
+        (
+            "maps",
+            "Where captures succeed",
+            figure(
+                probability_maps(study, boundary, space),
+                "Maps of the probability of success",
+                "Blue: success is at least 95 % sure; red: failure is; grey: undecided. Dots succeeded, crosses failed "
+                "(cases of every other misalignment, so a few stand on the other side).",
+            ),
+        ),
+        (
+            "matters",
+            "What matters",
+            figure(
+                sensitivity_bars(indices),
+                "Sobol indices",
+                "How much of the variance of success each axis explains over the ranges.",
+            ),
+        ),
+        (
+            "cost",
+            "Cases",
+            figure(
+                width_curve(counts, widths, study.width),
+                "Undecided share against cases",
+                "The line is the width at which the study may stop.",
+            )
+            + paragraph(f"Cases without a result: {reasons}."),
+        ),
+    ]
+    header = f"<h1>{content['sentence']}</h1>"
+    return page(f"{study.name}: capture tolerance", header, sections, f"Written by snarelab {__version__}.")
+
+
+def _failures(results: Results) -> list[str]:
+    return [str(why) for why in results.table()["reason"] if why]
+
+
+def _widths(study: Study, results: Results) -> tuple[np.ndarray, np.ndarray]:
+    total = len(results.table("space"))
+    counts = np.unique(np.append(np.arange(study.batch, total, max(study.batch, total // 8)), total))
+    return counts, np.array([space_boundary(study, results, int(n)).width() for n in counts])
+
+
+def _plain(interval: Interval) -> dict[str, float | None]:
+    return {k: None if np.isnan(v) else v for k, v in vars(interval).items()}

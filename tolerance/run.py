@@ -1,0 +1,152 @@
+"""Run the cases of a study on Dask workers, record each as it ends, and choose the next ones from what is known."""
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+from scipy.stats import qmc
+
+from ..errors import InputError
+from .boundary import Boundary, fit_boundary
+from .capture import Capture, Outcome
+from .results import Results
+from .study import Study
+from .summary import nominal_point, to_unit
+
+Say = Callable[[str], None]
+
+
+def run_study(
+    study: Study, results: Results, *, jobs: int = 2, scheduler: str | None = None, say: Say = lambda text: None
+) -> None:
+    """Run every case that is not recorded yet.
+
+    Parameters
+    ----------
+    study, results
+    jobs : int
+        Worker processes of the local cluster.
+    scheduler : str, optional
+        Address of a running Dask scheduler to use instead.
+    say : callable
+        Takes progress lines.
+
+    Raises
+    ------
+    InputError
+        The scheduler cannot be reached, or the disk is full; finished cases are kept.
+    """
+    with _client(jobs, scheduler) as client:
+        run = _Runner(study, results, client, say)
+        if study.box:
+            run.stage("box", _box_points(study), study.box_cases)
+        if study.sampling == "latin_hypercube":
+            cube = qmc.LatinHypercube(len(study.ranges), rng=study.seed).random(study.cases)
+            run.stage("space", study.scaled(cube), study.cases)
+            return
+        adaptive = study.sampling == "adaptive"
+        count = min(study.batch, study.cases) if adaptive else study.cases
+        run.stage("space", study.scaled(_sobol(study, count)), count)
+        was = np.inf
+        while adaptive:  # replayed from the start when a killed run goes on: batches depend on complete batches only
+            boundary = space_boundary(study, results, count)
+            width = boundary.width()
+            say(f"{count} cases: {100 * width:.1f} % of the range undecided, wanted {100 * study.width:.1f} %")
+            if max(width, was) <= study.width or count >= study.cases:
+                return  # narrow twice running: one batch can flatter the process
+            was = width
+            size = min(study.batch, study.cases - count)
+            run.stage("space", study.scaled(boundary.next_cases(size, study.seed + count)), size, first=count)
+            count += size
+
+
+def space_boundary(study: Study, results: Results, cases: int | None = None) -> Boundary:
+    """The boundary from the (first ``cases``) recorded cases over the whole range."""
+    table = results.table("space").iloc[:cases]
+    low, high = np.array(list(study.ranges.values())).T
+    unit = (table[list(study.ranges)].to_numpy(float) - low) / (high - low)
+    return fit_boundary(unit, table["margin"].to_numpy(float), study.seed)
+
+
+def run_case(capture: Capture, values: Mapping[str, float]) -> Outcome:
+    """One case, in a worker: a simulation that breaks down is an outcome with its reason, not an error."""
+    try:
+        return capture.run(values)
+    except (ArithmeticError, RuntimeError, ValueError) as error:
+        return Outcome.failed(" ".join(str(error).split())[:200] or type(error).__name__)
+
+
+class _Runner:
+    def __init__(self, study: Study, results: Results, client: Any, say: Say) -> None:
+        self._study, self._results, self._client, self._say = study, results, client, say
+        self._begun, self._ran = time.monotonic(), 0
+
+    def stage(self, stage: str, points: np.ndarray, count: int, first: int = 0) -> None:
+        """Run cases ``first`` to ``first + count`` of a stage; points of the varied axes, shape (count, n_ranges)."""
+        study, results = self._study, self._results
+        for start in range(0, count, study.batch):
+            numbers = range(first + start, first + min(start + study.batch, count))
+            wanted = {n: study.values(points[n - first]) for n in numbers if not results.done(stage, n)}
+            for number, outcome in self._outcomes(wanted):
+                results.add(stage, number, wanted[number], outcome)
+                self._ran += 1
+                rate = self._ran / (time.monotonic() - self._begun)
+                self._say(f"{stage} case {number + 1}: {len(results)} recorded, {3600 * rate:.0f} an hour")
+            results.merge(stage, numbers)
+
+    def _outcomes(self, wanted: Mapping[int, Mapping[str, float]]) -> Iterator[tuple[int, Outcome]]:
+        """Outcomes as they come; a case whose worker was killed is tried again by itself, for it may be innocent."""
+        suspects = []
+        for number, outcome in self._together(wanted):
+            if outcome is None:
+                suspects.append(number)
+            else:
+                yield number, outcome
+        for number in sorted(suspects):
+            for _, outcome in self._together({number: wanted[number]}):
+                yield number, outcome or Outcome.failed("its worker was killed each time it was tried (out of memory?)")
+
+    def _together(self, wanted: Mapping[int, Mapping[str, float]]) -> Iterator[tuple[int, Outcome | None]]:
+        from dask.distributed import KilledWorker, as_completed
+
+        futures = {self._client.submit(run_case, self._study.capture, v, pure=False): n for n, v in wanted.items()}
+        for future in as_completed(list(futures)):
+            error = future.exception()
+            if error is not None and not isinstance(error, KilledWorker):
+                raise InputError(f"a worker cannot run a case: {error}; has it the same snarelab installed?")
+            yield futures[future], future.result() if error is None else None
+
+
+def _sobol(study: Study, count: int) -> np.ndarray:
+    """The nominal case, where success is likeliest, then a Sobol set: the first cases see both sides if they can."""
+    sampler = qmc.Sobol(len(study.ranges), rng=study.seed)
+    cube = sampler.random_base2((count - 1).bit_length())[:count]
+    cube[0] = to_unit(study, nominal_point(study)[None, :])[0]
+    return cube
+
+
+def _box_points(study: Study) -> np.ndarray:
+    """Cases drawn evenly from the box; ranges outside the box are drawn whole."""
+    unit = np.random.default_rng([study.seed, 1]).random((study.box_cases, len(study.ranges)))
+    low, high = np.array([study.box.get(name, limits) for name, limits in study.ranges.items()]).T
+    return low + unit * (high - low)
+
+
+@contextmanager
+def _client(jobs: int, scheduler: str | None) -> Iterator[Any]:
+    from dask.distributed import Client, LocalCluster
+
+    if scheduler is None:
+        options: dict[str, Any] = {"threads_per_worker": 1, "dashboard_address": None}
+        with LocalCluster(n_workers=jobs, **options) as cluster, Client(cluster) as client:
+            yield client
+        return
+    try:
+        client = Client(scheduler, timeout="5s")
+    except (OSError, TimeoutError, ValueError) as error:
+        reason = " ".join(str(error).split())[:120]
+        raise InputError(f"scheduler {scheduler!r} cannot be reached: {reason}; is it running there?") from None
+    with client:
+        yield client

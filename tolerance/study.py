@@ -1,0 +1,235 @@
+"""The study file (TOML): what is varied over which ranges, what success means, and how cases are chosen."""
+
+import difflib
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from .capture import Capture, Outcome, find_capture
+
+SAMPLINGS = ("adaptive", "sobol", "latin_hypercube")
+_KEYS = ("name", "capture", "seed", "sampling", "batch", "cases", "width", "ranges", "fixed", "success", "box")
+_SUCCESS = ("radial_error", "strength")
+
+
+@dataclass(frozen=True)
+class Success:
+    """What counts as a capture: pin enclosed, little radial error at the end, no cable over its strength.
+
+    Parameters
+    ----------
+    radial_error : float
+        What the rigid docking mechanism takes [m].
+    strength : float
+        Breaking load of a cable [N].
+    """
+
+    radial_error: float
+    strength: float
+
+    def margin(self, outcome: Outcome) -> float:
+        """Signed distance from failure as a share of the limit, in -1 to 1; above zero is a success.
+
+        The smallest of 1 - radial_error/limit and 1 - tension/strength; -1 where the pin is not enclosed.
+        """
+        if outcome.reason or not outcome.enclosed:
+            return -1.0
+        worst = min(1.0 - outcome.radial_error / self.radial_error, 1.0 - outcome.peak_tension / self.strength)
+        return float(np.clip(worst, -1.0, 1.0))
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study file, read and checked.
+
+    Parameters
+    ----------
+    path : Path
+    name : str
+    capture : Capture
+    seed : int
+    sampling : str
+        One of `SAMPLINGS`.
+    batch : int
+        Cases that are chosen together.
+    cases : int
+        Most cases that are run to find the boundary.
+    width : float
+        Adaptive sampling stops where at most this share of the ranges' volume is undecided, twice running.
+    ranges : mapping of str to (low, high)
+        The varied axes.
+    fixed : mapping of str to float
+        Axes held at another value than their nominal one.
+    success : Success
+    box : mapping of str to (low, high)
+        A part of the ranges whose probability of success is wanted by itself.
+    box_cases : int
+        Cases that are run for it, drawn evenly.
+    """
+
+    path: Path
+    name: str
+    capture: Capture
+    seed: int
+    sampling: str
+    batch: int
+    cases: int
+    width: float
+    ranges: Mapping[str, tuple[float, float]]
+    fixed: Mapping[str, float]
+    success: Success
+    box: Mapping[str, tuple[float, float]]
+    box_cases: int
+
+    def scaled(self, unit: np.ndarray) -> np.ndarray:
+        """Points of the unit cube, shape (n, n_ranges), as values of the varied axes."""
+        low, high = np.array(list(self.ranges.values())).T
+        return low + unit * (high - low)
+
+    def values(self, point: np.ndarray) -> dict[str, float]:
+        """Every axis' value for one point of the varied axes, shape (n_ranges,)."""
+        nominal = {a.name: a.nominal for a in self.capture.axes}
+        return {**nominal, **self.fixed, **dict(zip(self.ranges, map(float, point), strict=True))}
+
+    def identity(self) -> dict[str, Any]:
+        """All that decides the cases and their outcomes: results of another identity cannot be continued."""
+        return {
+            "capture": self.capture.name,
+            "seed": self.seed,
+            "sampling": self.sampling,
+            "batch": self.batch,
+            "ranges": {k: list(v) for k, v in self.ranges.items()},
+            "fixed": dict(self.fixed),
+            "success": vars(self.success),
+            "box": {k: list(v) for k, v in self.box.items()},
+        }
+
+
+def load_study(path: str | Path) -> Study:
+    """Read a study file; raises InputError with what is wrong, the value, what is allowed and the mend."""
+    path = Path(path)
+    try:
+        raw = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such study file") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: not a TOML file: {error}; mend that line") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); name a file that can") from None
+    _known(path, "", raw, _KEYS)
+    try:
+        capture = find_capture(_text(path, raw, "capture", ""))
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    sampling = _text(path, raw, "sampling", "adaptive")
+    if sampling not in SAMPLINGS:
+        raise InputError(f"{path}: sampling = {sampling!r}; allowed are {', '.join(SAMPLINGS)}")
+    ranges = _ranges(path, raw, "ranges", capture)
+    if not ranges:
+        raise InputError(f"{path}: [ranges] is empty; name at least one of {_names(capture)}")
+    fixed = _table(path, raw, "fixed")
+    _known(path, "fixed", fixed, [a.name for a in capture.axes])
+    for name, value in fixed.items():
+        axis, number = capture.axis(name), _number(path, f"[fixed] {name}", value)
+        if name in ranges:
+            raise InputError(f"{path}: {name} stands in [ranges] and in [fixed]; keep one")
+        if not axis.low <= number <= axis.high:
+            raise InputError(f"{path}: [fixed] {name} = {value}; allowed is {axis.low:g} to {axis.high:g} {axis.unit}")
+    box_table = dict(_table(path, raw, "box"))
+    box_cases = _count(path, box_table.pop("cases", 60), "[box] cases", 1)
+    box = _ranges(path, {"box": box_table}, "box", capture)
+    for name, (low, high) in box.items():
+        if name not in ranges or low < ranges[name][0] or high > ranges[name][1]:
+            raise InputError(f"{path}: [box] {name} = [{low:g}, {high:g}] is not within [ranges]; widen the range")
+    return Study(
+        path,
+        _text(path, raw, "name", path.stem),
+        capture,
+        _count(path, raw.get("seed", 1), "seed", 0),
+        sampling,
+        _count(path, raw.get("batch", 32), "batch", 1),
+        _count(path, raw.get("cases", 512), "cases", 1),
+        _positive(path, "width", raw.get("width", 0.05)),
+        ranges,
+        {k: float(v) for k, v in fixed.items()},
+        _success(path, raw),
+        box,
+        box_cases,
+    )
+
+
+def _success(path: Path, raw: Mapping[str, Any]) -> Success:
+    table = _table(path, raw, "success")
+    _known(path, "success", table, _SUCCESS)
+    numbers = {k: _positive(path, f"[success] {k}", table[k]) for k in _SUCCESS if k in table}
+    for key in _SUCCESS:
+        if key not in numbers:
+            raise InputError(f"{path}: [success] {key} is missing; say when a capture counts as one")
+    return Success(**numbers)
+
+
+def _ranges(path: Path, raw: Mapping[str, Any], key: str, capture: Capture) -> dict[str, tuple[float, float]]:
+    table, found = _table(path, raw, key), {}
+    _known(path, key, table, [a.name for a in capture.axes])
+    for name, value in table.items():
+        axis = capture.axis(name)
+        if not (isinstance(value, list) and len(value) == 2):
+            raise InputError(f"{path}: [{key}] {name} = {value!r}; allowed is [low, high] in {axis.unit}")
+        low, high = (_number(path, f"[{key}] {name}", v) for v in value)
+        if not low < high:
+            raise InputError(f"{path}: [{key}] {name} = [{low:g}, {high:g}] is empty; low must be below high")
+        if low < axis.low or high > axis.high:
+            allowed = f"{axis.low:g} to {axis.high:g} {axis.unit}"
+            raise InputError(f"{path}: [{key}] {name} = [{low:g}, {high:g}]; the model holds for {allowed}")
+        found[name] = (low, high)
+    return found
+
+
+def _known(path: Path, table: str, given: Mapping[str, Any], allowed: Any) -> None:
+    for key in given:
+        if key not in allowed:
+            near = difflib.get_close_matches(key, list(allowed), 1)
+            where = f"[{table}] " if table else ""
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            raise InputError(f"{path}: {where}unknown key {key!r}; allowed are {', '.join(allowed)}{hint}")
+
+
+def _table(path: Path, raw: Mapping[str, Any], key: str) -> Mapping[str, Any]:
+    table = raw.get(key, {})
+    if not isinstance(table, dict):
+        raise InputError(f"{path}: {key} = {table!r}; allowed is a table [{key}]")
+    return table
+
+
+def _text(path: Path, raw: Mapping[str, Any], key: str, default: str) -> str:
+    value = raw.get(key, default)
+    if not isinstance(value, str):
+        raise InputError(f"{path}: {key} = {value!r}; allowed is text in quotes")
+    return value
+
+
+def _number(path: Path, what: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+        raise InputError(f"{path}: {what} = {value!r}; allowed is a finite number")
+    return float(value)
+
+
+def _positive(path: Path, what: str, value: Any) -> float:
+    if not _number(path, what, value) > 0:
+        raise InputError(f"{path}: {what} = {value!r}; no case could ever meet it; give a number above zero")
+    return float(value)
+
+
+def _count(path: Path, value: Any, what: str, least: int) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or value < least:
+        raise InputError(f"{path}: {what} = {value!r}; allowed is a whole number from {least}")
+    return value
+
+
+def _names(capture: Capture) -> str:
+    return ", ".join(a.name for a in capture.axes)
