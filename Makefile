@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 SOURCES := $(shell git ls-files '*.py' '*.toml' '*.urdf' '*.csv' '*.json' 2>/dev/null | grep -v -e '^tests/' -e '^bench/')
-STUDIES := emps
+STUDIES := emps free-floating
 
 .PHONY: help demo test check bench clean $(STUDIES:%=study-%)
 

@@ -1,0 +1,126 @@
+"""A study's ``report.html``: what was found, a table of the paper's numbers and ours, figures, and a 3-D playback."""
+
+import base64
+import gzip
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+
+from ..identification.report_page import figure, page, paragraph, table
+from .outcome import FOLDER, Quantity
+
+_KINDS = {
+    "predicted": "Comes out of the model; nothing was set to meet the paper's number.",
+    "calibrated": "A free parameter of the model was set to meet the paper's number: agreement here proves nothing.",
+    "reference": "Ours alone; there is no number to compare with.",
+}
+
+_PLAYBACK = """<figure><div class="plate"><iframe id="playback-frame" title="3-D playback"
+style="display:block;width:100%;height:min(38rem,85vh);border:0"></iframe></div>
+<figcaption>CAPTION</figcaption></figure>
+<noscript><p>The playback needs JavaScript.</p></noscript>
+<script type="application/octet-stream" id="playback-data">DATA</script>
+<script>
+new IntersectionObserver(async (entries, observer) => {
+  if (!entries.some(entry => entry.isIntersecting)) return;
+  observer.disconnect();
+  const packed = Uint8Array.from(atob(document.getElementById("playback-data").textContent), c => c.charCodeAt(0));
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+  document.getElementById("playback-frame").srcdoc = await new Response(stream).text();
+}).observe(document.getElementById("playback-frame"));
+</script>
+"""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One figure: its SVG, the same in words for those who cannot see it, and a caption."""
+
+    svg: bytes
+    alternative: str
+    caption: str
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of the page between the table and the playback: a heading, paragraphs of plain text, pictures."""
+
+    heading: str
+    paragraphs: Sequence[str] = ()
+    pictures: Sequence[Picture] = ()
+
+
+def write_page(
+    study: str,
+    title: str,
+    found: str,
+    quantities: Sequence[Quantity],
+    sections: Sequence[Section] = (),
+    playback: str | None = None,
+    caption: str = "Drag to turn, scroll to come closer, right button to shift.",
+) -> Path:
+    """Write ``build/studies/<study>/report.html``, whole or not at all; returns its path.
+
+    The page needs no other file and no network. The playback is packed, and unpacked when it comes into view.
+
+    Parameters
+    ----------
+    study : str
+        Name of the folder and of the make target.
+    title : str
+        What was studied, a few words.
+    found : str
+        What was found, in one sentence.
+    quantities : sequence of Quantity
+        The table.
+    sections : sequence of Section
+    playback : str, optional
+        A page of its own, from `Playback.html`.
+    caption : str
+        What the playback shows.
+    """
+    parts = [("numbers", "The paper's numbers and ours", _numbers(quantities))]
+    for number, section in enumerate(sections, start=1):
+        content = "".join(paragraph(text) for text in section.paragraphs)
+        content += "".join(figure(p.svg, p.alternative, p.caption) for p in section.pictures)
+        parts.append((f"part{number}", section.heading, content))
+    if playback is not None:
+        parts.append(("playback", "Playback in 3-D", _frame(playback, caption)))
+    header = f'<p class="quiet">{escape(title)}</p>\n<h1>{escape(found)}</h1>\n'
+    document = page(title, header, parts, f"Written by snarelab: make study-{study}.")
+    folder = FOLDER / study
+    folder.mkdir(parents=True, exist_ok=True)
+    path, partial = folder / "report.html", folder / "report.html.part"
+    partial.write_text(document, encoding="utf-8")
+    partial.replace(path)
+    return path
+
+
+def _numbers(quantities: Sequence[Quantity]) -> str:
+    rows = [
+        [
+            escape(q.name.replace("_", " ")),
+            escape("" if q.unit == "1" else q.unit),
+            "–" if q.paper is None else f"{q.paper:g}",
+            escape(_text(q.ours)),
+            "" if q.low is None or q.high is None else f"{q.low:.4g} to {q.high:.4g}",
+            q.kind,
+        ]
+        for q in quantities
+    ]
+    used = {q.kind for q in quantities}
+    kinds = "".join(f"<dt>{kind}</dt><dd>{text}</dd>" for kind, text in _KINDS.items() if kind in used)
+    heads = ["quantity", "unit", "paper", "ours", "interval", "kind"]
+    return table("", heads, rows, numeric=(2, 3, 4)) + f'<dl class="facts">{kinds}</dl>\n'
+
+
+def _text(ours: float | str | list[str]) -> str:
+    if isinstance(ours, str):
+        return ours
+    return ", ".join(ours) if isinstance(ours, list) else f"{ours:.4g}"
+
+
+def _frame(playback: str, caption: str) -> str:
+    data = base64.b64encode(gzip.compress(playback.encode(), mtime=0)).decode("ascii")
+    return _PLAYBACK.replace("CAPTION", escape(caption)).replace("DATA", data)
