@@ -4,7 +4,7 @@ BIN := .venv/bin
 SOURCES := $(shell git ls-files '*.py' '*.toml' '*.urdf' '*.csv' '*.json' 2>/dev/null | grep -v -e '^tests/' -e '^bench/')
 STUDIES := emps free-floating
 
-.PHONY: help demo test check bench clean $(STUDIES:%=study-%)
+.PHONY: help demo test check bench fmus clean $(STUDIES:%=study-%)
 
 help:            ## what can be made
 	@sed -n -e 's/^\$$(STUDIES.*## /  make study-NAME\t/p' -e 's/^\([a-z]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
@@ -24,6 +24,11 @@ bench: .venv/installed ## ratios against named rivals, measured in one run
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/torque.py
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/friction_fit.py
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/diagnosis.py
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/floating.py
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/fmu.py
+
+fmus: .venv/installed ## the shipped FMUs and a page on each, into build/fmus
+	$(BIN)/python -m snarelab.fmu.shipped
 
 clean:           ## remove what was built; the environment too
 	rm -rf .venv build *.egg-info

@@ -1,4 +1,4 @@
-"""The command line: ``snarelab identify | diagnose | simulate | tolerance``.
+"""The command line: ``snarelab identify | diagnose | simulate | export | cosim | tolerance``.
 
 Exit status 0: it ran, whatever the verdict. 2: unusable input, one line on standard error, nothing written.
 1: a fault of the program.
@@ -16,7 +16,9 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from . import __version__
+from .cosim.command import add_parser as add_cosim
 from .errors import InputError
+from .fmu.command import add_parser as add_export
 from .tolerance.command import add_parser as add_tolerance
 
 
@@ -73,6 +75,8 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("--out", required=True, metavar="RECORDING", help="where to write it (.csv or .parquet)")
     p.set_defaults(run=_simulate)
 
+    add_export(commands)
+    add_cosim(commands)
     add_tolerance(commands)
     return parser
 

@@ -1,0 +1,115 @@
+"""``snarelab cosim SYSTEM.ssp|SYSTEM.toml --out RECORDING``."""
+
+import argparse
+import contextlib
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from .participant import StepError
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command to the subparsers of ``snarelab``."""
+    p = commands.add_parser("cosim", help="run a system of FMUs and other participants together")
+    p.add_argument("system", metavar="SYSTEM.ssp|SYSTEM.toml")
+    p.add_argument("--out", required=True, metavar="RECORDING", help="where to write the outputs (.csv or .parquet)")
+    p.add_argument("--until", type=float, metavar="SECONDS", help="end here, not where the system file says")
+    p.add_argument("--step", type=float, metavar="SECONDS", help="macro step, in place of the system file's")
+    p.add_argument("--timeout", type=float, default=60.0, metavar="SECONDS", help="longest wait for one step (60)")
+    p.add_argument(
+        "--same-process",
+        action="store_true",
+        help="run participants in this process: faster, but one that hangs or crashes takes the run's data with it",
+    )
+    p.set_defaults(run=run)
+
+
+def run(given: argparse.Namespace) -> None:
+    """Run and write; a run that fails or is interrupted keeps its recording up to the last good step.
+
+    Raises InputError with what failed, when, and what was kept; SystemExit(130) where it is interrupted.
+    """
+    from dataclasses import replace
+
+    from ..recordings import write_recording
+    from .setup import Hosting, load_setup
+
+    out = Path(given.out)
+    if out.suffix.lower() not in (".csv", ".parquet"):
+        raise InputError(f"{out}: a recording is written as .csv or .parquet, not {out.suffix!r}; change the suffix")
+    if not out.parent.is_dir():
+        raise InputError(f"{out}: its folder does not exist; make it first")
+    if not given.timeout > 0:
+        raise InputError(f"--timeout {given.timeout}: must be positive")
+    setup = load_setup(given.system, Hosting(not given.same_process, given.timeout))
+    try:
+        changes = {"step": given.step, "stop": given.until}
+        setup = replace(setup, **{key: value for key, value in changes.items() if value is not None})
+        master = _started(given.system, setup)
+        with _terminated_is_interrupted():
+            try:
+                result = master.run(setup.stop, _progress(setup.start, setup.stop))
+            except StepError as error:
+                write_recording(master.result().recording, out)
+                raise InputError(f"{given.system}: {error}; {out} holds the run up to there") from None
+            except KeyboardInterrupt:
+                write_recording(master.result().recording, out)
+                print(f"snarelab: interrupted at {master.time:.9g} s; {out} holds the run up to there", file=sys.stderr)
+                raise SystemExit(130) from None
+        write_recording(result.recording, out)
+    finally:
+        for participant in setup.system.participants.values():
+            participant.close()
+    print(f"{result.steps} steps, {result.rejected} rejected, to {master.time:.9g} s")
+    for loop in result.loops:
+        print(f"  algebraic loop solved: {loop}")
+    for name, joules in result.residual.items():
+        print(f"  bond {name}: the coupling made {joules:.3g} J of {result.exchanged[name]:.3g} J exchanged")
+    for event in result.log[:20]:
+        print(f"  {event}")
+    if len(result.log) > 20:
+        print(f"  and {len(result.log) - 20} more such steps")
+
+
+def _started(path: str, setup: Any) -> Any:
+    """The master; whatever is wrong is said with the file's name."""
+    try:
+        return setup.master()
+    except (InputError, StepError) as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+@contextlib.contextmanager
+def _terminated_is_interrupted() -> Iterator[None]:
+    """SIGTERM ends the run as Ctrl-C does: with its recording."""
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _progress(start: float, stop: float) -> Any:
+    """One line on a terminal, at most five times a second; nothing in a pipe."""
+    if not sys.stderr.isatty():
+        return None
+    shown = 0.0
+
+    def show(reached: float) -> None:
+        nonlocal shown
+        if time.monotonic() - shown > 0.2 or reached >= stop:
+            shown = time.monotonic()
+            end = "\r\x1b[2K" if reached >= stop else ""
+            share = 100 * (reached - start) / (stop - start)
+            print(f"\r\x1b[2K{reached:.3f} s of {stop:.3f} s, {share:.0f} %{end}", end="", file=sys.stderr, flush=True)
+
+    return show

@@ -1,0 +1,143 @@
+"""Compile a model's sources and pack everything into one FMU file, all or nothing."""
+
+import os
+import platform
+import shlex
+import subprocess
+import sys
+import tempfile
+import zipfile
+from importlib.resources import files
+from pathlib import Path
+
+from ..errors import InputError
+from ..models.c_library import _compiler
+from .c_files import source_files
+from .description import About, build_description, model_description
+from .equations import Equations, Variable
+from .page import icon, page
+
+# -O1: straight-line code gains next to nothing from more. No contraction: the same bits on every machine.
+FLAGS = ("-std=c99", "-O1", "-ffp-contract=off", "-shared", "-fPIC", "-fvisibility=hidden", "-w")
+
+
+def write_fmu(equations: Equations, path: str | Path, version: int, stop: float = 10.0) -> Path:
+    """Write a self-contained FMU.
+
+    Parameters
+    ----------
+    equations : Equations
+    path : path
+        Where; an FMU that is there is replaced.
+    version : 2 or 3
+        Of FMI.
+    stop : float
+        End of the default experiment [s].
+
+    Raises
+    ------
+    InputError
+        No C compiler, or a place that cannot be written.
+    """
+    sources, token = source_files(equations, version)
+    about = About(
+        name=equations.name,
+        identifier=equations.name,
+        description=equations.description,
+        token=token,
+        step=1e-3,
+        stop=stop,
+        derivatives=True,
+        interpolates=True,
+        needs_tool=False,
+        saves=True,
+        compiled_from=f"fmi{version}.c",
+    )
+    return pack(about, equations.variables, sources, {}, path, version, ("-lm",))
+
+
+def pack(
+    about: About,
+    variables: tuple[Variable, ...],
+    sources: dict[str, str],
+    resources: dict[str, str],
+    path: str | Path,
+    version: int,
+    libraries: tuple[str, ...] = (),
+) -> Path:
+    """Compile the sources and write the archive: description, binary, sources, resources, page, licence, icon."""
+    path = Path(path)
+    content = {
+        "modelDescription.xml": model_description(about, variables, version),
+        "documentation/index.html": page(about, variables, version),
+        "documentation/licenses/license.txt": _licence(),
+        **{f"sources/{name}": text for name, text in sources.items()},
+        **{f"resources/{name}": text for name, text in resources.items()},
+    }
+    if version == 3:
+        content["sources/buildDescription.xml"] = build_description(about)
+    image = "model.png" if version == 2 else "terminalsAndIcons/icon.png"
+    part = path.with_name(path.name + ".part")
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch)
+        for name, text in sources.items():
+            (folder / name).write_text(text, encoding="utf-8")
+        library = folder / f"{about.identifier}{library_suffix()}"
+        compile_library(folder / about.compiled_from, library, libraries)
+        binary = library.read_bytes()
+    try:
+        with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
+            for name, text in content.items():
+                archive.writestr(name, text)
+            archive.writestr(image, icon())
+            if version == 3:
+                archive.writestr("terminalsAndIcons/terminalsAndIcons.xml", _TERMINALS)
+            archive.writestr(f"binaries/{binary_folder(version)}/{library.name}", binary)
+        part.replace(path)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror}; choose a folder that exists") from None
+    finally:
+        part.unlink(missing_ok=True)
+    return path
+
+
+_TERMINALS = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiTerminalsAndIcons fmiVersion="3.0">
+  <GraphicalRepresentation>
+    <CoordinateSystem x1="-100" y1="-100" x2="100" y2="100"/>
+    <Icon x1="-100" y1="-100" x2="100" y2="100"/>
+  </GraphicalRepresentation>
+</fmiTerminalsAndIcons>
+"""
+
+
+def compile_library(source: Path, library: Path, libraries: tuple[str, ...]) -> None:
+    """Build a shared library from one C file; InputError where there is no compiler or it fails."""
+    try:
+        compiler, _ = _compiler(os.environ.get("SNARELAB_CC", ""), os.environ.get("PATH", ""))
+    except OSError as problem:
+        raise InputError(f"an FMU needs a C compiler: {problem}; install one, or name one in SNARELAB_CC") from None
+    command = [*compiler, *FLAGS, str(source), "-o", str(library), *libraries]
+    run = subprocess.run(command, capture_output=True, text=True, check=False)
+    if run.returncode:
+        complaint = (run.stderr.strip().splitlines() or ["no message"])[0]
+        raise InputError(f"the C compiler failed on {shlex.join(command)}: {complaint}; name another in SNARELAB_CC")
+
+
+def library_suffix() -> str:
+    """Ending of a shared library's name on this machine."""
+    return {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
+
+
+def binary_folder(version: int) -> str:
+    """Name of this platform's folder under ``binaries``."""
+    machine = {"AMD64": "x86_64", "x86_64": "x86_64", "arm64": "aarch64"}.get(platform.machine(), platform.machine())
+    system = {"win32": "windows", "darwin": "darwin"}.get(sys.platform, "linux")
+    if version == 3:
+        return f"{machine}-{system}"
+    bits = "64" if machine in ("x86_64", "aarch64") else "32"
+    return {"windows": "win", "darwin": "darwin", "linux": "linux"}[system] + bits
+
+
+def _licence() -> str:
+    return (files("snarelab.fmu") / "c" / "licence.txt").read_text(encoding="utf-8")

@@ -1,0 +1,149 @@
+"""Laws of a model's effects as expressions: parameters and hidden states go into the ledger, laws come out."""
+
+from collections.abc import Mapping
+
+import casadi as ca
+import numpy as np
+
+from ..errors import InputError
+from ..models.effect import Effect, Parameter
+from ..models.hidden_state import SIGNALS
+from ..models.model_file import Model, Placed
+from ..models.rig_kinematics import far_end
+from .equations import Ledger
+from .symbolic import root
+
+#: What model files call the inertial parameters of a link.
+_INERTIAL = ("mass", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
+
+
+class PlacedLaws:
+    """The effects of one model with symbols for their parameters.
+
+    Parameters
+    ----------
+    model : Model
+        Its file must hold a value for every parameter.
+    ledger : Ledger
+        Takes parameters under the vocabulary's names, and inputs ``temp.<joint>`` where a law reads a temperature.
+
+    Raises
+    ------
+    InputError
+        A parameter without a value.
+    """
+
+    def __init__(self, model: Model, ledger: Ledger) -> None:
+        """Register every parameter of the model's effects."""
+        self._model, self._ledger = model, ledger
+        self._parameters: dict[str, dict[str, ca.SX]] = {}
+        self._scales: dict[int, ca.SX] = {}
+        self._temperatures: dict[int, ca.SX] = {}
+        wanted = [f"{p.key}.{x.name}" for p in model.effects for x in p.effect.parameters]
+        wanted += [
+            f"speed_scale.{model.joints[self.joint_of(p)]}" for p in model.effects if "speed_scale" in _read(p.effect)
+        ]
+        missing = [key for key in wanted if key not in model.values]
+        if missing:
+            raise InputError(
+                f"{model.path}: no value for {missing[0]!r} ({len(missing)} missing); write it under [parameters], "
+                "or let 'snarelab identify --save-model' do it"
+            )
+        for p in model.effects:
+            self._parameters[p.key] = {x.name: self._parameter(p, x) for x in p.effect.parameters}
+            j = self.joint_of(p)
+            read = _read(p.effect)
+            if "speed_scale" in read and j not in self._scales:
+                name = f"speed_scale.{model.joints[j]}"
+                words = "peak speed in the recordings that the model was fitted to; sets how sharp friction turns over"
+                unit = self.unit(j, "S/s")
+                self._scales[j] = ledger.parameter(name, unit, model.values[name], words, (1e-9, np.inf))
+            if "temperature" in read and j not in self._temperatures:
+                name = f"temp.{model.joints[j]}"
+                self._temperatures[j] = ledger.input(name, "degC", f"temperature of {model.joints[j]}")
+
+    def at(self, kind: str) -> list[Placed]:
+        """Placed effects that act at joints, links or sensors, in the model's order."""
+        return [p for p in self._model.effects if p.effect.at == kind]
+
+    def joint_of(self, p: Placed) -> int:
+        """Index of the joint that an effect's place belongs to."""
+        if p.effect.at == "link":
+            return [link.name for link in self._model.tree.links].index(p.at)
+        return self._model.joints.index(p.at.removeprefix("tau.").removeprefix("q."))
+
+    def unit(self, joint: int, unit: str, channel: str = "") -> str:
+        """A unit with the joint's torque, position and channel units written out."""
+        torque, position = ("N", "m") if self._model.tree.joints[joint].kind == "prismatic" else ("N*m", "rad")
+        reading = position if channel.startswith("q.") else torque
+        return "".join({"T": torque, "S": position, "U": reading}.get(c, c) for c in unit)
+
+    def signals(self, joint: int) -> dict[str, ca.SX]:
+        """Signals that depend on the place alone: time, temperature, speed scale."""
+        found = {"time": self._ledger.time}
+        if joint in self._scales:
+            found["speed_scale"] = self._scales[joint]
+        if joint in self._temperatures:
+            found["temperature"] = self._temperatures[joint]
+        return found
+
+    def law(self, p: Placed, signals: Mapping[str, ca.SX]) -> ca.SX:
+        """What the effect gives for signals (and states by name)."""
+        return ca.vertcat(p.effect.law(signals, self._parameters[p.key]))
+
+    def rate(self, p: Placed, signals: Mapping[str, ca.SX]) -> ca.SX:
+        """Rates of the effect's hidden states."""
+        assert p.effect.rate is not None
+        return ca.vertcat(*p.effect.rate(signals, self._parameters[p.key]))
+
+    def steady(self, p: Placed, signals: Mapping[str, ca.SX]) -> ca.SX:
+        """Hidden states with zero rate at given signals."""
+        x = ca.SX.sym("x", len(p.effect.states))
+        return root(self.rate(p, {**signals, **dict(zip(p.effect.states, ca.vertsplit(x), strict=True))}), x)
+
+    def link_parameters(self) -> list[ca.SX]:
+        """Inertial parameters (10,) of every link, changed by the link effects as `identification` changes them."""
+        tree, values = self._model.tree, self._model.values
+        nominal = [ca.SX(link.phi) for link in tree.links]
+        found = [
+            ca.SX([values.get(f"inertia.{link.name}.{n}", v) for n, v in zip(_INERTIAL, link.phi, strict=True)])
+            for link in tree.links
+        ]
+        for p in self.at("link"):
+            k = self.joint_of(p)
+            tip = ca.SX(far_end(tree, k))
+            found[k] = found[k] + self.law(p, {"phi": nominal[k], "tip": tip}) - nominal[k]
+        return found
+
+    def _parameter(self, p: Placed, x: Parameter) -> ca.SX:
+        name, joint = f"{p.key}.{x.name}", self.joint_of(p)
+        scale = self._model.values.get(f"speed_scale.{self._model.joints[joint]}") if x.relative_to == "speed" else None
+        known = not x.relative_to or scale is not None
+        factor = 1.0 if scale is None else scale
+        low, high = (
+            b * factor if known or b in (0.0, -np.inf, np.inf) else s for b, s in ((x.low, -np.inf), (x.high, np.inf))
+        )
+        return self._ledger.parameter(
+            name,
+            self.unit(joint, x.unit, p.at),
+            self._model.values[name],
+            f"{x.meaning}: {p.effect.sentence}",
+            (low, high),
+        )
+
+
+def identifier(name: str) -> str:
+    """A model's name as the C identifier that FMI wants."""
+    kept = "".join(c if c.isascii() and c.isalnum() else "_" for c in name) or "model"
+    return f"_{kept}" if kept[0].isdigit() else kept
+
+
+def _read(effect: Effect) -> set[str]:
+    """Names of the joint signals that an effect's law or rate reads."""
+    if effect.at == "link":
+        return set()
+    signals = {name: ca.SX.sym(name) for name in SIGNALS["sensor"]}
+    states = {name: ca.SX.sym(name) for name in effect.states}
+    p = {x.name: ca.SX.sym(x.name) for x in effect.parameters}
+    read = ca.vertcat(effect.law(signals | states, p), *(effect.rate(signals | states, p) if effect.rate else []))
+    return {name for name, u in signals.items() if any(ca.which_depends(read, u, 1, False))}
