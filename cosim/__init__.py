@@ -1,1 +1,1 @@
-"""Co-simulation in FMI's terms. Empty until the master lands; nothing imports it."""
+"""Co-simulation in FMI's terms: `System`, `Master` and participants; see docs/cosimulation.md."""

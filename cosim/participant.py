@@ -25,7 +25,7 @@ class Variable:
         Unique in the participant; recordings' column names where one fits (``q.joint1``, ``pos.pin.x``).
     causality : "input", "output" or "parameter"
     unit : str
-        pint's spelling (``N*m``, ``rad/s``); ``1`` for a plain number.
+        pint's spelling (``N*m``, ``rad/s``); ``1`` for a plain number, empty where it is not stated.
     start : float
         Value before the first step (inputs), default (parameters), or what `Participant.outputs` gives at first.
     description : str
@@ -34,7 +34,7 @@ class Variable:
         Bounds [unit].
     depends : tuple of str or None
         For an output: the inputs that change it at once, without a step (direct feed-through). Empty: none.
-        None: unknown, which counts as all.
+        None: unknown; the master then moves each input at the start and looks.
     """
 
     name: str
@@ -53,12 +53,15 @@ class Participant(ABC):
     Life: construct, `initialize` once, then `set_inputs`, `step`, `outputs` again and again, then `close`.
     ``state = save()`` and ``restore(state)`` give exactly the same future, bit for bit, also in another instance of the
     same participant; `can_restore` says whether they exist. A step that fails raises `StepError` and leaves the
-    participant so that `restore` still works.
+    participant so that `restore` still works. `input_order` is how many derivatives of the inputs a step follows,
+    `can_vary_step` whether steps may differ in size.
     """
 
     name: str
     variables: tuple[Variable, ...]
     can_restore: bool = False
+    input_order: int = 0
+    can_vary_step: bool = True
 
     @abstractmethod
     def initialize(self, time: float = 0.0, parameters: Mapping[str, float] | None = None) -> None:
@@ -72,6 +75,20 @@ class Participant(ABC):
     def step(self, time: float, size: float) -> None:
         """Advance from ``time`` by ``size`` [s] with the inputs held; raises `StepError`."""
 
+    def set_input_derivatives(self, first: np.ndarray, second: np.ndarray) -> None:
+        """Derivatives of every input at the start of the step [unit/s, unit/s²], each shape (n_inputs,).
+
+        Called after each `set_inputs` where `input_order` is 1 (``second`` is then zero) or 2, and then only.
+        """
+        raise NotImplementedError(f"{self.name}: takes no input derivatives")
+
+    def begin(self, time: float, size: float) -> None:
+        """Start a step that `finish` waits for; the default takes the whole step here, as nothing runs beside it."""
+        self.step(time, size)
+
+    def finish(self) -> None:  # noqa: B027  nothing is left to wait for unless `begin` is overridden
+        """Wait for the step that `begin` started; raises `StepError`."""
+
     @abstractmethod
     def outputs(self) -> np.ndarray:
         """Every output now, shape (n_outputs,), in the order of ``variables``."""
@@ -83,6 +100,10 @@ class Participant(ABC):
     def restore(self, state: Any) -> None:
         """Return to a saved state, exactly."""
         raise NotImplementedError(f"{self.name}: cannot restore a state")
+
+    def compiled_calls(self) -> Any:
+        """What `snarelab.cosim.compiled_loop` needs to drive it from C; None where only Python can."""
+        return None
 
     def close(self) -> None:  # noqa: B027  most participants hold nothing to give back
         """Give back processes, files and memory; no call follows."""

@@ -1,4 +1,4 @@
-"""An arm on a floating or fixed base as a participant: wrench at the tip in, motion of tip, joints and base out.
+"""An arm on a floating or fixed base as a participant: wrenches at tip and mount in, motion of tip, joints, base out.
 
 Its steps are those of `FloatingMotion`: error-controlled, in C, and a function of the saved state alone, so that
 restore and repeat is exact.
@@ -23,10 +23,10 @@ _AXES = "xyz"
 class FloatingArmParticipant(Participant):
     """One arm, its joints under a servo or passive.
 
-    Inputs: ``force.tip.*``, ``torque.tip.*`` at the tip in the world frame, ``target.<joint>`` of the servo, and
-    ``servo``: 1, or 0 for motors off. Outputs, in the world frame: pose and twist of the tip and of the base,
-    ``q.<joint>``, ``qd.<joint>``, and the momentum of base and arm about the world's origin. Parameters: gains and
-    effects by the names of `Drive`.
+    Inputs: ``force.tip.*``, ``torque.tip.*`` at the tip in the world frame, the same of ``mount`` where the arm has
+    one, ``target.<joint>`` of the servo, and ``servo``: 1, or 0 for motors off. Outputs, in the world frame: pose and
+    twist of the tip, of the base, and of the mount; ``q.<joint>``, ``qd.<joint>``, and the momentum of base and arm
+    about the world's origin. Parameters: gains and effects by the names of `Drive`.
 
     Parameters
     ----------
@@ -39,6 +39,10 @@ class FloatingArmParticipant(Participant):
         The base's pose and the momentum of base and arm at the start, as in `FloatingMotion.start`.
     servo : bool
         Whether the motors are on until an input says otherwise.
+    impulses : bool
+        True: wrenches come in as what they have summed up to since the start, ``impulse.tip.*`` and
+        ``angular_impulse.tip.*`` [N·s, N·m·s]. A step applies, evenly, what is new at its end, so that momentum is
+        handed over whole whatever an extrapolation got wrong on the way.
     name : str
     """
 
@@ -54,13 +58,16 @@ class FloatingArmParticipant(Participant):
         quaternion: ArrayLike = (1.0, 0.0, 0.0, 0.0),
         momentum: ArrayLike = (0.0,) * 6,
         servo: bool = True,
+        impulses: bool = False,
         name: str = "arm",
     ) -> None:
         """Write and compile the equations; raises InputError as `FloatingMotion` does."""
         self.name = name
         self._motion = FloatingMotion(arm, drive)
         self._start = self._motion.start(q, None, position, quaternion, momentum)
-        self._first = np.concatenate([np.zeros(6), self._motion.joints(self._start[None])[0][0], [float(servo)]])
+        self._n_wrenches, self._impulses = self._motion.n_wrenches, impulses
+        at_first = self._motion.joints(self._start[None])[0][0]
+        self._first = np.concatenate([np.zeros(self._n_wrenches), at_first, [float(servo)]])
         joints = [(joint.name, "rad" if joint.kind == "revolute" else "m") for joint in arm.tree.joints]
         values = _shown(self._motion, self._start)
         self.variables = (
@@ -74,11 +81,12 @@ class FloatingArmParticipant(Participant):
                 )
                 for key, value in self._motion.parameters.items()
             ),
-            *_inputs(joints, self._first),
-            *_outputs(joints, values),
+            *_inputs(joints, self._first, arm.mount is not None, impulses),
+            *_outputs(joints, values, arm.mount is not None),
         )
         self._inputs, self._rates = self._first.copy(), np.zeros((2, len(self._first)))
         self._state, self._time, self._size, self._values = self._start.copy(), 0.0, 1e-3, {}
+        self._applied = np.zeros(self._n_wrenches)
 
     def initialize(self, time: float = 0.0, parameters: Mapping[str, float] | None = None) -> None:
         """Go to the start, with parameters by name; raises InputError for one that is unknown or out of bounds."""
@@ -86,7 +94,7 @@ class FloatingArmParticipant(Participant):
         self._motion.check(given)
         self._values, self._time, self._size = given, time, 1e-3
         self._state, self._inputs = self._start.copy(), self._first.copy()
-        self._rates = np.zeros((2, len(self._first)))
+        self._rates, self._applied = np.zeros((2, len(self._first))), np.zeros(self._n_wrenches)
 
     def set_inputs(self, values: np.ndarray) -> None:
         """Take wrench, targets and the servo's switch, held until told otherwise."""
@@ -105,20 +113,25 @@ class FloatingArmParticipant(Participant):
             broken = ~np.isfinite(self._inputs) | ~np.isfinite(self._rates).all(axis=0)
             what = self.names("input")[int(np.flatnonzero(broken)[0])]
             raise StepError(f"{self.name}: at {time:.9g} s the input {what} is not finite; look at where it comes from")
+        inputs, rates, n = self._inputs, self._rates, self._n_wrenches
+        reached = (inputs + rates[0] * size + 0.5 * rates[1] * size**2)[:n]
+        if self._impulses:
+            inputs, rates = inputs.copy(), rates.copy()
+            inputs[:n], rates[:, :n] = (reached - self._applied) / size, 0.0
         try:
             end = self._motion.advance(
                 time,
                 self._state,
                 time + size,
                 min(self._size, size),
-                self._inputs[:-1],
-                self._rates[:, :-1],
+                inputs[:-1],
+                rates[:, :-1],
                 servo=bool(self._inputs[-1]),
                 values=self._values,
             )
         except StepFault as fault:
             raise StepError(f"{self.name}: {fault}; shorten the macro step, or look at the wrench") from None
-        self._state, self._time, self._size = end.state, end.time, end.size
+        self._state, self._time, self._size, self._applied = end.state, end.time, end.size, reached
 
     def outputs(self) -> np.ndarray:
         """Everything shown, from the state alone."""
@@ -126,32 +139,38 @@ class FloatingArmParticipant(Participant):
 
     def save(self) -> Any:
         """State, inputs, parameters and the step to go on with."""
-        return self._state.copy(), self._time, self._size, self._inputs.copy(), self._rates.copy(), dict(self._values)
+        inputs = self._inputs.copy(), self._rates.copy(), self._applied.copy()
+        return self._state.copy(), self._time, self._size, inputs, dict(self._values)
 
     def restore(self, state: Any) -> None:
         """Back to a saved state."""
-        x, self._time, self._size, inputs, rates, values = state
-        self._state, self._inputs, self._rates, self._values = x.copy(), inputs.copy(), rates.copy(), dict(values)
+        x, self._time, self._size, inputs, values = state
+        self._state, self._values = x.copy(), dict(values)
+        self._inputs, self._rates, self._applied = (array.copy() for array in inputs)
 
 
 def _axes(stem: str, unit: str, text: str) -> list[tuple[str, str, str]]:
     return [(f"{stem}.{axis}", unit, f"{text}, {axis}") for axis in _AXES]
 
 
-def _inputs(joints: list[tuple[str, str]], start: np.ndarray) -> list[Variable]:
-    shown = [
-        *_axes("force.tip", "N", "force on the tip, world frame"),
-        *_axes("torque.tip", "N*m", "torque on the tip, world frame"),
+def _inputs(joints: list[tuple[str, str]], start: np.ndarray, mounted: bool, impulses: bool) -> list[Variable]:
+    shown = []
+    kinds = [("impulse", "N*s"), ("angular_impulse", "N*m*s")] if impulses else [("force", "N"), ("torque", "N*m")]
+    for body in ("tip", "mount") if mounted else ("tip",):
+        for kind, unit in kinds:
+            shown += _axes(f"{kind}.{body}", unit, f"{kind.replace('_', ' ')} on the {body}, world frame")
+    shown += [
         *((f"target.{name}", unit, "where the servo moves the joint") for name, unit in joints),
         ("servo", "1", "1: motors on, 0: motors off"),
     ]
     return [Variable(name, "input", unit, float(x), text) for (name, unit, text), x in zip(shown, start, strict=True)]
 
 
-def _outputs(joints: list[tuple[str, str]], start: np.ndarray) -> list[Variable]:
+def _outputs(joints: list[tuple[str, str]], start: np.ndarray, mounted: bool) -> list[Variable]:
     """In the order of `_shown`; none changes at once with an input."""
     shown = []
-    for body, text in (("tip", "the tip"), ("base", "the base's frame")):
+    bodies = [("tip", "the tip"), ("base", "the base's frame"), ("mount", "the mount")]
+    for body, text in bodies if mounted else bodies[:2]:
         shown += _axes(f"pos.{body}", "m", f"position of {text} in the world")
         shown += [(f"quat.{body}.{part}", "1", f"attitude of {text} in the world, {part}") for part in ("w", *_AXES)]
         shown += _axes(f"vel.{body}", "m/s", f"velocity of {text}'s origin, world frame")
@@ -168,4 +187,5 @@ def _shown(motion: FloatingMotion, state: np.ndarray) -> np.ndarray:
     q, qd = motion.joints(state[None])
     parts = (seen.tip_position, seen.tip_quaternion, seen.tip_twist)
     base = (seen.base_position, seen.base_quaternion, seen.base_twist)
-    return np.concatenate([part[0] for part in (*parts, *base, q, qd, seen.momentum)])
+    mount = (seen.mount_position, seen.mount_quaternion, seen.mount_twist) if motion.arm.mount else ()
+    return np.concatenate([part[0] for part in (*parts, *base, *mount, q, qd, seen.momentum)])

@@ -1,0 +1,142 @@
+"""An FMU's variables as the participant's: names, causality, units that pint reads, direct feed-through."""
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+from ..errors import InputError
+from .participant import Causality, Variable
+from .units import quantity
+
+_NUMBERS = ("Real", "Float32", "Float64", "Integer", "Enumeration", "Boolean")
+_WHOLE = re.compile(r"U?Int\d+")
+_BASE = {"kg": "kg", "m": "m", "s": "s", "A": "A", "K": "K", "mol": "mol", "cd": "cd", "rad": "rad"}
+
+
+@dataclass(frozen=True)
+class Slot:
+    """One variable of the model description, scalar or array, and the participant's scalars that it stands for."""
+
+    reference: int
+    type: str
+    names: tuple[str, ...]
+    continuous: bool
+
+
+@dataclass(frozen=True)
+class Interface:
+    """All scalars in the order of the model description, and where each is found in the FMU."""
+
+    variables: tuple[Variable, ...]
+    slots: Mapping[Causality, tuple[Slot, ...]]
+
+
+def read_interface(description: Any, path: object) -> Interface:
+    """Inputs, outputs and parameters that are numbers.
+
+    Parameters
+    ----------
+    description : fmpy.model_description.ModelDescription
+    path : object
+        The FMU, for messages.
+
+    Raises
+    ------
+    InputError
+        For an input of text, bytes or a clock, which nothing here could give.
+    """
+    units = {unit.name: unit.baseUnit for unit in description.unitDefinitions}
+    sizes = {v.valueReference: v for v in description.modelVariables}
+    groups: dict[Causality, list[Slot]] = {"input": [], "output": [], "parameter": []}
+    variables: list[Variable] = []
+    depends = _dependencies(description, sizes)
+    for v in description.modelVariables:
+        if v.causality not in groups:
+            continue
+        if v.type not in _NUMBERS and not _WHOLE.fullmatch(v.type):
+            if v.causality == "input":
+                raise InputError(
+                    f"{path}: input {v.name!r} holds {v.type}, not a number; such inputs are not supported"
+                )
+            continue
+        names = _names(v, sizes)
+        groups[v.causality].append(Slot(v.valueReference, v.type, names, v.variability in (None, "continuous")))
+        unit = v.unit or (v.declaredType.unit if v.declaredType else None) or ""
+        starts = _numbers(v.start, len(names))
+        variables += [
+            Variable(
+                name,
+                v.causality,
+                pint_unit(unit, units.get(unit)),
+                start,
+                v.description or "",
+                _number(v.min, -math.inf),
+                _number(v.max, math.inf),
+                depends.get(v.name) if v.causality == "output" else (),
+            )
+            for name, start in zip(names, starts, strict=True)
+        ]
+    return Interface(tuple(variables), {causality: tuple(slots) for causality, slots in groups.items()})
+
+
+def pint_unit(name: str, base: Any = None) -> str:
+    """The unit in pint's spelling.
+
+    FMI's names are free text (``N.m``, ``m/s2``); what counts are the exponents of its base unit, where they are given.
+    A name that pint reads as the same is kept, else the base unit is written out. A name that neither explains stays.
+    """
+    spelled = re.sub(r"([A-Za-z])(-?\d+)", r"\1**\2", name.replace("·", "*").replace(".", "*").replace(" ", "*"))
+    try:
+        read = quantity(spelled) if spelled else None
+    except InputError:
+        read = None
+    if base is None:
+        return spelled if read is not None else name
+    powers = "*".join(f"{unit}**{getattr(base, key)}" for key, unit in _BASE.items() if getattr(base, key)) or "1"
+    meant = quantity(powers if base.factor == 1 else f"{base.factor!r} * {powers}")
+    if read is not None and read.dimensionality == meant.dimensionality and _zero(read) == base.offset:
+        ratio = 1.0 if base.offset else float((read / meant).to("dimensionless").magnitude)
+        if math.isclose(ratio, 1.0, rel_tol=1e-6):
+            return spelled
+    return name if base.offset else powers if base.factor == 1 else f"{base.factor!r} * {powers}"
+
+
+def _zero(read: Any) -> float:
+    """What the unit's zero is in its root unit: 273.15 for degrees Celsius."""
+    return round(float(type(read)(0.0, read.units).to_root_units().magnitude), 9)
+
+
+def _names(v: Any, sizes: Mapping[int, Any]) -> tuple[str, ...]:
+    """A scalar's name, or one name an element, counted from 1 in the order of the values."""
+    lengths = [int(d.start if d.start is not None else sizes[d.valueReference].start) for d in v.dimensions]
+    if not lengths:
+        return (v.name,)
+    return tuple(f"{v.name}[{','.join(map(str, at))}]" for at in product(*(range(1, n + 1) for n in lengths)))
+
+
+def _dependencies(description: Any, sizes: Mapping[int, Any]) -> dict[str, tuple[str, ...] | None]:
+    """Inputs that each output depends on; None where the model description does not say."""
+    found: dict[str, tuple[str, ...] | None] = {}
+    for unknown in description.outputs:
+        if unknown.dependencies is None:
+            found[unknown.variable.name] = None
+        else:
+            known = [v for v in unknown.dependencies if v.causality == "input"]
+            found[unknown.variable.name] = tuple(name for v in known for name in _names(v, sizes))
+    return found
+
+
+def _numbers(text: Any, count: int) -> list[float]:
+    values = str(text).split() if text is not None else ["0"]
+    return [_number(value, 0.0) for value in (values if len(values) == count else values[:1] * count)]
+
+
+def _number(text: Any, default: float) -> float:
+    if text is None:
+        return default
+    if str(text) in ("true", "false"):
+        return float(str(text) == "true")
+    return float(text)

@@ -1,0 +1,118 @@
+"""The snare with impulses at its ports, so that a coupling hands momentum over whole.
+
+A force that is read at communication points says little about what passed between them: a contact rings a thousand
+times a second. What passed is known exactly, it is what the snare's own bodies gained: with P, L the momentum of cables
+and floating target about the world's origin, x the effector's origin, and I, T the impulse and its moment about x,
+
+    I = −ΔP − I_pin,      T = −ΔL − x I − x_pin × I_pin − T_pin,      x I standing for x × I,
+
+over each macro step, added up since the start. (I_pin, T_pin) on a pin that is moved from outside is the sum of the
+contact forces at the model's own steps. Momentum that leaves here thus arrives there, to rounding, whatever the step.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ...models.snare import SnareModel
+from ...models.snare_energy import KINETIC, OVERLAP, STRAIN
+from ...models.snare_momentum import left_over, momentum
+from ...models.snare_recorder import _TIME
+from ..participant import StepError, Variable
+from .snare import SnareParticipant
+
+_ENERGIES = ("ring_work", "strain", "kinetic", "overlap", "target", "damped", "friction")
+
+
+class ImpulseSnareParticipant(SnareParticipant):
+    """As `SnareParticipant`, with more outputs.
+
+    ``impulse.effector.*`` and ``angular_impulse.effector.*`` [N·s, N·m·s] are what the snare has given the end effector
+    since the start, the moment about its origin; the same of ``pin``, about its foot, where it is moved from outside.
+    ``momentum.linear.*`` and ``momentum.angular.*`` are those of cables and floating target, about the world's origin,
+    and ``energy.*`` [J] is what `SnareHistory` calls energies.
+    """
+
+    def __init__(self, *arguments: Any, **keywords: Any) -> None:
+        """Take what `SnareParticipant` takes."""
+        super().__init__(*arguments, **keywords)
+        bodies = ("effector", "pin") if self._moves_target else ("effector",)
+        shown = [
+            (f"{kind}.{body}.{axis}", unit, f"on the {body} since the start, world frame")
+            for body in bodies
+            for kind, unit in (("impulse", "N*s"), ("angular_impulse", "N*m*s"))
+            for axis in "xyz"
+        ]
+        for kind, unit in (("linear", "N*s"), ("angular", "N*m*s")):
+            shown += [(f"momentum.{kind}.{axis}", unit, "of cables and floating target") for axis in "xyz"]
+        shown += [(f"energy.{name}", "J", "of the snare, since the start where it is lost") for name in _ENERGIES]
+        self.variables = (*self.variables, *(Variable(name, "output", unit, 0.0, text) for name, unit, text in shown))
+        self._passed, self._pin = np.zeros(6), np.zeros(6)
+
+    def initialize(self, time: float = 0.0, parameters: Mapping[str, float] | None = None) -> None:
+        """As `SnareParticipant.initialize`."""
+        super().initialize(time, parameters)
+        self._passed, self._pin = np.zeros(6), np.zeros(6)
+
+    def step(self, time: float, size: float) -> None:
+        """Step, and add up what passed."""
+        model, pin = self._built(), self._pin
+        before, foot = momentum(model.assembly), model.assembly.pin[0].copy()
+        effector = model.effector_pose().position
+        try:
+            super().step(time, size)
+        except StepError:
+            self._pin = pin
+            raise
+        effector = 0.5 * (effector + model.effector_pose().position) - model.origin
+        foot = 0.5 * (foot + model.assembly.pin[0])
+        self._passed = self._passed + left_over(momentum(model.assembly) - before, effector, foot, self._pin - pin)
+
+    def _built(self) -> SnareModel:
+        """The model; where the pin is moved from outside, its wrench is summed up at each of the model's own steps."""
+        if self._model is None and self._moves_target:
+            model = super()._built()
+            recorder = model._recorder
+
+            def after_step(_system: Any, now: float) -> bool:
+                since, before = now - recorder._totals[_TIME], recorder.pin_wrench
+                recorder.after_step(now)
+                if since > 0:
+                    self._pin = self._pin + 0.5 * since * (before + recorder.pin_wrench)
+                return True
+
+            model.assembly.system.SetPostStepUserFunction(after_step)
+        return super()._built()
+
+    def outputs(self) -> np.ndarray:
+        """What `SnareParticipant` shows, then impulses, momentum and energies."""
+        model = self._built()
+        passed = [self._passed, self._pin] if self._moves_target else [self._passed]
+        total = momentum(model.assembly)
+        total[3:] += np.cross(model.origin, total[:3])
+        return np.concatenate([super().outputs(), *passed, total, _energies(model)])
+
+    def cables(self) -> np.ndarray:
+        """Where the cables' nodes are now, in the world [m]; (3, n_nodes, 3)."""
+        model = self._built()
+        a = model.assembly
+        moved = a.system.systemData.GetODE2Coordinates()[: a.n_cable_coordinates].reshape(a.nodes.shape)
+        return (moved + a.nodes)[:, :, 0] + model.origin
+
+    def save(self) -> Any:
+        """The model's state, the inputs, and the sums."""
+        return super().save(), self._passed, self._pin
+
+    def restore(self, state: Any) -> None:
+        """Back to a saved state, bit for bit."""
+        own, self._passed, self._pin = state
+        super().restore(own)
+
+
+def _energies(model: Any) -> np.ndarray:
+    recorder = model._recorder
+    totals, now = recorder._totals, recorder._energies
+    return np.array(
+        [totals[3], now[STRAIN], now[KINETIC], now[OVERLAP], recorder._target_energy(), totals[4], totals[5]]
+    )

@@ -1,0 +1,212 @@
+"""One pass over all participants: each is given its inputs for the macro step and takes it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .feedthrough import FeedThrough
+from .hold import Hold, combine, end_weights, weights
+from .participant import Participant, StepError
+from .system import System
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a compiled loop of equal steps needs beyond the layout.
+
+    Parameters
+    ----------
+    visits : tuple of int
+        Participants to be brought up to date after a step, in order.
+    follow : tuple of int
+        Participants with direct feed-through.
+    before : pair of tuples of float
+        The hold's weights where the newest value is that of the step's start: for what is held, and for the step's end.
+    after : tuple of float
+        The weights for what is held where the newest value is that of the step's end.
+    sequential : bool
+    """
+
+    visits: tuple[int, ...]
+    follow: tuple[int, ...]
+    before: tuple[tuple[float, ...], tuple[float, ...]]
+    after: tuple[float, ...]
+    sequential: bool
+
+
+class Sweep:
+    """A macro step, side by side or one after another.
+
+    Parameters
+    ----------
+    system : System
+    hold : Hold
+    feed : FeedThrough
+    sequential : bool
+        Gauss-Seidel; else Jacobi.
+    """
+
+    def __init__(self, system: System, hold: Hold, feed: FeedThrough, sequential: bool) -> None:
+        """Lay out."""
+        self._system, self._layout, self._hold, self._feed = system, system.layout, hold, feed
+        self._participants = list(system.participants.values())
+        self._sequential = sequential
+        self._orders = tuple(0 if hold.middle else min(p.input_order, hold.degree) for p in self._participants)
+        self._follow = [
+            i
+            for i, p in enumerate(self._participants)
+            if any(v.depends != () for v in p.variables if v.causality == "output")
+        ]
+        # What runs beside the rest starts before what holds everything up.
+        self._starts = sorted(
+            range(len(self._participants)), key=lambda i: type(self._participants[i]).begin is Participant.begin
+        )
+        layout = self._layout
+        self.mean_inputs = np.zeros(len(layout.inputs))
+        self._reading = [
+            (
+                layout.source[at],
+                layout.factor[at],
+                layout.offset[at],
+                self.mean_inputs[at],
+                np.zeros(at.stop - at.start),
+            )
+            for at in layout.input_slices
+        ]
+
+    def nodes(self, size: float, sizes: list[float], ahead: bool = False) -> tuple[float, ...]:
+        """Times of the known values in steps from the start of this one, newest first."""
+        times = [1.0, 0.0] if ahead else [0.0]
+        for past in sizes:
+            times.append(times[-1] - past / size)
+        return tuple(times[: self._hold.degree + 1])
+
+    def __call__(
+        self, time: float, size: float, past: list[np.ndarray], sizes: list[float], ahead: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Step everyone; outputs (n_outputs,) at the end.
+
+        Parameters
+        ----------
+        time, size : float
+            Start and length of the macro step [s].
+        past : list of arrays (n_outputs,)
+            Outputs at the start and before, newest first.
+        sizes : list of float
+            Steps between them [s].
+        ahead : array (n_outputs,), optional
+            Outputs assumed at the end.
+
+        Raises
+        ------
+        StepError
+            From the participant that failed, or for an output that is not a finite number.
+        """
+        if self._sequential:
+            outputs = self._one_by_one(time, size, past, sizes, ahead)
+        else:
+            outputs = self._side_by_side(time, size, past, sizes, ahead)
+        self._feed.settle(time + size, outputs)
+        self.check(time + size, outputs)
+        return outputs
+
+    def plan(self, size: float) -> Plan | None:
+        """What a compiled loop needs; None where it could not do the same."""
+        if any(self._orders) or self._feed.loops:
+            return None
+        back, ahead = (tuple(start - k for k in range(self._hold.degree + 1)) for start in (0.0, 1.0))
+        before = weights(self._hold, back, size, 0)[0], end_weights(back)
+        visits = tuple(visit for visit in self._feed.order if isinstance(visit, int))
+        return Plan(visits, tuple(self._follow), before, weights(self._hold, ahead, size, 0)[0], self._sequential)
+
+    def failure(self, i: int, time: float, error: Exception) -> StepError:
+        """What participant ``i`` did not manage in the step from a time [s]."""
+        return self._feed.failure(i, error, f"the step from {time:.9g} s")
+
+    def check(self, time: float, outputs: np.ndarray) -> None:
+        """Refuse outputs that are not finite, by name."""
+        if not np.isfinite(np.add.reduce(outputs)) and not np.isfinite(outputs).all():
+            bad = int(np.flatnonzero(~np.isfinite(outputs))[0])
+            raise StepError(f"{self._layout.outputs[bad]} is {outputs[bad]} at {time:.9g} s; take smaller steps")
+
+    def _side_by_side(
+        self, time: float, size: float, past: list[np.ndarray], sizes: list[float], ahead: np.ndarray | None
+    ) -> np.ndarray:
+        values = past if ahead is None else [ahead, *past]
+        nodes = self.nodes(size, sizes, ahead is not None)
+        held = {
+            order: [combine(row, values) for row in weights(self._hold, nodes, size, order)]
+            for order in set(self._orders)
+        }
+        failures: list[Exception] = []
+        begun = []
+        for i in self._starts:
+            try:
+                self._give(i, held[self._orders[i]], size)
+                self._participants[i].begin(time, size)
+                begun.append(i)
+            except Exception as error:  # the others must come to rest before anything else is done
+                failures.append(self.failure(i, time, error))
+                break
+        for i in begun:
+            try:
+                self._participants[i].finish()
+            except Exception as error:
+                failures.append(self.failure(i, time, error))
+        if failures:
+            raise failures[0]
+        outputs = np.empty(len(self._layout.outputs))
+        for i, participant in enumerate(self._participants):
+            try:
+                outputs[self._layout.output_slices[i]] = participant.outputs()
+            except Exception as error:
+                raise self.failure(i, time, error) from error
+        return outputs
+
+    def _one_by_one(
+        self, time: float, size: float, past: list[np.ndarray], sizes: list[float], ahead: np.ndarray | None
+    ) -> np.ndarray:
+        before = self.nodes(size, sizes)
+        after = self.nodes(size, sizes, ahead=True)
+        outputs = combine(end_weights(before), past) if ahead is None else ahead.copy()
+        orders = set(self._orders)
+        rows_after = {order: weights(self._hold, after, size, order) for order in orders}
+        if ahead is None:
+            held = {o: [combine(row, past) for row in weights(self._hold, before, size, o)] for o in orders}
+        else:
+            held = {o: [combine(row, [ahead, *past]) for row in rows_after[o]] for o in orders}
+        for i, participant in enumerate(self._participants):
+            where = self._layout.output_slices[i]
+            try:
+                self._give(i, held[self._orders[i]], size)
+                participant.begin(time, size)
+                participant.finish()
+                if i in self._follow:
+                    self._feed.ask(i, outputs)
+                else:
+                    outputs[where] = participant.outputs()
+            except Exception as error:
+                raise self.failure(i, time, error) from error
+            known = [outputs[where], *(value[where] for value in past)]
+            for order in orders:
+                rows = rows_after[order]
+                for row, array in zip(rows, held[order], strict=False):
+                    array[where] = combine(row, known)
+                for row in rows[len(held[order]) :]:  # the first steps know a slope only once someone has gone ahead
+                    held[order].append(np.zeros(len(outputs)))
+                    held[order][-1][where] = combine(row, known)
+        return outputs
+
+    def _give(self, i: int, held: list[np.ndarray], size: float) -> None:
+        """Set a participant's inputs, and their derivatives where it takes them."""
+        source, factor, offset, mean, still = self._reading[i]
+        values = factor * held[0][source] + offset
+        participant, order = self._participants[i], self._orders[i]
+        participant.set_inputs(values)
+        mean[:] = values
+        if participant.input_order:
+            slopes = [factor * row[source] for row in held[1 : order + 1]]
+            first, second = (*slopes, still, still)[:2]
+            participant.set_input_derivatives(first, second)
+            if slopes:
+                mean += first * (size / 2) + second * (size * size / 6)
