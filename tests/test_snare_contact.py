@@ -1,0 +1,177 @@
+"""Contact: distance to the pin, the law of the force, balance, and the Jacobian against finite differences."""
+
+# pyright: reportArgumentType=false, reportAttributeAccessIssue=false
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize_scalar
+from scipy.spatial.transform import Rotation
+
+from snarelab.models.snare_contact import find_contacts
+from snarelab.models.snare_crossing import find_crossings
+from snarelab.models.snare_cubic import combine, first_weights, weights
+from snarelab.models.snare_forces import system_forces, system_jacobian
+from snarelab.models.snare_law import force, give, hertz_overlap, law_constants, powers
+from snarelab.models.snare_parameters import SnareParameters
+from snarelab.models.snare_pin import distance, pin_cylinders, surface
+from snarelab.models.snare_settled import settled
+
+P = SnareParameters()
+N = 10
+SIZE = P.cable_length / N
+
+
+def test_distance_to_a_cylinder_is_that_to_its_nearest_point():
+    """Against the nearest of a dense cloud of points on the surface."""
+    cylinder = np.array([0.01, -0.03, 0.0])
+    angle = np.linspace(0, 2 * np.pi, 300, endpoint=False)
+    around = np.column_stack([np.zeros_like(angle), np.cos(angle), np.sin(angle)])
+    side = [[x, 0, 0] + 0.01 * around for x in np.linspace(-0.03, 0, 200)]
+    ends = [[x, 0, 0] + r * around for x in (-0.03, 0.0) for r in np.linspace(0, 0.01, 100)]
+    cloud = np.concatenate(side + ends)
+    rng = np.random.default_rng(1)
+    for point in rng.uniform([-0.05, -0.03, -0.03], [0.02, 0.03, 0.03], (60, 3)):
+        found = distance(cylinder, tuple(point))
+        if found > 1e-3:
+            assert found == pytest.approx(np.min(np.linalg.norm(cloud - point, axis=1)), abs=3e-5)
+            gap, normal, *_ = surface(cylinder, tuple(point))
+            assert gap == found
+            # the normal is the gradient of the distance
+            gradient = [
+                (distance(cylinder, tuple(point + step)) - distance(cylinder, tuple(point - step))) / 2e-7
+                for step in 1e-7 * np.eye(3)
+            ]
+            assert np.allclose(normal, gradient, atol=1e-6)
+
+
+def touching_state(n_pin, overlap=1.0e-4, turn=(0.0, 0.3, 0.2), seed=0):
+    """Cables at rest, and a pin that overlaps the first; all moving at random."""
+    rng = np.random.default_rng(seed)
+    nodes = settled(P, N)
+    rotation = Rotation.from_rotvec(turn)
+    axis = rotation.as_matrix()[:, 0]
+    tangent = nodes[0, 5, 1] / np.linalg.norm(nodes[0, 5, 1])
+    out = np.cross(axis, tangent)
+    foot = nodes[0, 5, 0] + 0.003 * tangent + out / np.linalg.norm(out) * (P.pin_radius + P.cable_radius - overlap)
+    foot = foot + 0.12 * axis
+    quaternion = np.roll(rotation.as_quat(), 1)
+    reference = np.concatenate([nodes.ravel(), np.concatenate([foot, quaternion])[:n_pin]])
+    pin, euler = np.zeros((6, 3)), np.zeros((2, 4))
+    pin[0], pin[3:], euler[0] = foot, rotation.as_matrix(), quaternion
+    pin[1:3] = rng.normal(size=(2, 3)) * 0.05
+    directions = rng.normal(size=(6, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    fixed = (reference, N, SIZE, n_pin, pin_cylinders(P), law_constants(P), P.cable_radius, 0.1)
+    moving = (pin, euler, np.zeros((24, 4)), np.zeros((12, 5)), directions)
+    return np.zeros_like(reference), rng.normal(size=reference.shape) * 0.05, fixed, moving
+
+
+def differences(q, v, fixed, moving, of):
+    step = 1e-8 if of == "q" else 1e-6
+    columns = []
+    for change in step * np.eye(len(q)):
+        a = (change, 0) if of == "q" else (0, change)
+        up = system_forces(q + a[0], v + a[1], fixed, moving)
+        columns.append((up - system_forces(q - a[0], v - a[1], fixed, moving)) / (2 * step))
+    return -np.array(columns).T
+
+
+def dense(triplets, n):
+    matrix = np.zeros((n, n))
+    np.add.at(matrix, (triplets[:, 0].astype(int), triplets[:, 1].astype(int)), triplets[:, 2])
+    return matrix
+
+
+@pytest.mark.parametrize("n_pin", [0, 3, 7])
+def test_jacobian_is_the_derivative_of_the_forces(n_pin):
+    q, v, fixed, moving = touching_state(n_pin)
+    assert (
+        find_contacts(fixed[0][: 66 * 3].reshape(-1, 3), N, SIZE, fixed[4], moving[0], P.cable_radius, moving[2]) == 1
+    )
+    project = np.eye(len(q))
+    if n_pin == 7:  # Euler parameters stay of unit length: only changes across them mean something
+        project[-4:, -4:] -= np.outer(moving[1][0], moving[1][0])
+    for of, factors in (("q", (1.0, 0.0)), ("v", (0.0, 1.0))):
+        exact = dense(system_jacobian(q, v, fixed, moving, *factors), len(q)) @ project
+        found = differences(q, v, fixed, moving, of) @ project
+        assert np.max(np.abs(exact - found)) < 1e-6 * np.max(np.abs(found))  # rounding of differences
+
+
+def crossing_state():
+    """The first two cables moved so that they cross with a small overlap; no pin near."""
+    q, v, fixed, moving = touching_state(0)
+    nodes = fixed[0].reshape(3, N + 1, 2, 3).copy()
+    one, two = nodes[0, 4:6].reshape(4, 3), nodes[1, 6:8].reshape(4, 3)
+    across = np.cross(combine(first_weights(0.4, SIZE), one), combine(first_weights(0.7, SIZE), two))
+    apart = across / np.linalg.norm(across) * (2 * P.cable_radius - 1e-4)
+    here = np.array(combine(weights(0.4, SIZE), one)) - apart
+    nodes[1, :, 0] += here - combine(weights(0.7, SIZE), two)
+    moving[0][0] = [1.0, 1.0, 1.0]
+    return q, v, (nodes.ravel(), *fixed[1:]), moving
+
+
+def test_jacobian_of_crossing_cables():
+    q, v, fixed, moving = crossing_state()
+    assert find_crossings(fixed[0].reshape(-1, 3), N, SIZE, P.cable_radius, moving[3]) == 1
+    for of, factors in (("q", (1.0, 0.0)), ("v", (0.0, 1.0))):
+        exact = dense(system_jacobian(q, v, fixed, moving, *factors), len(q))
+        found = differences(q, v, fixed, moving, of)
+        assert np.max(np.abs(exact - found)) < 1e-6 * np.max(np.abs(found))
+
+
+def test_contact_balances_force_and_moment():
+    """On cables (as forces on r and couples through r') and pin together: nothing is left over."""
+    q, v, fixed, moving = touching_state(7)
+    fixed = (*fixed[:-1], 0.0)
+    forces = system_forces(q, v, fixed, moving)
+    on_nodes, on_pin = forces[:198].reshape(-1, 3), forces[198:]
+    coordinates = fixed[0][:198].reshape(-1, 3)
+    assert np.abs(on_nodes[0::2].sum(axis=0) + on_pin[:3]).max() < 1e-10 * np.abs(on_pin).max()
+    e = moving[1][0]
+    turn = 2 * np.array([[-e[1], e[0], -e[3], e[2]], [-e[2], e[3], e[0], -e[1]], [-e[3], -e[2], e[1], e[0]]])
+    moment = turn @ on_pin[3:] / 4 + np.cross(fixed[0][198:201], on_pin[:3])  # G Gᵀ = 4
+    moment += np.cross(coordinates, on_nodes).sum(axis=0)
+    assert np.abs(moment).max() < 1e-10 * np.abs(on_pin).max()
+
+
+def test_the_contact_is_where_the_cable_is_nearest():
+    _, _, fixed, moving = touching_state(0)
+    positions = fixed[0].reshape(-1, 3)
+    find_contacts(positions, N, SIZE, fixed[4], moving[0], P.cable_radius, moving[2])
+    first, part, fraction, gap = moving[2][0]
+    element = positions[int(first) : int(first) + 4]
+
+    def from_axis(x):
+        point = np.array(combine(weights(x, SIZE), element)) - moving[0][0]
+        axis = moving[0][3:, 0]
+        return np.linalg.norm(point - (point @ axis) * axis)
+
+    best = minimize_scalar(from_axis, bounds=(0, 1), method="bounded", options={"xatol": 1e-12})
+    assert part == 0
+    assert fraction == pytest.approx(best.x, abs=1e-6)
+    assert gap == pytest.approx(best.fun - P.pin_radius - P.cable_radius, abs=1e-14)
+
+
+def test_law_is_hertz_with_coulomb_and_never_pulls():
+    law = law_constants(P)
+    n = (0.0, 0.0, 1.0)
+    still = force(law, -3e-6, 0.0, n, (0.0, 0.0, 0.0))
+    assert still == pytest.approx((0, 0, P.hertz_stiffness * 3e-6**1.5))
+    sliding = force(law, -3e-6, 0.0, n, (0.05, 0.0, 0.0))
+    assert sliding[0] == pytest.approx(-P.friction * still[2], rel=1e-4)  # slip velocity is 0.4 % of the slip
+    assert force(law, -3e-6, 0.0, n, (0.0, 0.0, 5.0)) == pytest.approx((0, 0, 0))  # leaving fast
+    assert force(law, -3e-6, 0.0, n, (0.0, 0.0, -0.1))[2] == pytest.approx(1.1 * still[2])
+    stored, damped, rubbed = powers(law, -3e-6, 0.0, n, (0.05, 0.0, -0.1))
+    assert stored == pytest.approx(0.4 * P.hertz_stiffness * 3e-6**2.5)
+    assert damped == pytest.approx(0.1 * still[2] * 0.1)
+    assert rubbed == pytest.approx(P.friction * 1.1 * still[2] * 0.05, rel=1e-4)
+
+
+def test_overlap_shares_out_between_hertz_and_the_element():
+    law = law_constants(P)
+    soft = give(law, 0.5, SIZE)
+    # a beam clamped at both ends under a load in its middle: l³/(192 EI)
+    assert soft == pytest.approx(SIZE**3 / (192 * P.bending_stiffness))
+    x = hertz_overlap(law, -5e-6, soft)
+    assert x + soft * P.hertz_stiffness * x**1.5 == pytest.approx(5e-6, rel=1e-13)
+    assert give(law, 0.0, SIZE) == 0
