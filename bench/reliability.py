@@ -1,8 +1,9 @@
 """How often a named effect is right: a bank of simulated arms, each with one concealed effect or none.
 
-``python bench/reliability.py --cases 119 --seed 1 --workers 2``. Every case is a random arm that MuJoCo moves, with
-LuGre friction, disturbances and noise; the concealed effect is sized to 0.5 to 4 times the disturbance, in torque that
-the known friction cannot pose as. Cases done are lines of ``build/reliability/seed<S>.jsonl`` and are not done again.
+``python bench/reliability.py --cases 119 --seed 1 --workers 2``, or ``--only 11 28`` for single cases. Every case is a
+random arm that MuJoCo moves, with LuGre friction, disturbances and noise; the concealed effect is sized to 0.5 to 4
+times the disturbance, in torque that the known friction cannot pose as. Cases done are lines of
+``build/reliability/seed<S>.jsonl`` and are not done again.
 The result is ``identification/reliability.json``: the frequency of a right name and place against the margin, which
 is how often the effect beat its rivals in a bootstrap. It never falls with the margin (isotonic regression: Barlow,
 Bartholomew, Bremner and Brunk 1972), and every group of names counts one right and one wrong name more than it saw, so
@@ -23,7 +24,6 @@ from datetime import date
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
-from unittest.mock import patch
 
 os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
@@ -39,7 +39,6 @@ from bench.lugre import LuGre
 from bench.motion import fourier_motion, point_to_point_motion
 from bench.mujoco_plant import Plant, simulate, write_csv
 from bench.parts import Disturbance
-from snarelab.identification import answer
 from snarelab.identification.diagnose import diagnose
 from snarelab.models.model_file import load_model
 
@@ -69,7 +68,7 @@ def run_case(seed: int, number: int, seconds: float = TRAIN, holdout: float = HO
             {
                 "name": e.name,
                 "at": e.at,
-                "margin": e.probability,
+                "margin": e.margin,
                 "right": any(a in true for a in answers),
                 "right_name": any(a[0] == t[0] for a in answers for t in true),
                 "right_place": any(_joint(a[1]) == _joint(t[1]) for a in answers for t in true),
@@ -100,9 +99,7 @@ def _diagnosed(folder: Path, kind: str, rng: np.random.Generator, seconds: float
     (folder / "arm.toml").write_text(f'name = "arm"\nsystem = "arm"\nurdf = "arm.urdf"\neffects = [{listed}]\n')
     write_csv(folder / "train.csv", simulate(plant, motions[0], seconds, RATE, rng))
     write_csv(folder / "hold.csv", simulate(plant, motions[1], holdout, RATE, rng))
-    # What is recorded is the margin: the curve must not be read while it is made.
-    with patch.object(answer, "reliability", lambda margin: 1.0):
-        diagnosis = diagnose(load_model(folder / "arm.toml"), [folder / "train.csv"], folder / "hold.csv").diagnosis
+    diagnosis = diagnose(load_model(folder / "arm.toml"), [folder / "train.csv"], folder / "hold.csv").diagnosis
     true = {(name, hidden.at) for name in (kind, *hidden.unknown)} if kind else set()
     return facts | {"verdict": diagnosis.verdict}, true, diagnosis
 
@@ -142,19 +139,19 @@ def _joint(place: str) -> int:
 
 def fill(
     path: Path,
-    cases: int,
+    cases: Sequence[int],
     seed: int,
     workers: int,
     run: Callable[[int, int], dict[str, Any]] = run_case,
     tell: Callable[[str], None] = print,
 ) -> list[dict[str, Any]]:
-    """Do the cases that ``path`` does not have yet; every case up to ``cases``, in order."""
+    """Do those of the cases that ``path`` does not have yet; all of them, in order."""
     path.parent.mkdir(parents=True, exist_ok=True)
     lines = path.read_text().splitlines(keepends=True) if path.exists() else []
     lines = [line for line in lines if line.endswith("\n")]  # a run that was stopped may have left half a line
     path.write_text("".join(lines))
     done = {record["case"]: record for record in map(json.loads, lines)}
-    wanted = [k for k in range(cases) if k not in done]
+    wanted = [k for k in cases if k not in done]
     with ProcessPoolExecutor(workers, get_context("spawn")) as pool, path.open("a") as file:
         jobs = [pool.submit(run, seed, k) for k in wanted]
         for job in as_completed(jobs):
@@ -164,8 +161,8 @@ def fill(
             file.flush()
             answers = ", ".join(f"{e['name']} at {e['at']} ({e['margin']:.2f})" for e in record["named"])
             hidden = f"{record['kind'] or 'nothing'} {record['at']}"
-            tell(f"{len(done)}/{cases}  case {record['case']}: {hidden}: {record['outcome']}: {answers or '-'}")
-    return [done[k] for k in range(cases)]
+            tell(f"{len(done)}/{len(cases)}  case {record['case']}: {hidden}: {record['outcome']}: {answers or '-'}")
+    return [done[k] for k in cases]
 
 
 def curve(margins: ArrayLike, right: ArrayLike, group: int = GROUP) -> tuple[NDArray, NDArray]:
@@ -215,10 +212,16 @@ def main() -> int:
     """Fill the bank, fit the curve, write and print."""
     parser = argparse.ArgumentParser(description="How often a named effect is right, on a bank of simulated arms.")
     parser.add_argument("--cases", type=int, default=119)
+    parser.add_argument("--only", type=int, nargs="+", metavar="CASE", help="do just these, afresh, and make no curve")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=2)
     given = parser.parse_args()
-    records = fill(ROOT / "build" / "reliability" / f"seed{given.seed}.jsonl", given.cases, given.seed, given.workers)
+    folder = ROOT / "build" / "reliability"
+    if given.only:
+        with tempfile.TemporaryDirectory() as scratch:
+            print(summary(fill(Path(scratch) / "only.jsonl", given.only, given.seed, given.workers)))
+        return 0
+    records = fill(folder / f"seed{given.seed}.jsonl", range(given.cases), given.seed, given.workers)
     named = [e for r in records for e in r["named"]]
     print(summary(records))
     if not named:

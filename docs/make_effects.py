@@ -12,9 +12,6 @@ from snarelab.models.effects import FAMILIES, effects
 PAGE = Path(__file__).with_name("effects.md")
 
 PLANNED = {
-    "drive train": ("backlash",),
-    "structure and mass": ("link_torsion", "link_bending"),
-    "suspension rig": ("slide_friction", "sling_tension_error", "suspension_sway", "hang_point_clearance"),
     "free-floating base": ("external_torque", "flexible_appendage", "propellant_slosh", "wheel_friction"),
     "snare and contact": (
         "contact_friction",
@@ -37,6 +34,10 @@ results and in reports. This page is written from the code by `python docs/make_
   channel, such as `tau.joint1`.
 - A joint effect gives the torque that the drive must supply on top of the rigid body's. A link effect changes the
   link's ten inertial parameters `phi`. A sensor effect turns the true value into what the channel reads.
+- On a suspension rig (`system = "zero_g_rig"`): a *sling* is named in the model file, and its effect is a force and
+  moment on the arm at the hang point, z up. A *slide* goes by the name of the joint that moves it, and its effect is a
+  friction force at the contacts. A *boom* is a link with slings beyond it, by the link's name. The rig's geometry takes
+  each to the torque of every joint that it can turn.
 - Units are those of a rotary joint. For a sliding joint read N for N·m, and m for rad. U is the channel's own unit.
 - `q`, `qd` and `qdd` are the joint's position, speed and acceleration. `load` is the rigid-body torque at the joint,
   from the model. `sgn` is the direction of motion, smoothed over 0.1 % of the joint's peak speed.

@@ -137,7 +137,7 @@ def _finding(t: Taken, final: Fit, trials: Mapping[str, tuple[float, float]], jo
         if r.probability >= 0.005 or not r.separable
     )
     sentence = evidence_sentence(placed, t.judged.explained, channels, with_it, without_it)
-    return Finding(placed.effect.name, placed.at, t.probability * right, parameters, sentence, rivals)
+    return Finding(placed.effect.name, placed.at, t.probability, t.probability * right, parameters, sentence, rivals)
 
 
 def _fits(

@@ -20,6 +20,8 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..models.effect import Parameter
 from ..models.model_file import Placed
+from ..models.rig import Rig
+from ..models.rig_kinematics import sling_of
 from ..models.tree import Tree
 from .base_parameters import INERTIAL, BaseParameters
 from .effect_terms import contributions
@@ -139,7 +141,9 @@ class Assembly:
 
     def joint_of(self, p: Placed) -> int:
         """Index of the joint that an effect's place belongs to."""
-        if p.effect.at == "link":
+        if isinstance(self.tree, Rig) and p.effect.at == "sling":
+            return sling_of(self.tree, p.at).link
+        if p.effect.at in ("link", "boom"):
             return self._links.index(p.at)
         return self._joints.index(p.at.removeprefix("tau.").removeprefix("q."))
 
@@ -173,6 +177,12 @@ class Assembly:
             for x, value in zip(p.effect.parameters, self.parameters(k, theta), strict=True)
         }
 
+    def keep(self, placed: Sequence[Placed], theta: Array) -> "Assembly":
+        """The same model with only some of its effects, to start from where it is."""
+        kept = Assembly(self.tree, placed, self.base, self.scales, self.values(theta))
+        kept.phi = self.phi
+        return kept
+
     def parameters(self, k: int, theta: Array) -> Array:
         """All parameters of the k-th placed effect, in its law's order."""
         full = self._full[k].copy()
@@ -203,7 +213,7 @@ class Assembly:
     def evaluate(self, experiment: Experiment, theta: Array) -> Evaluation:
         """Rigid-body torque, readings and derivative blocks at full rate."""
         load, rigid = self._rigid(experiment, theta)
-        tau, blocks = load.copy(), list(rigid)
+        tau, blocks = load.copy("F"), list(rigid)
         passed: dict[int, list[Callable[[Array], Array]]] = {}
         # Sensors read what all the others add up to, so they come last.
         for k, p in sorted(enumerate(self.placed), key=lambda item: item[1].effect.at == "sensor"):
@@ -230,10 +240,11 @@ class Assembly:
             n_base = len(self.base.names)
             columns = experiment.regressor[:, :, self.base.columns]
             blocks = [Block(c, np.arange(n_base), columns[:, c], ("base", c)) for c in range(n_joints)]
-            return columns @ theta[:n_base], blocks
-        if "rigid" not in experiment.store:
-            experiment.store["rigid"] = experiment.regressor @ self.phi
-        load, blocks = experiment.store["rigid"].copy(), []
+            return columns @ theta[:n_base] - experiment.carried, blocks
+        key = ("rigid", self.phi.tobytes())
+        if key not in experiment.store:
+            experiment.store[key] = np.asfortranarray(experiment.regressor @ self.phi - experiment.carried)
+        load, blocks = experiment.store[key].copy("F"), []  # a joint's samples side by side
         for k, p in enumerate(self.placed):
             if p.effect.at != "link":
                 continue

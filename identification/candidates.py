@@ -1,11 +1,12 @@
 """Which effects could be missing, at which places, and the columns each would add to the torque."""
 
 from dataclasses import dataclass
-from itertools import product
+from itertools import combinations, product
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..models.effect import Effect, Parameter
 from ..models.effects import effects
 from ..models.model_file import Model, Placed, places
 from .assembly import Assembly, Evaluation
@@ -18,12 +19,17 @@ MOST_VARIANTS = 36
 """Grid points of one effect at one place; a finer grid is thinned evenly."""
 
 
+MOST_COMBINED = 4
+"""Most columns of a link effect of which every combination is tried."""
+
+
 @dataclass(frozen=True)
 class Variant:
     """One effect at one place with its shape parameters set.
 
     ``amplitudes`` are the parameters the law is linear in, whose columns are tried, between ``low`` and ``high``; where
-    there is none (a delay, a spring), the law's whole contribution is the one column.
+    there is none (a delay, a spring), the law's whole contribution is the one column. The place of a mass on a link has
+    its slope tried beside the mass, which makes (mass, mass * x, mass * y, mass * z) amplitudes.
     """
 
     placed: Placed
@@ -33,12 +39,21 @@ class Variant:
     high: Array
 
     def subsets(self) -> list[NDArray[np.int_]]:
-        """Positions of the columns to try together: each amplitude alone, and all of them."""
-        every = np.arange(max(len(self.amplitudes), 1))
-        if len(every) == 1:
-            return [every]
-        singles = [every[k : k + 1] for k in every if self.placed.effect.parameters[self.amplitudes[k]].alone]
-        return [every, *singles]
+        """Positions of the columns to try together: all and single ones; of a vector's few components, every set."""
+        n = max(len(self.amplitudes), 1)
+        parameters = [self.placed.effect.parameters[i] for i in self.amplitudes]
+        alone = {k for k, p in enumerate(parameters) if p.alone and not p.grid} or {0}
+        counts = range(1, n + 1) if self.placed.effect.at == "link" and n <= MOST_COMBINED else sorted({1, n})
+        return [np.array(some) for k in counts for some in combinations(range(n), k) if alone & set(some)]
+
+    def start(self, amplitudes: Array) -> Array:
+        """All parameters of the effect (p,) for amplitudes found."""
+        full = self.parameters.copy()
+        if len(self.amplitudes):
+            full[self.amplitudes] = amplitudes
+            slopes = [i for i in self.amplitudes if self.placed.effect.parameters[i].grid]
+            full[slopes] /= amplitudes[0] or 1.0
+        return full
 
 
 def library(model: Model) -> list[Placed]:
@@ -63,8 +78,10 @@ def variants(assembly: Assembly, placed: Placed) -> list[Variant]:
     for i, p in enumerate(placed.effect.parameters):
         scale = assembly.scale(placed, p)
         axes.append([g * scale for g in p.grid] or [p.zero * scale])
-        if not p.grid:
+        if _is_linear(placed.effect, p):
             amplitudes.append(i)
+    if any(placed.effect.parameters[i].grid for i in amplitudes):
+        axes[0] = [1.0]  # slopes are taken at one kilogram
     index = np.array(amplitudes, int)
     bounds = [assembly.bounds(placed, placed.effect.parameters[i]) for i in index] or [(0.0, np.inf)]
     low, high = (np.array(x, float) for x in zip(*bounds, strict=True))
@@ -127,13 +144,18 @@ def free_parameters(assembly: Assembly, experiment: Experiment, state: Evaluatio
         parameters,
     )
     moves = np.sum([np.sum(columns**2, axis=0) for _, _, columns in terms], axis=0) > 0
-    amplitudes = {p.name for i, p in enumerate(placed.effect.parameters) if not p.grid and len(variant.amplitudes)}
+    amplitudes = {p.name for p in placed.effect.parameters if _is_linear(placed.effect, p) and len(variant.amplitudes)}
     on = {placed.effect.parameters[i].name for i in variant.amplitudes}
     return tuple(
         p.name
         for p, moving in zip(placed.effect.parameters, moves, strict=True)
         if moving and (p.name in on or p.name not in amplitudes)
     )
+
+
+def _is_linear(effect: Effect, parameter: Parameter) -> bool:
+    """Whether a column stands for the parameter: an amplitude, or a place on a link, whose grid is its origin alone."""
+    return not parameter.grid or (effect.at == "link" and len(parameter.grid) == 1)
 
 
 def smooth_columns(experiment: Experiment, state: Evaluation, joint: int, pieces: int = 8) -> Array:

@@ -76,7 +76,9 @@ def _bands(found: Fit, experiments: Sequence[Experiment]) -> Array:
         acceleration, speed = e.motion.to_band(e.motion.qdd)[longest], e.motion.to_band(e.motion.qd)[longest]
         length = min(len(acceleration), int(8 * rate))
         for c in range(n_joints):
-            columns = np.concatenate([gather(blocks, c)[1], smooth_columns(e, state, c), _directed(e, c)], axis=1)
+            index, own = gather(blocks, c)
+            fitted = [own] if len(index) else []
+            columns = np.concatenate([*fitted, smooth_columns(e, state, c), _directed(e, c)], axis=1)
             left = residual[:, c] - columns @ np.linalg.lstsq(columns, residual[:, c], rcond=1e-8)[0]
             # Friction that sticks is physics that the model may lack, not a disturbance.
             left = left * (np.abs(e.motion.to_band(e.motion.qd)[:, c]) > REST * np.max(np.abs(e.motion.qd[:, c])))
@@ -112,6 +114,6 @@ def _low_passed(experiment: Experiment, bands: Array) -> Experiment:
                     x[s, c] = sosfiltfilt(sos, x[s, c])
     kept = ", ".join(f"{j} {b:.2g} Hz" for j, b in zip(motion.joints, bands, strict=True) if np.isfinite(b))
     note = f"columns for the search come from low-passed motion, because disturbances drive these joints above: {kept}"
-    made = Experiment(replace(motion, **filtered, notes=(*motion.notes, note)), experiment.body)
+    made = replace(experiment, motion=replace(motion, **filtered, notes=(*motion.notes, note)), store={})
     made.store["bands"] = bands
     return made

@@ -29,6 +29,9 @@ Array = NDArray[np.float64]
 CONFIRM = 0.05
 """An effect is confirmed if the held-out residual energy of its channels rises by this share when it is taken out."""
 
+SECOND_CHOICES = 2
+"""Searches for another explanation of what the held-out recording did not confirm."""
+
 
 @dataclass(frozen=True)
 class Answer:
@@ -74,14 +77,21 @@ def diagnose(
     locked = load_experiments(model, [holdout], body, band)
     demand_torque([*train, *locked])
     base = base_parameters(body) if model.inertia == "free" else None
-    found = search(model, base, scales(train), train, progress=progress, seed=seed)
-    progress("confirming on the held-out recording")
-    confirmed, trials = _confirm(found, train, locked)
-    final = found.fit
-    for t in found.taken:
-        if t not in confirmed:
-            assembly = without(final, t.judged.placed)
-            final = fit(assembly, train, start=carry(final, assembly), multi_start=False)
+    best = _attempt(search(model, base, scales(train), train, progress=progress, seed=seed), train, locked, progress)
+    last, rejected = best, {t.judged.placed.key: t for t in best.rejected}
+    for _ in range(SECOND_CHOICES):
+        if not last.rejected:
+            break
+        progress("looking for what else could explain what the held-out recording did not confirm")
+        again = search(
+            model, base, scales(train), train, before=last.found, barred=rejected, progress=progress, seed=seed
+        )
+        last = _attempt(again, train, locked, progress)
+        rejected |= {t.judged.placed.key: t for t in last.rejected}
+        if np.sum(np.log(last.final.sigma)) < np.sum(np.log(best.final.sigma)):
+            best = last
+    confirmed, trials, final = best.confirmed, best.trials, best.final
+    found = replace(best.found, taken=(*confirmed, *rejected.values()))
     final, inertia = physical(final, train)
     steps = _steps(found, confirmed, final, train, locked)
     diagnosis = report_on(model, found, confirmed, final, trials, steps, train, locked)
@@ -89,25 +99,47 @@ def diagnose(
     return Answer(diagnosis, replace(model, effects=final.assembly.placed, values=values))
 
 
-def _confirm(
-    found: Found, train: Sequence[Experiment], locked: Sequence[Experiment]
-) -> tuple[list[Taken], Mapping[str, tuple[float, float]]]:
-    """Effects whose removal (all else fitted again) makes the held-out recording worse; errors with and without
-    each."""
-    with_all, measured = channel_rms(found.fit.assembly, locked, found.fit.theta)
-    confirmed, trials = [], {}
-    for t in found.taken:
-        placed = t.judged.placed
-        assembly = without(found.fit, placed)
-        again = fit(assembly, train, start=carry(found.fit, assembly), multi_start=False)
-        rms, _ = channel_rms(assembly, locked, again.theta)
-        c = list(t.judged.channels)
-        energy = [float(np.sum((x[c] / measured[c]) ** 2)) for x in (with_all, rms)]
-        if energy[1] > (1 + CONFIRM) * energy[0]:
-            confirmed.append(t)
-        worst = c[int(np.argmax(rms[c] / measured[c] - with_all[c] / measured[c]))]
-        trials[placed.key] = (float(with_all[worst] / measured[worst]), float(rms[worst] / measured[worst]))
-    return confirmed, trials
+@dataclass(frozen=True)
+class _Attempt:
+    """A search, what of it the held-out recording confirmed and did not, the trials, and the fit of what is left."""
+
+    found: Found
+    confirmed: tuple[Taken, ...]
+    rejected: tuple[Taken, ...]
+    trials: Mapping[str, tuple[float, float]]
+    final: Fit
+
+
+def _attempt(
+    found: Found, train: Sequence[Experiment], locked: Sequence[Experiment], progress: Callable[[str], None]
+) -> _Attempt:
+    """Take out the effect that the held-out recording misses least, all else fitted again, until it misses every one.
+
+    One at a time: of two that stand in for each other, one stays. Channels are weighted as the fit weights them.
+    """
+    progress("confirming on the held-out recording")
+    confirmed, rejected, trials, final = list(found.taken), [], {}, found.fit
+    while confirmed:
+        with_all, measured = channel_rms(final.assembly, locked, final.theta)
+        rises, fits = [], []
+        for t in confirmed:
+            c = list(t.judged.channels)
+            assembly = without(final, t.judged.placed)
+            fits.append(fit(assembly, train, start=carry(final, assembly), multi_start=False))
+            rms, _ = channel_rms(assembly, locked, fits[-1].theta)
+            energy = [float(np.sum((x[c] / final.sigma[c]) ** 2)) for x in (with_all, rms)]
+            rises.append(energy[1] / energy[0] - 1)
+            worst = c[int(np.argmax(rms[c] / measured[c] - with_all[c] / measured[c]))]
+            trials[t.judged.placed.key] = (
+                float(with_all[worst] / measured[worst]),
+                float(rms[worst] / measured[worst]),
+            )
+        weakest = int(np.argmin(rises))
+        if rises[weakest] > CONFIRM:
+            break
+        rejected.append(confirmed.pop(weakest))
+        final = fits[weakest]
+    return _Attempt(found, tuple(confirmed), tuple(rejected), trials, final)
 
 
 def _steps(
@@ -123,11 +155,10 @@ def _steps(
     steps = [line("model as given", found.first.assembly, found.first.theta)]
     names = list(dict.fromkeys(t.judged.placed.effect.name for t in confirmed))
     old = final.assembly
-    values = old.values(final.theta)
     for k, name in enumerate(names):
         rest = {t.judged.placed.key for t in confirmed if t.judged.placed.effect.name in names[k + 1 :]}
         if rest:
-            assembly = Assembly(old.tree, [p for p in old.placed if p.key not in rest], old.base, old.scales, values)
+            assembly = old.keep([p for p in old.placed if p.key not in rest], final.theta)
             theta = fit(assembly, train, start=carry(final, assembly), multi_start=False).theta
         else:
             assembly, theta = old, final.theta

@@ -9,8 +9,11 @@ from scipy.signal import fftconvolve
 from ..models.effect import Effect
 from ..models.hidden_state import evaluate_law
 from ..models.model_file import Placed
+from ..models.rig import Rig
+from ..models.rig_kinematics import far_end
 from ..models.tree import Tree
 from .experiment import Experiment
+from .rig_terms import rig_signals, rig_terms
 
 Array = NDArray[np.float64]
 
@@ -59,6 +62,10 @@ def contributions(
         change, by_parameter = _link_change(effect, tree, joint, parameters)
         columns = experiment.regressor[:, :, own]
         return [(c, columns[:, c] @ change, columns[:, c] @ by_parameter) for c in range(columns.shape[1])], None, None
+    if isinstance(tree, Rig) and effect.at in ("sling", "boom"):
+        read = rig_signals(experiment, tree, effect, placed.at)
+        values, by_parameter, _ = _by_segment(experiment, effect, read, parameters)
+        return rig_terms(experiment, tree, effect, placed.at, values, by_parameter), None, None
     signals = {
         "q": motion.q[:, joint],
         "qd": motion.qd[:, joint],
@@ -78,6 +85,8 @@ def contributions(
     if effect.states:
         signals["inertia"] = experiment.mass_matrix[:, joint, joint]
     values, by_parameter, by_load = _by_segment(experiment, effect, signals, parameters)
+    if isinstance(tree, Rig) and effect.at == "slide":
+        return rig_terms(experiment, tree, effect, placed.at, values, by_parameter), None, None
     if effect.acts_on == "torque":
         return [(joint, values[:, 0], by_parameter[:, 0])], None if by_load is None else by_load[:, 0, 0], None
     by_position, by_rate = experiment.tangent
@@ -95,9 +104,7 @@ def contributions(
 def _link_change(effect: Effect, tree: Tree, link: int, parameters: Array) -> tuple[Array, Array]:
     """Change of a link's inertial parameters (10,) and its derivative by the effect's parameters (10, p)."""
     phi = tree.links[link].phi
-    outboard = [j.translation for j in tree.joints if j.parent == link]
-    tip = outboard[0] if outboard else phi[1:4] / max(phi[0], 1e-12)
-    found = evaluate_law(effect, {"phi": phi[None], "tip": np.asarray(tip)[None]}, parameters)
+    found = evaluate_law(effect, {"phi": phi[None], "tip": far_end(tree, link)[None]}, parameters)
     return found.values[0] - phi, found.by_parameter[0]
 
 

@@ -116,14 +116,17 @@ class Evidence:
                 noise[:, b] += part.T @ c.noise[rows]
         return Products(own, cross, right, noise @ self.signs)
 
-    def gain(self, p: Products, low: Array, high: Array) -> Gain:
-        """Log-likelihood gained on all blocks by the candidate, amplitudes between bounds, baseline fitted again."""
+    def gain(self, p: Products, low: Array, high: Array, least: float | None = None) -> Gain:
+        """Log-likelihood gained on all blocks by the candidate, amplitudes between bounds, baseline fitted again.
+
+        ``least`` is the share of every column that the baseline must not be able to mimic.
+        """
         cross = p.cross.sum(0)
         own = p.own.sum(0)
         schur = own - cross.T @ self._total.solve(cross)
         left = np.diag(schur) / np.maximum(np.diag(own), 1e-300)
         unabsorbed = float(np.min(left)) if len(left) > 1 else float(left[0])
-        if unabsorbed < (ABSORBED if len(left) == 1 else ABSORBED_PART):
+        if unabsorbed < (least or (ABSORBED if len(left) == 1 else ABSORBED_PART)):
             return Gain(0.0, np.zeros(len(low)), unabsorbed)
         target = p.right.sum(0) - cross.T @ self._fitted
         amplitudes = _bounded(schur, own, target, low, high)

@@ -6,10 +6,13 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..models.model_file import Model
+from ..models.rig import Rig
+from ..models.rig_kinematics import sling_map
 from ..models.rigid_body import RigidBody
 from ..recordings import JointKind, read_recording
 from ..recordings.condition import Motion, condition
@@ -21,11 +24,13 @@ Array = NDArray[np.float64]
 class Experiment:
     """Motion of one recording and the rigid body's share of its torque.
 
-    ``n`` samples, ``J`` joints, ``L`` links; ``store`` keeps columns that do not change while a model is fitted.
+    ``n`` samples, ``J`` joints, ``L`` links; ``tension`` holds what slings of a rig were measured to pull, each (n,)
+    [N]; ``store`` keeps columns that do not change while a model is fitted.
     """
 
     motion: Motion
     body: RigidBody
+    tension: Mapping[str, Array] = field(default_factory=dict)
     store: dict[object, Array] = field(default_factory=dict, repr=False)
 
     @cached_property
@@ -40,8 +45,26 @@ class Experiment:
 
     @cached_property
     def tangent(self) -> tuple[Array, Array]:
-        """Derivative of the nominal torque by position and by rate, each (n, J, J)."""
-        return self.body.tangent(self.motion.q, self.motion.qd, self.motion.qdd)
+        """Derivative of the nominal torque by position and by rate, each (n, J, J); slings move with the arm."""
+        gravity = np.zeros(3) if isinstance(self.body.tree, Rig) else None
+        return self.body.tangent(self.motion.q, self.motion.qd, self.motion.qdd, gravity=gravity)
+
+    @cached_property
+    def carried(self) -> Array:
+        """Torque that a rig's slings take off the joints (n, J) [N·m or N]; zero on an arm without slings.
+
+        In balance that is the weight of the arm as the model gives it, so that all which differs from the model's
+        masses shows under gravity. A measured tension adds what it exceeds the balance by.
+        """
+        rig, q = self.body.tree, self.motion.q
+        if not isinstance(rig, Rig):
+            return np.zeros_like(q)
+        total = self.body.torque(q, np.zeros_like(q), np.zeros_like(q))
+        for sling in rig.slings:
+            if sling.name in self.tension:
+                excess = self.tension[sling.name] - sling.tension
+                total -= sling_map(rig, sling, q)[:, :, 2] * excess[:, None]
+        return total
 
     @cached_property
     def measured(self) -> Array:
@@ -85,12 +108,33 @@ def load_experiments(
     """
     kinds: dict[str, JointKind] = {j.name: j.kind for j in model.tree.joints}
     datasets = [read_recording(path, model.signals, kinds) for path in paths]
+    measured = [_tensions(d, model) for d in datasets]
+    datasets = [_without_gaps_in(t, d) for t, d in zip(measured, datasets, strict=True)]
     wanted = band or model.bandwidth
     motions = [condition(d, model.joints, wanted) for d in datasets]
     narrowest = min(m.band for m in motions)
     if any(m.band > 1.01 * narrowest for m in motions):
         motions = [condition(d, model.joints, narrowest) for d in datasets]
-    return [Experiment(m, body) for m in motions]
+    return [
+        Experiment(m, body, {name: np.interp(m.time, d["time"].values, x) for name, x in t.items()})
+        for m, d, t in zip(motions, datasets, measured, strict=True)
+    ]
+
+
+def _tensions(dataset: xr.Dataset, model: Model) -> dict[str, Array]:
+    """Recorded tension of the model's slings, by the sling's name, each (all rows,) [N]."""
+    slings = model.tree.slings if isinstance(model.tree, Rig) else ()
+    names = [s.name for s in slings if f"tension.{s.name}" in dataset]
+    return {name: np.asarray(dataset[f"tension.{name}"].values, float) for name in names}
+
+
+def _without_gaps_in(tensions: Mapping[str, Array], dataset: xr.Dataset) -> xr.Dataset:
+    """The recording with positions missing wherever a tension is: conditioning then leaves the sample out."""
+    if not tensions:
+        return dataset
+    good = np.isfinite(list(tensions.values())).all(axis=0)
+    names = [name for name in dataset.data_vars if str(name).startswith("q.")]
+    return dataset.assign({name: dataset[name].where(xr.DataArray(good, dims="time")) for name in names})
 
 
 def demand_apart(recordings: Sequence[str | Path], holdout: str | Path) -> None:

@@ -24,6 +24,9 @@ CLUSTER = 0.5
 WEAK = 1e-13
 """Share of the largest eigenvalue of the scaled normal matrix below which a direction counts as unknown."""
 
+PART = 1e-6
+"""Share of a parameter in unknown directions from which on it is unknown itself; less is rounding."""
+
 
 @dataclass(frozen=True)
 class Fit:
@@ -33,7 +36,7 @@ class Fit:
     ----------
     assembly : Assembly
     theta, std : array (P,)
-        Parameters in the assembly's order and their standard deviations.
+        Parameters in the assembly's order and their standard deviations; inf where the data say nothing.
     covariance : array (P, P)
         Of the directions that the data carry.
     sigma : array (J,)
@@ -124,8 +127,8 @@ def _covariance(
 ) -> tuple[Array, Array, float]:
     """Cluster-robust covariance (P, P), standard deviations (P,), and the condition number of the scaled Jacobian.
 
-    Directions that the data say nothing about are left out of the covariance; the standard deviation of a parameter
-    that has a part in them is what such a direction has at least, a number too large to be mistaken.
+    Directions that the data say nothing about are left out of the covariance; a parameter that has a part in them has
+    an infinite standard deviation.
     """
     if not len(theta):
         return np.zeros((0, 0)), np.zeros(0), 1.0
@@ -149,6 +152,6 @@ def _covariance(
     half = vectors[:, known] / np.sqrt(values[known]) / scale[:, None]
     inverse = half @ half.T
     covariance = inverse @ meat @ inverse * clusters / max(clusters - 1, 1)
-    unknown = np.sum(vectors[:, ~known] ** 2, axis=1) / (WEAK * max(values[-1], 1.0)) / scale**2
+    unknown = np.sum(vectors[:, ~known] ** 2, axis=1) > PART
     condition = float(np.sqrt(values[-1] / max(values[0], 1e-30)))
-    return covariance, np.sqrt(np.diag(covariance) + unknown), condition
+    return covariance, np.where(unknown, np.inf, np.sqrt(np.diag(covariance))), condition

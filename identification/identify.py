@@ -15,6 +15,7 @@ from .base_parameters import INERTIAL, BaseParameters, base_parameters
 from .consistent_inertia import ConsistentInertia, consistent_inertia
 from .experiment import Experiment, demand_apart, demand_torque, load_experiments, scales
 from .fit import Fit, channel_rms, fit
+from .friction_curve import friction_curves, identifiable
 
 
 @dataclass(frozen=True)
@@ -41,12 +42,15 @@ class Identified:
                 "at": s.at,
                 "name": s.name,
                 "value": float(value),
-                "std": float(std),
+                "std": min(float(std), 1e300),  # where it is inf, null says so once the table can print that
                 "unit": s.unit,
                 "at_bound": bool(bound),
+                "identifiable": bool(carried),
             }
             | ({"combination": combination[s.key]} if s.key in combination else {})
-            for s, value, std, bound in zip(found.assembly.slots, found.theta, found.std, found.at_bound, strict=True)
+            for s, value, std, bound, carried in zip(
+                found.assembly.slots, found.theta, found.std, found.at_bound, identifiable(found), strict=True
+            )
         ]
         fits: dict[str, Any] = {}
         for role, experiments in (("train", self.train), ("holdout", self.holdout)):
@@ -67,6 +71,20 @@ class Identified:
                 f"{Path(e.motion.path).name}: {note}" for e in (*self.train, *self.holdout) for note in e.motion.notes
             ],
         }
+        curves = friction_curves(found, self.train)
+        if curves:
+            answer["curves"] = [
+                {
+                    "at": c.at,
+                    "kind": c.kind,
+                    "effects": list(c.effects),
+                    "speed": c.speed.tolist(),
+                    "value": c.value.tolist(),
+                    "std": c.std.tolist(),
+                    "unit": c.unit,
+                }
+                for c in curves
+            ]
         if self.inertia is not None:
             answer["inertia"] = {
                 "physical": not self.inertia.changed,

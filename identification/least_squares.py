@@ -17,6 +17,8 @@ from scipy.optimize import lsq_linear
 
 Array = NDArray[np.float64]
 
+_GROWTH = 10.0
+
 
 @dataclass(frozen=True)
 class Normal:
@@ -25,6 +27,22 @@ class Normal:
     cost: float
     gradient: Array
     matrix: Array
+
+
+@dataclass(frozen=True)
+class Objective:
+    """½‖r(theta)‖² and the bounds that its parameters keep.
+
+    Parameters
+    ----------
+    normal : callable
+        ``theta (n_parameters,) -> Normal``; may return a cost of inf where the model cannot be evaluated.
+    low, high : array (n_parameters,)
+    """
+
+    normal: Callable[[Array], Normal]
+    low: Array
+    high: Array
 
 
 @dataclass(frozen=True)
@@ -38,32 +56,36 @@ class Solution:
 
 
 def minimise(
-    normal: Callable[[Array], Normal],
+    objective: Objective,
     start: Array,
-    low: Array,
-    high: Array,
     *,
     max_steps: int = 60,
     tolerance: float = 1e-8,
+    damping: float = 1e-6,
+    stride: Array | float = np.inf,
 ) -> Solution:
     """Minimise ½‖r(theta)‖² between bounds.
 
     Parameters
     ----------
-    normal : callable
-        ``theta (n_parameters,) -> Normal``; may return a cost of inf where the model cannot be evaluated.
-    start, low, high : array (n_parameters,)
-        Start and bounds; the start is moved inside.
+    objective : Objective
+    start : array (n_parameters,)
+        It is moved inside the bounds.
     max_steps : int
         Most trial steps.
     tolerance : float
         Settled when a step's predicted gain falls below this share of the cost.
+    damping : float
+        To begin with: 0 where the model is linear, more where its first step is not to be believed.
+    stride : float or array (n_parameters,)
+        Most that a parameter may change in one step.
     """
+    normal, low, high = objective.normal, objective.low, objective.high
     theta = np.clip(start, low, high)
     here = normal(theta)
     if not np.isfinite(here.cost):
         return Solution(theta, here, 0, False)
-    damping = 1e-6
+    growth = _GROWTH
     scale = np.zeros(len(theta))
     bend, bent = np.zeros_like(here.matrix), False
     for step in range(1, max_steps + 1):
@@ -71,7 +93,9 @@ def minimise(
         scale = np.maximum(scale, np.sqrt(np.diag(here.matrix)))
         model = Normal(here.cost, here.gradient, here.matrix + bend) if bent else here
         try:
-            move = bounded_step(model, scale, damping, low - theta, high - theta)
+            move = bounded_step(
+                model, scale, damping, np.maximum(low - theta, -stride), np.minimum(high - theta, stride)
+            )
         except np.linalg.LinAlgError:
             bent = False  # not convex: the plain model always is
             continue
@@ -87,13 +111,15 @@ def minimise(
             miss = there.cost - here.cost - here.gradient @ move - 0.5 * move @ here.matrix @ move
             bent = abs(miss - 0.5 * move @ bend @ move) < abs(miss)
             theta, here = trial, there
-            damping = max(damping * (0.1 if ratio > 0.7 else 0.5), 1e-12)
+            damping = max(damping * (0.1 if ratio > 0.7 else 0.5 if ratio > 0.25 else 2.0), 1e-12)
+            growth = _GROWTH
         elif bent:
             bent = False
         elif damping > 1e8:
             return Solution(theta, here, step, True)
         else:
-            damping = max(damping, 1e-8) * 10
+            damping = max(damping, 1e-8) * growth
+            growth *= 3  # a row of refusals: the damping is far too low (Nielsen 1999)
     return Solution(theta, here, max_steps, False)
 
 

@@ -11,10 +11,15 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..models.hidden_state import rows
+from ..models.model_file import Placed
+from ..models.rig import Rig
+from ..models.rig_kinematics import reached_joints
 from .assembly import Assembly, Block
 from .experiment import Experiment
-from .least_squares import Normal, Solution
+from .least_squares import Normal, Objective, Solution
 from .projection import minimise_projected
+from .rig_terms import PLACES
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int_]
@@ -59,8 +64,11 @@ class Problem:
 
     def minimise(self, theta: Array, sigma: Array, tolerance: float = 1e-8) -> Solution:
         """Best parameters from one start, channels weighted by 1 / sigma (C,)."""
-        low, high = self.assembly.low, self.assembly.high
-        return minimise_projected(lambda x: self.normal(x, sigma), theta, low, high, self.shapes, tolerance=tolerance)
+        return minimise_projected(self.objective(sigma), theta, self.shapes, tolerance=tolerance)
+
+    def objective(self, sigma: Array) -> Objective:
+        """What is minimised, channels weighted by 1 / sigma (C,)."""
+        return Objective(lambda x: self.normal(x, sigma), self.assembly.low, self.assembly.high)
 
     def channel_fits(self, experiment: Experiment, theta: Array) -> Iterator[tuple[Array, Index, Array]]:
         """Of each channel in band: residual (n_band,), parameters it depends on (k,), its derivative (n_band, k)."""
@@ -78,7 +86,8 @@ class Problem:
                     if b.key is not None:
                         experiment.store[b.key] = columns
                 banded.append(Block(b.channel, b.index, columns))
-            yield experiment.measured[:, channel] - modelled[:, k], *gather(banded, channel)
+            index, columns = gather(banded, channel)
+            yield experiment.measured[:, channel] - modelled[:, k], index, columns.reshape(len(modelled), len(index))
 
     def normal(self, theta: Array, sigma: Array) -> Normal:
         """Cost, gradient and normal matrix, channels weighted by 1 / sigma (C,); inf where torque is not finite."""
@@ -117,6 +126,15 @@ def gather(blocks: Sequence[Block], channel: int) -> tuple[Index, Array]:
     return unique, columns @ np.eye(len(unique))[inverse]
 
 
+def reached(assembly: Assembly, p: Placed) -> tuple[int, ...]:
+    """Channels that a placed effect can change."""
+    tree = assembly.tree
+    if isinstance(tree, Rig) and p.effect.at in PLACES:
+        return reached_joints(tree, p.effect.at, p.at, rows(p.effect))
+    everywhere = p.effect.at == "link" or p.effect.acts_on == "position"
+    return tuple(range(tree.n_joints)) if everywhere else (assembly.joint_of(p),)
+
+
 def split(assembly: Assembly, experiments: Sequence[Experiment], theta: Array) -> list[Problem]:
     """Cut a model's fit into problems that share no parameter; channels without any parameter are left out."""
     blocks = assembly.evaluate(experiments[0], theta).blocks
@@ -136,11 +154,5 @@ def split(assembly: Assembly, experiments: Sequence[Experiment], theta: Array) -
 
 def _part(assembly: Assembly, channels: Index, theta: Array) -> Assembly:
     """The model with only what reaches some channels."""
-    placed = [
-        p
-        for p in assembly.placed
-        if p.effect.at == "link" or p.effect.acts_on == "position" or assembly.joint_of(p) in channels
-    ]
-    part = Assembly(assembly.tree, placed, None, assembly.scales, assembly.values(theta))
-    part.phi = assembly.phi
-    return part
+    placed = [p for p in assembly.placed if not set(reached(assembly, p)).isdisjoint(channels)]
+    return assembly.keep(placed, theta)

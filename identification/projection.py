@@ -6,12 +6,10 @@ over both crawls (Golub & Pereyra 1973). A step is Kaufman's (1975): the Schur c
 Amplitudes for a new s are foretold to first order, so that a point takes one pass over the samples or two.
 """
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import NDArray
 
-from .least_squares import Normal, Solution, bounded_step, minimise
+from .least_squares import Normal, Objective, Solution, bounded_step, minimise
 
 Array = NDArray[np.float64]
 
@@ -22,65 +20,68 @@ _RIDGE = 1e-10
 
 
 def minimise_projected(
-    normal: Callable[[Array], Normal],
-    start: Array,
-    low: Array,
-    high: Array,
-    shapes: NDArray[np.bool_],
-    *,
-    max_steps: int = 60,
-    tolerance: float = 1e-8,
+    objective: Objective, start: Array, shapes: NDArray[np.bool_], *, max_steps: int = 60, tolerance: float = 1e-8
 ) -> Solution:
     """Minimise ½‖r(theta)‖² between bounds; as `least_squares.minimise`, for r linear in all but some parameters.
 
+    Shapes that must be positive are searched in their logarithms, and no step takes one further than e times.
+
     Parameters
     ----------
-    normal : callable
-        ``theta (n_parameters,) -> Normal``.
-    start, low, high : array (n_parameters,)
+    objective : Objective
+    start : array (n_parameters,)
     shapes : array (n_parameters,) of bool
         Parameters that r is not linear in. Linearity in the others is used for speed, not trusted: what is
         returned was evaluated.
-    max_steps : int
-        Most steps in the shapes.
-    tolerance : float
-        Settled when a step's predicted gain falls below this share of the cost.
+    max_steps, tolerance
+        As for `least_squares.minimise`; steps are in the shapes.
     """
     if not shapes.any():
-        return minimise(normal, start, low, high, max_steps=max_steps, tolerance=tolerance)
-    search = _Search(normal, np.clip(start, low, high), low, high, shapes)
-    found = minimise(search, start[shapes], low[shapes], high[shapes], max_steps=max_steps, tolerance=tolerance)
+        return minimise(objective, start, max_steps=max_steps, tolerance=tolerance)
+    search = _Search(objective, np.clip(start, objective.low, objective.high), shapes)
+    low, high = objective.low[shapes], objective.high[shapes]
+    positive = low > 0
+
+    def scaled(values: Array) -> Array:
+        return np.where(positive, np.log(np.where(positive, values, 1.0)), values)
+
+    def normal(coordinates: Array) -> Normal:
+        power = np.exp(np.where(positive, coordinates, 0.0))
+        reduced = search(np.clip(np.where(positive, power, coordinates), low, high))
+        return Normal(reduced.cost, reduced.gradient * power, reduced.matrix * np.outer(power, power))
+
+    found = minimise(
+        Objective(normal, scaled(low), scaled(high)),
+        scaled(search.theta[shapes]),
+        max_steps=max_steps,
+        tolerance=tolerance,
+        damping=1e-2,
+        stride=np.where(positive, 1.0, np.inf),
+    )
     return Solution(search.theta, search.here, found.steps, found.settled)
 
 
 def project(
-    normal: Callable[[Array], Normal],
-    theta: Array,
-    low: Array,
-    high: Array,
-    shapes: NDArray[np.bool_],
-    scale: Array | float = 0.0,
+    objective: Objective, theta: Array, shapes: NDArray[np.bool_], scale: Array | float = 0.0
 ) -> tuple[Array, float, Normal]:
     """Solve the amplitudes, shapes held: parameters (n_parameters,), cost there, normal equations at ``theta``.
 
     ``scale`` is the most influence that each parameter is known to have: one that lost nearly all of it stays.
     """
-    here = normal(theta)
+    here = objective.normal(theta)
     if not np.isfinite(here.cost):
         return theta, np.inf, here
-    room = np.where(shapes, 0.0, low - theta), np.where(shapes, 0.0, high - theta)
+    room = np.where(shapes, 0.0, objective.low - theta), np.where(shapes, 0.0, objective.high - theta)
     move = bounded_step(here, np.maximum(scale, np.sqrt(np.diag(here.matrix))), _RIDGE, *room)
     cost = here.cost + float(here.gradient @ move + 0.5 * move @ here.matrix @ move)
-    return np.clip(theta + move, low, high), cost, here
+    return np.clip(theta + move, objective.low, objective.high), cost, here
 
 
 class _Search:
     """The reduced problem as a function of the shapes; keeps the best point it has been asked for."""
 
-    def __init__(
-        self, normal: Callable[[Array], Normal], start: Array, low: Array, high: Array, shapes: NDArray[np.bool_]
-    ) -> None:
-        self._normal, self._low, self._high, self._shapes = normal, low, high, shapes
+    def __init__(self, objective: Objective, start: Array, shapes: NDArray[np.bool_]) -> None:
+        self._objective, self._shapes = objective, shapes
         self.theta, self.here = start, Normal(np.inf, np.zeros(len(start)), np.zeros((len(start), len(start))))
         self._follow = np.zeros((len(start), np.count_nonzero(shapes)))
         self._scale = np.zeros(len(start))
@@ -88,18 +89,19 @@ class _Search:
     def __call__(self, shape: Array) -> Normal:
         foretold = self.theta + self._follow @ (shape - self.theta[self._shapes])
         foretold[self._shapes] = shape
-        foretold = np.clip(foretold, self._low, self._high)
-        theta, cost, here = project(self._normal, foretold, self._low, self._high, self._shapes, self._scale)
+        low, high = self._objective.low, self._objective.high
+        foretold = np.clip(foretold, low, high)
+        theta, cost, here = project(self._objective, foretold, self._shapes, self._scale)
         if not np.isfinite(cost):
             return Normal(np.inf, np.zeros(len(shape)), np.zeros((len(shape), len(shape))))
         self._scale = np.maximum(self._scale, np.sqrt(np.diag(here.matrix)))
         progress = self.here.cost - cost if np.isfinite(self.here.cost) else 0.0
         if here.cost - cost > WORTH_A_PASS * abs(progress):
-            there = self._normal(theta)
+            there = self._objective.normal(theta)
             theta, here = (theta, there) if there.cost < here.cost else (foretold, here)
         else:
             theta = foretold
-        free = ~self._shapes & (theta > self._low) & (theta < self._high)
+        free = ~self._shapes & (theta > low) & (theta < high)
         reduced, follow = _schur(here, free, self._shapes, self._scale)
         if here.cost < self.here.cost:
             self.theta, self.here = theta, here

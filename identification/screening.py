@@ -74,9 +74,7 @@ class Judged:
 
     def start(self) -> dict[str, float]:
         """Starting values by key for the joint refit."""
-        full = self.variant.parameters.copy()
-        if len(self.variant.amplitudes):
-            full[self.variant.amplitudes] = self.amplitudes
+        full = self.variant.start(self.amplitudes)
         names = [p.name for p in self.placed.effect.parameters]
         return {f"{self.placed.key}.{name}": float(value) for name, value in zip(names, full, strict=True)}
 
@@ -192,7 +190,8 @@ def screen(
         judged.append(Judged(variant, placed, amplitudes, score, price, explained, tuple(own), products, columns))
     threshold = {channels: float(np.quantile(x, LEVEL)) for channels, x in null.items()}
     for j in judged:
-        if len(j.variant.amplitudes) == 1:
+        rest = j.variant.amplitudes[1:]
+        if len(j.variant.amplitudes) and all(j.placed.effect.parameters[i].grid for i in rest):
             p = j.placed.effect.parameters[int(j.variant.amplitudes[0])]
             # Both bars count: a score above noise, and a share of the residual worth a name.
             needed = max(threshold[j.channels] + j.price, 0.5 * WORTH * sum(_energy(white[c]) for c in j.channels))

@@ -8,7 +8,7 @@ A candidate is judged on whitened samples with the whole baseline fitted again b
 3. it explains a share of its channels' residual energy that is worth a name.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,9 +18,10 @@ from ..models.model_file import Model, Placed
 from .assembly import Assembly
 from .base_parameters import BaseParameters
 from .closed_loop import planned
+from .evidence import ABSORBED
 from .experiment import Experiment, Scales
 from .fit import Fit, fit
-from .saturated import Noise
+from .rig_terms import PLACES
 from .screening import WORTH, Judged, Screening, reliably_positive, screen
 
 Array = NDArray[np.float64]
@@ -74,6 +75,8 @@ def search(
     scales: Mapping[str, Scales],
     experiments: Sequence[Experiment],
     *,
+    before: Found | None = None,
+    barred: Collection[str] = (),
     progress: Callable[[str], None] = lambda _: None,
     seed: int = 0,
 ) -> Found:
@@ -88,23 +91,28 @@ def search(
     scales : mapping of str to Scales
     experiments : sequence of Experiment
         Training recordings.
+    before : Found, optional
+        An earlier search of the same: its baseline and first screening are not done again.
+    barred : collection of str
+        Keys of effects and places that must not be taken.
     progress : callable
         Told in a few words what is under way.
     seed : int
     """
-    progress("fitting the baseline")
-    first = found = fit(assemble(model, base, scales), experiments, progress=progress, seed=seed)
-    instruments = None
     taken: list[Taken] = []
-    opening: Screening | None = None
-    noise: Noise | None = None
-    for number in range(1, MOST_ROUNDS + 2):
-        progress(f"round {number}: screening every effect at every place")
-        instruments = planned(found, experiments, instruments)
-        result = screen(model, found, experiments, instruments, noise, seed)
-        opening, noise = opening or result, result.noise
-        passing = _passing(result) if number <= MOST_ROUNDS else []
-        chosen = _choose(passing)
+    if before is None:
+        progress("fitting the baseline")
+        first = found = fit(assemble(model, base, scales), experiments, progress=progress, seed=seed)
+        progress("round 1: screening every effect at every place")
+        instruments = planned(found, experiments)
+        opening = result = screen(model, found, experiments, instruments, None, seed)
+    else:
+        first = found = before.first
+        opening = result = before.opening
+        instruments = before.instruments
+    for number in range(2, MOST_ROUNDS + 2):
+        passing = [j for j in _passing(result) if j.placed.key not in barred]
+        chosen = _choose(result, passing)
         if not chosen:
             break
         taken += [_weigh(result, j, passing, seed) for j in chosen]
@@ -113,8 +121,10 @@ def search(
         progress("refitting with " + ", ".join(f"{j.placed.effect.name} at {j.placed.at}" for j in chosen))
         assembly = assemble(model, base, scales)
         found = fit(assembly, experiments, start=carry(found, assembly), multi_start=False)
-    assert opening is not None
-    return Found(first, model, found, tuple(taken), opening, result, tuple(instruments or ()))
+        progress(f"round {number}: screening every effect at every place")
+        instruments = planned(found, experiments, instruments)
+        result = screen(model, found, experiments, instruments, opening.noise, seed)
+    return Found(first, model, found, tuple(taken), opening, result, tuple(instruments))
 
 
 def carry(found: Fit, assembly: Assembly) -> Array:
@@ -125,9 +135,7 @@ def carry(found: Fit, assembly: Assembly) -> Array:
 
 def without(found: Fit, placed: Placed) -> Assembly:
     """The same model with one effect taken out again."""
-    old = found.assembly
-    rest = [p for p in old.placed if p.key != placed.key]
-    return Assembly(old.tree, rest, old.base, old.scales, old.values(found.theta))
+    return found.assembly.keep([p for p in found.assembly.placed if p.key != placed.key], found.theta)
 
 
 def _passing(result: Screening) -> list[Judged]:
@@ -139,33 +147,55 @@ def _passing(result: Screening) -> list[Judged]:
         fresh = result.evidence.fresh_gains(j.products, j.variant.low, j.variant.high)
         if reliably_positive(fresh) and _holds_in_motion(result, j):
             passing.append(j)
-    single: dict[int, float] = {}
-    for j in passing:
-        if len(j.channels) == 1:
-            single.setdefault(j.channels[0], j.score)
-    # Where several local effects explain more than one that reaches everywhere, they are the simpler story.
-    return [j for j in passing if len(j.channels) == 1 or sum(single.get(c, 0.0) for c in j.channels) <= j.score]
+    return passing
 
 
-def _choose(passing: Sequence[Judged]) -> list[Judged]:
+def _choose(result: Screening, passing: Sequence[Judged]) -> list[Judged]:
     """The best candidate, and beside it the best on every channel that no better candidate reaches."""
     keys = {j.placed.key for j in passing}
+    best: dict[int, Judged] = {}
+    for j in passing:
+        if len(j.channels) == 1:
+            best.setdefault(j.channels[0], j)
     chosen: list[Judged] = []
     reached: set[int] = set()
     for j in passing:
         if any(f"{name}.{j.placed.at}" in keys for name in j.placed.effect.contains):
             continue  # a special case of it passes too, and goes first
+        local = [best[c] for c in j.channels if c in best]
+        if len(j.channels) > 1 and local and not _worth_its_reach(result, j, local):
+            continue
         if reached.isdisjoint(j.channels):
             chosen.append(j)
         reached |= set(j.channels)
     return chosen
 
 
+def _worth_its_reach(result: Screening, wide: Judged, local: Sequence[Judged]) -> bool:
+    """Is an effect that reaches several channels, with the local ones it leaves a need for, a better story than the
+    best local effects of those channels together?"""
+    alone = _together(result, [wide])
+    beside = [j for j in local if _together(result, [wide, j]) - alone > result.threshold[j.channels]]
+    return _together(result, [wide, *beside]) >= _together(result, local)
+
+
+def _together(result: Screening, several: Sequence[Judged]) -> float:
+    """Score of several candidates at once."""
+    reached = sorted({c for j in several for c in j.channels})
+    size = {c: len(result.evidence.channels[c].residual) for c in reached}
+    columns = [
+        (c, np.hstack([j.columns.get(c, np.zeros((size[c], len(j.variant.low)))) for j in several])) for c in reached
+    ]
+    low, high = (np.concatenate([getattr(j.variant, side) for j in several]) for side in ("low", "high"))
+    gain = result.evidence.gain(result.evidence.products(columns), low, high, ABSORBED)
+    return gain.total - sum(j.price for j in several)
+
+
 def _holds_in_motion(result: Screening, j: Judged) -> bool:
     """Does it still pass with the samples near rest left out? Stuck friction poses as delay, elasticity and
     Stribeck."""
-    if j.placed.effect.at_rest:
-        return True
+    if j.placed.effect.at_rest or j.placed.effect.at in PLACES:
+        return True  # what a sling does shows on joints that stand still while others move
     moving = result.moving
     products = moving.products([(c, x[~result.at_rest[c]]) for c, x in j.columns.items()])
     gain = moving.gain(products, j.variant.low, j.variant.high)

@@ -96,6 +96,6 @@ def _projected(problem: Problem, theta: Array, sigma: Array, shape: dict[int, fl
     """Cost and parameters (P,) with some shapes set, the others held, and all amplitudes solved."""
     trial = theta.copy()
     trial[list(shape)] = list(shape.values())
-    low, high = problem.assembly.low, problem.assembly.high
-    moved, cost, _ = project(lambda x: problem.normal(x, sigma), np.clip(trial, low, high), low, high, problem.shapes)
+    trial = np.clip(trial, problem.assembly.low, problem.assembly.high)
+    moved, cost, _ = project(problem.objective(sigma), trial, problem.shapes)
     return cost, moved

@@ -1,11 +1,15 @@
 """What an effect is: named parameters and one CasADi law, shared by fit, simulation and FMU.
 
 An effect is one file in ``models/effects`` that ends in ``EFFECT = Effect(...)``. Its law is written once, for one
-place (a joint, a link, a sensor channel) and one instant, in CasADi symbols:
+place (a joint, a link, a sling, a sensor channel) and one instant, in CasADi symbols:
 
 - ``at="joint"``: the torque [N·m or N] that the drive must supply on top of the rigid body's.
 - ``at="link"``: the link's ten inertial parameters about its own frame, changed.
 - ``at="sensor"``: what the channel reads, given the true value.
+- On a suspension rig: ``at="sling"``, the wrench (6,) on the arm at the sling's hang point, force [N] and moment [N·m]
+  in the world frame; ``at="slide"``, the friction force [N] at the slides that a joint moves; ``at="boom"``, for
+  torsion and for bending of a link (2,), the upward force per lever [N/m] on the slings beyond it. The rig's geometry
+  takes each to the torque of every joint.
 
 Hidden state (a spring's twist, a delayed signal) is a system of ordinary differential equations: ``states`` names it,
 ``rate`` is its right-hand side, and the law may read it.
@@ -68,8 +72,8 @@ class Effect:
         The vocabulary's word; also the file's name.
     family : str
         Heading of the vocabulary it stands under.
-    at : "joint", "link" or "sensor"
-        Where it acts.
+    at : "joint", "link", "sensor", "sling", "slide" or "boom"
+        Where it acts; a slide goes by the name of its joint, a boom by that of its link.
     sentence : str
         What a test engineer would say: "friction that does not depend on speed".
     equation, source : str
@@ -83,7 +87,9 @@ class Effect:
         ``speed_scale`` [S/s] the joint's peak speed in the recordings that the model was fitted to, saved with the
         model. Link: ``s["phi"]``, 10 numbers (m, m·cx, m·cy, m·cz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz) about the link's
         frame, and ``s["tip"]``, 3 numbers [m]: the next joint's origin, or the centre of mass of a last link;
-        returns 10. Sensor: ``value`` (true value), ``time``, and the joint signals of its joint.
+        returns 10. Sensor: ``value`` (true value), ``time``, and the joint signals of its joint. Sling: ``velocity``
+        (3 numbers [m/s], of the hang point), ``weight`` and ``tension`` [N] in balance, ``time``. Slide: the signals of
+        its joint. Boom: ``spread``, the sum of squared levers of the slings beyond it [m²], in torsion and in bending.
         A state is read as ``s[state_name]``.
     states : tuple of str
         Names of hidden states, all starting at rest (zero rate).
@@ -106,7 +112,7 @@ class Effect:
 
     name: str
     family: str
-    at: Literal["joint", "link", "sensor"]
+    at: Literal["joint", "link", "sensor", "sling", "slide", "boom"]
     sentence: str
     equation: str
     source: str

@@ -36,6 +36,9 @@ class FloatingArm:
         False: the base stands still in the world.
     as_published : bool
         True keeps an inertia that no body can have, if a publication gives one; `projected` mends it.
+    mount : pair of arrays (3, 3), (3,), or None
+        Rotation and translation in the base's frame of a frame that is fixed there, where something else pulls at the
+        base [–, m].
 
     Raises
     ------
@@ -51,6 +54,7 @@ class FloatingArm:
     tip_translation: Array = field(default_factory=lambda: np.zeros(3))
     floating: bool = True
     as_published: bool = False
+    mount: tuple[Array, Array] | None = None
 
     def __post_init__(self) -> None:
         """Refuse what would fall, or what no body is."""

@@ -7,8 +7,9 @@ accelerations come from the rest of the equations of motion (`floating_symbols`)
     (H_m - H_bm^T H_b^-1 H_bm + B) qdd = tau - c_m + J_m^T f - H_bm^T H_b^-1 (J_b^T f - c_b)
 
 tau is the motor's torque less what the effects take, B what they take per acceleration (a rotor's inertia), and f the
-wrench at the tip. Everything is one CasADi expression, run in C: Drake calls a force written in Python so slowly
-(about 0.5 ms) that friction from the registry would cost a hundred times the arm. Drake is the check.
+wrench at the tip. Another wrench may act at the arm's mount, a frame fixed to the base: it adds to the base's rows.
+Everything is one CasADi expression, run in C: Drake calls a force written in Python so slowly (about 0.5 ms) that
+friction from the registry would cost a hundred times the arm. Drake is the check.
 """
 
 from collections.abc import Mapping
@@ -41,6 +42,8 @@ class Observed:
         Of the base frame's origin [m/s, rad/s].
     tip_position, tip_quaternion : array (n, 3), (n, 4)
     tip_twist : array (n, 6)
+    mount_position, mount_quaternion, mount_twist : array (n, 3), (n, 4), (n, 6)
+        Of the arm's mount; of the base's frame where it has none.
     momentum : array (n, 6)
         Linear [N·s], and angular about the world's origin [N·m·s].
     energy : array (n,)
@@ -53,6 +56,9 @@ class Observed:
     tip_position: Array
     tip_quaternion: Array
     tip_twist: Array
+    mount_position: Array
+    mount_quaternion: Array
+    mount_twist: Array
     momentum: Array
     energy: Array
 
@@ -61,8 +67,9 @@ class FloatingMotion:
     """Equations of motion of an arm and the steps that follow them.
 
     Inputs (6 + J,): wrench at the tip in the world frame [N, N·m], then the servo's target [rad or m]; held, or moving
-    along a parabola. State: base position, quaternion, linear and angular momentum (13, on
-    a floating base only), then q, qd, and the effects' hidden states.
+    along a parabola. An arm with a mount has six more, the wrench there about the mount's origin, behind the tip's.
+    State: base position, quaternion, linear and angular momentum (13, on a floating base only), then q, qd, and the
+    effects' hidden states.
 
     Parameters
     ----------
@@ -80,7 +87,8 @@ class FloatingMotion:
         self.n_base = _BASE_STATES if arm.floating else 0
         n_joints = arm.n_joints
         self.n_states = self.n_base + 2 * n_joints + self._law.n_states
-        self.n_inputs = 6 + n_joints
+        self.n_wrenches = 6 if arm.mount is None else 12
+        self.n_inputs = self.n_wrenches + n_joints
         self._n_held = 1 + 3 * self.n_inputs + 1 + len(self._law.start)
         time, x, u = ca.SX.sym("t"), ca.SX.sym("x", self.n_states), ca.SX.sym("u", self._n_held)
         rate, observed = self._equations(time, x, u)
@@ -146,9 +154,9 @@ class FloatingMotion:
 
         Parameters
         ----------
-        inputs : array (6 + J,) or None
-            Wrench and target at ``time``; None: zero.
-        rates : array (2, 6 + J) or None
+        inputs : array (n_inputs,) or None
+            Wrenches and target at ``time``; None: zero.
+        rates : array (2, n_inputs) or None
             Their first and second derivatives by time; None: zero.
         servo : bool
             False turns the motors off: only the effects act in the joints.
@@ -164,8 +172,8 @@ class FloatingMotion:
                 array = np.ravel(given)
                 if array.size != place.stop - place.start:
                     raise InputError(
-                        f"{self.arm.tree.name}: {array.size} {name} given; give {place.stop - place.start}: 6 of the "
-                        "wrench, then the joints' targets"
+                        f"{self.arm.tree.name}: {array.size} {name} given; give {place.stop - place.start}: "
+                        f"{self.n_wrenches} of the wrench, then the joints' targets"
                     )
                 held[place] = array
         held[1 + 3 * n] = float(servo)
@@ -175,7 +183,7 @@ class FloatingMotion:
     def observe(self, states: Array) -> Observed:
         """What shows at states (n, n_states)."""
         rows = self._observed(np.atleast_2d(states))[0][:, :, 0]
-        parts = np.split(rows, np.cumsum([3, 4, 6, 3, 4, 6, 6]), axis=1)
+        parts = np.split(rows, np.cumsum([3, 4, 6, 3, 4, 6, 3, 4, 6, 6]), axis=1)
         parts[-1] = parts[-1][:, 0]
         return Observed(*parts)
 
@@ -199,8 +207,9 @@ class FloatingMotion:
         q, qd, hidden = joints[:n_joints], joints[n_joints : 2 * n_joints], joints[2 * n_joints :]
         passed, n = time - u[0], self.n_inputs
         now = u[1 : 1 + n] + passed * (u[1 + n : 1 + 2 * n] + 0.5 * passed * u[1 + 2 * n : 1 + 3 * n])
-        wrench, target, on, values = now[:6], now[6:], u[1 + 3 * n], u[2 + 3 * n :]
+        wrench, target, on, values = now[:6], now[self.n_wrenches :], u[1 + 3 * n], u[2 + 3 * n :]
         whole, tip = symbols.inertia(arm, q), symbols.tip(arm, q)
+        mount_turn, mount_place = (ca.DM(part) for part in arm.mount or (np.eye(3), np.zeros(3)))
         h_b, h_bm, h_m = whole[:6, :6], whole[:6, 6:], whole[6:, 6:]
         if arm.floating:
             position, quaternion, linear, angular = x[:3], x[3:7], x[7:10], x[10:13]
@@ -214,11 +223,13 @@ class FloatingMotion:
             twist = ca.SX(6, 1)
         bias = symbols.bias(arm, q, twist, qd, ca.SX(ca.DM(arm.tree.gravity)))
         taken = self._law.expression(time, q, qd, hidden, ca.diag(h_m), target, on, values)
-        force = ca.vertcat(rotation.T @ wrench[:3], rotation.T @ wrench[3:])
+        force = _turned(rotation.T, wrench)
         pull = taken.torque - bias[6:] + tip.by_joints.T @ force
         matrix = h_m + ca.diag(taken.inertia)
         if arm.floating:
-            pull -= half.T @ ca.solve(root, tip.by_base.T @ force - bias[:6])
+            at_mount = now[6:12] if arm.mount else ca.SX(6, 1)
+            on_base = tip.by_base.T @ force + symbols.by_base(mount_place).T @ _turned(rotation.T, at_mount)
+            pull -= half.T @ ca.solve(root, on_base - bias[:6])
             matrix -= half.T @ half
         lower = ca.chol(matrix).T
         qdd = ca.solve(lower.T, ca.solve(lower, pull))
@@ -226,7 +237,9 @@ class FloatingMotion:
         place = position + rotation @ tip.translation
         if arm.floating:
             moment = ca.cross(place, wrench[:3]) + wrench[3:]
-            base = [rotation @ twist[:3], symbols.quaternion_rate(quaternion, twist[3:]), wrench[:3], moment]
+            moment += ca.cross(position + rotation @ mount_place, at_mount[:3]) + at_mount[3:]
+            pushed = wrench[:3] + at_mount[:3]
+            base = [rotation @ twist[:3], symbols.quaternion_rate(quaternion, twist[3:]), pushed, moment]
             rates = [*base, *rates]
         tip_twist = tip.by_base @ twist + tip.by_joints @ qd
         moving = ca.vertcat(twist, qd)
@@ -239,6 +252,9 @@ class FloatingMotion:
             place,
             symbols.quaternion_of(rotation @ tip.rotation),
             _turned(rotation, tip_twist),
+            position + rotation @ mount_place,
+            symbols.quaternion_of(rotation @ mount_turn),
+            _turned(rotation, symbols.by_base(mount_place) @ twist),
             total_linear,
             rotation @ inside[3:] + ca.cross(position, total_linear),
             0.5 * ca.dot(moving, whole @ moving),

@@ -73,8 +73,12 @@ def tip(arm: FloatingArm, q: ca.SX) -> Tip:
         by_turning = ca.vertcat(ca.cross(axis, point - frames[i][1]), axis)
         columns[i] = by_turning if joint.kind == "revolute" else ca.vertcat(axis, none)
         i = joint.parent
-    by_base = ca.blockcat([[ca.SX.eye(3), -ca.skew(point)], [ca.SX(3, 3), ca.SX.eye(3)]])
-    return Tip(turned @ ca.DM(arm.tip_rotation), point, by_base, ca.horzcat(*columns))
+    return Tip(turned @ ca.DM(arm.tip_rotation), point, by_base(point), ca.horzcat(*columns))
+
+
+def by_base(point: ca.SX | ca.DM) -> ca.SX:
+    """Twist (6, 6) of a point (3,) per twist of the base that carries it."""
+    return ca.blockcat([[ca.SX.eye(3), -ca.skew(ca.SX(point))], [ca.SX(3, 3), ca.SX.eye(3)]])
 
 
 def inertia(arm: FloatingArm, q: ca.SX) -> ca.SX:

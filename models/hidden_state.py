@@ -33,9 +33,16 @@ _GAMMA = 1 - np.sqrt(0.5)
 _JOINT = dict.fromkeys(("q", "qd", "qdd", "load", "inertia", "time", "temperature", "speed_scale"), 1)
 
 #: Signals that a law may read, by place, and how many numbers each has.
-SIGNALS = {"joint": _JOINT, "link": {"phi": 10, "tip": 3}, "sensor": {"value": 1, **_JOINT}}
+SIGNALS = {
+    "joint": _JOINT,
+    "link": {"phi": 10, "tip": 3},
+    "sensor": {"value": 1, **_JOINT},
+    "sling": {"velocity": 3, "weight": 1, "tension": 1, "time": 1},
+    "slide": _JOINT,
+    "boom": {"spread": 2, "time": 1},
+}
 
-#: The signal, by place, that itself depends on the model's parameters.
+#: The signal, by place, that itself depends on the model's parameters; none on a rig's slings, slides and booms.
 THROUGH = {"joint": "load", "link": "phi", "sensor": "value"}
 
 
@@ -133,6 +140,21 @@ def evaluate_law(
     return Evaluation(values[:, :, 0], by_parameter, by_signal[0] if by_signal else None)
 
 
+@cache
+def rows(effect: Effect) -> tuple[int, ...]:
+    """Which of the numbers that a law gives can be other than zero."""
+    law = _symbols(effect).law
+    return tuple(i for i in range(law.numel()) if not law[i].is_zero())
+
+
+@cache
+def reads(effect: Effect) -> tuple[str, ...]:
+    """Signals that a law, or the rate of its states, depends on."""
+    _, _, signals, law, rate = _symbols(effect)
+    read = ca.vertcat(law, rate)
+    return tuple(name for name, u in signals.items() if any(ca.which_depends(read, u, 1, False)))
+
+
 def prepare(effects: Iterable[Effect]) -> None:
     """Compile effects ahead of their first use, several at a time; what is in the cache already costs milliseconds."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
@@ -158,22 +180,33 @@ def _carried(effect: Effect, built: _Built, signals: list[np.ndarray], p: np.nda
     return built.step.scan(start, *here, *later, np.append(p, dt))
 
 
-@cache
-def _build(effect: Effect) -> _Built:
+class _Symbols(NamedTuple):
+    p: ca.SX
+    x: ca.SX
+    signals: dict[str, ca.SX]
+    law: ca.SX
+    rate: ca.SX
+
+
+def _symbols(effect: Effect) -> _Symbols:
     p = ca.SX.sym("p", len(effect.parameters))
     x = ca.SX.sym("x", len(effect.states))
-    sensitivity = ca.SX.sym("S", x.numel(), p.numel())
-    all_signals = {name: ca.SX.sym(name, size) for name, size in SIGNALS[effect.at].items()}
+    signals = {name: ca.SX.sym(name, size) for name, size in SIGNALS[effect.at].items()}
     named = dict(zip((parameter.name for parameter in effect.parameters), ca.vertsplit(p), strict=True))
-    s = all_signals | dict(zip(effect.states, ca.vertsplit(x) if effect.states else [], strict=True))
+    s = signals | dict(zip(effect.states, ca.vertsplit(x) if effect.states else [], strict=True))
     law = ca.vertcat(effect.law(s, named))
-    rate = ca.vertcat(*effect.rate(s, named)) if effect.rate else ca.SX(0, 1)
-    read = ca.vertcat(law, rate)
-    signals = {name: u for name, u in all_signals.items() if any(ca.which_depends(read, u, 1, False))}
+    return _Symbols(p, x, signals, law, ca.vertcat(*effect.rate(s, named)) if effect.rate else ca.SX(0, 1))
+
+
+@cache
+def _build(effect: Effect) -> _Built:
+    p, x, all_signals, law, rate = _symbols(effect)
+    sensitivity = ca.SX.sym("S", x.numel(), p.numel())
+    signals = {name: all_signals[name] for name in reads(effect)}
     names, u = tuple(signals), list(signals.values())
-    through = all_signals[THROUGH[effect.at]]
+    through = all_signals.get(THROUGH.get(effect.at, ""))
     outputs = [law, ca.jacobian(law, p) + ca.jacobian(law, x) @ sensitivity]
-    if any(ca.which_depends(law, through, 1, False)):
+    if through is not None and any(ca.which_depends(law, through, 1, False)):
         outputs.append(ca.jacobian(law, through))
     law_function = _compiled(effect, "law", [*u, _stacked(x, sensitivity), p], outputs, [*names, "states", "p"])
     if not effect.states:
@@ -208,7 +241,9 @@ def _stacked(x: ca.SX, sensitivity: ca.SX) -> ca.SX:
 
 def _compiled(effect: Effect, what: str, inputs: list[ca.SX], outputs: list[ca.SX], names: list[str]) -> SampleFunction:
     results = [f"out{i}" for i in range(len(outputs))]
-    return SampleFunction(ca.Function(f"{effect.name}_{what}", inputs, ca.cse(outputs), names, results))
+    # A link's law runs on one sample, a step from one to the next; the others on thousands side by side.
+    lanes = what == "law" and effect.at != "link"
+    return SampleFunction(ca.Function(f"{effect.name}_{what}", inputs, ca.cse(outputs), names, results), lanes=lanes)
 
 
 def _steady_state(effect: Effect, built: _Built, first: list[np.ndarray], p: np.ndarray) -> np.ndarray:

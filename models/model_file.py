@@ -16,18 +16,22 @@ from ..errors import InputError
 from ..recordings.signals import FORMS, Signal, is_signal, joint_of
 from .effect import Effect
 from .effects import get_effect
+from .hidden_state import rows
+from .rig import Rig, built_in_rig
+from .rig_file import read_slings, sling_table
+from .rig_kinematics import booms, reached_joints, slides
 from .tree import Tree
 from .urdf import load_urdf
 
-SYSTEMS = ("arm",)
-"""Systems that this version can fit; the format reserves zero_g_rig, free_floating_arm and snare_capture."""
+SYSTEMS = ("arm", "zero_g_rig")
+"""Systems that this version can fit; the format reserves free_floating_arm and snare_capture."""
 
-_KEYS = ("name", "system", "urdf", "gravity", "inertia", "effects", "signals", "bandwidth", "parameters")
+_KEYS = ("name", "system", "urdf", "gravity", "inertia", "effects", "slings", "signals", "bandwidth", "parameters")
 
 
 @dataclass(frozen=True)
 class Placed:
-    """An effect and the one place it acts at: a joint, a link, or a sensor channel such as ``tau.joint1``.
+    """An effect and the one place it acts at: a joint, a link, a sling, or a sensor channel such as ``tau.joint1``.
 
     Parameters named in ``hold`` are not identified: the recordings did not ask for them, or another effect carries
     them.
@@ -52,9 +56,10 @@ class Model:
     path : Path
         The file.
     name, system : str
-    urdf : Path
+    urdf : Path or None
+        None for the built-in rig.
     tree : Tree
-        Joints, links, nominal inertia and gravity.
+        Joints, links, nominal inertia and gravity; a `Rig` for ``zero_g_rig``, with its slings.
     inertia : "fixed" or "free"
     effects : tuple of Placed
         Physics that the model has, one entry a place.
@@ -69,7 +74,7 @@ class Model:
     path: Path
     name: str
     system: str
-    urdf: Path
+    urdf: Path | None
     tree: Tree
     inertia: str
     effects: tuple[Placed, ...]
@@ -88,11 +93,16 @@ class Model:
 
 
 def places(effect: Effect, tree: Tree) -> tuple[str, ...]:
-    """Every place of a tree at which an effect can act; sensor effects act on torque channels by default."""
+    """Places of a tree at which an effect can act on some torque; sensor effects act on torque channels by default."""
     if effect.at == "joint":
         return tuple(j.name for j in tree.joints)
     if effect.at == "link":
         return tuple(link.name for link in tree.links)
+    if effect.at != "sensor":
+        if not isinstance(tree, Rig):
+            return ()
+        every = {"sling": tuple(s.name for s in tree.slings), "slide": slides(tree), "boom": booms(tree)}[effect.at]
+        return tuple(at for at in every if reached_joints(tree, effect.at, at, rows(effect)))
     return tuple(f"tau.{j.name}" for j in tree.joints)
 
 
@@ -121,8 +131,6 @@ def load_model(path: str | Path) -> Model:
     system = _text(path, raw, "system", "arm")
     if system not in SYSTEMS:
         raise InputError(f"{path}: system {system!r} cannot be fitted by this version; allowed: {', '.join(SYSTEMS)}")
-    if "urdf" not in raw:
-        raise InputError(f"{path}: key 'urdf' is missing; name the URDF, relative to this file")
     inertia = _text(path, raw, "inertia", "fixed")
     if inertia not in ("fixed", "free"):
         raise InputError(f"{path}: inertia = {inertia!r}; allowed are 'fixed' and 'free'")
@@ -131,8 +139,8 @@ def load_model(path: str | Path) -> Model:
     number = isinstance(bandwidth, int | float) and not isinstance(bandwidth, bool)
     if bandwidth is not None and not (number and 0 < bandwidth < np.inf):
         raise InputError(f"{path}: bandwidth = {bandwidth!r}; allowed is a positive number of hertz")
-    urdf = path.parent / _text(path, raw, "urdf", "")
-    tree = load_urdf(urdf, tuple(gravity))
+    urdf = path.parent / _text(path, raw, "urdf", "") if "urdf" in raw else None
+    tree = _tree(path, raw, system, urdf, gravity)
     return Model(
         path,
         _text(path, raw, "name", path.stem),
@@ -147,6 +155,22 @@ def load_model(path: str | Path) -> Model:
     )
 
 
+def _tree(path: Path, raw: Mapping[str, Any], system: str, urdf: Path | None, gravity: Sequence[float]) -> Tree:
+    """The arm of a model file, on its slings where the system is a rig."""
+    if "slings" in raw and (system != "zero_g_rig" or urdf is None):
+        raise InputError(f"{path}: [slings] belong to system = 'zero_g_rig' with a URDF of your own; take them out")
+    if urdf is not None:
+        tree = load_urdf(urdf, tuple(gravity))
+        if system != "zero_g_rig":
+            return tree
+    elif system != "zero_g_rig":
+        raise InputError(f"{path}: key 'urdf' is missing; name the URDF, relative to this file")
+    try:
+        return built_in_rig(gravity) if urdf is None else read_slings(path, raw.get("slings"), tree)
+    except InputError as error:
+        raise InputError(str(error) if str(error).startswith(str(path)) else f"{path}: {error}") from None
+
+
 def save_model(model: Model, path: str | Path, note: str) -> None:
     """Write a model file that `load_model` reads back, all or nothing.
 
@@ -154,7 +178,6 @@ def save_model(model: Model, path: str | Path, note: str) -> None:
     does not.
     """
     path = Path(path)
-    urdf = os.path.relpath(model.urdf, path.parent)
     by_name: dict[str, list[Placed]] = {}
     for placed in model.effects:
         by_name.setdefault(placed.effect.name, []).append(placed)
@@ -171,7 +194,7 @@ def save_model(model: Model, path: str | Path, note: str) -> None:
     lines += [
         f"name = {_toml(model.name)}",
         f"system = {_toml(model.system)}",
-        f"urdf = {_toml(Path(urdf).as_posix())}",
+        *([] if model.urdf is None else [f"urdf = {_toml(Path(os.path.relpath(model.urdf, path.parent)).as_posix())}"]),
         f"gravity = {_toml([float(g) for g in model.tree.gravity])}",
         f"inertia = {_toml(model.inertia)}",
         "effects = [",
@@ -180,6 +203,10 @@ def save_model(model: Model, path: str | Path, note: str) -> None:
     ]
     if model.bandwidth is not None:
         lines.append(f"bandwidth = {_toml(model.bandwidth)}")
+    if isinstance(model.tree, Rig) and model.urdf is not None:
+        lines += ["", "[slings]"]
+        for name, fields in sling_table(model.tree).items():
+            lines.append(f"{_toml(name)} = {{ {', '.join(f'{k} = {_toml(v)}' for k, v in fields.items())} }}")
     if model.signals:
         lines += ["", "[signals]"]
         for name, signal in model.signals.items():
@@ -235,6 +262,8 @@ def _placed(path: Path, entries: Any, tree: Tree) -> tuple[Placed, ...]:
         except InputError as error:
             raise InputError(f"{path}: {error}") from None
         everywhere = places(effect, tree)
+        if not everywhere:
+            raise InputError(f"{path}: {name} acts at a {effect.at}, and this model has none; take it out")
         extra = set(entry) - {"name", "at", "hold"} if isinstance(entry, dict) else set()
         if extra:
             raise InputError(f"{path}: effects: {name} has {sorted(extra)[0]!r}; allowed are name, at, hold")
@@ -267,6 +296,9 @@ def _signals(path: Path, table: Any, tree: Tree) -> dict[str, Signal]:
         joint = joint_of(name)
         if joint is not None and joint not in joints:
             raise InputError(f"{path}: {name!r} in [signals]: the URDF has no such joint, only {', '.join(joints)}")
+        slings = [f"tension.{s.name}" for s in tree.slings] if isinstance(tree, Rig) else [name]
+        if name.startswith("tension.") and name not in slings:
+            raise InputError(f"{path}: {name!r} in [signals]: the rig has no such sling, only {', '.join(slings)}")
         fields = {"column": entry} if isinstance(entry, str) else entry
         if not isinstance(fields, dict) or not isinstance(fields.get("column"), str):
             raise InputError(

@@ -129,6 +129,7 @@ class Recorder:
                 "target": self._target_energy(),
                 "ring": ring_motion(time, p.ring_rate, p.ring_travel, p.ring_ramp)[0],
                 "cables": cables + self._origin,
+                "ends": np.reshape(self._data.GetAECoordinates()[self._ends], (6, 3)),
                 "contacts": self._contacts,
             }
         )

@@ -1,6 +1,7 @@
 """Functions over many samples: shapes, the library cache, and what happens without a compiler."""
 
 import threading
+import warnings
 
 import casadi as ca
 import numpy as np
@@ -124,3 +125,49 @@ def test_sample_functions_check_their_inputs():
     ]:
         with pytest.raises(InputError, match=said):
             function(*inputs)
+
+
+LANES = 128
+
+
+def bumps() -> SampleFunction:
+    """A matrix and a number of a sample and of numbers that all samples share; tanh is the code's own in lanes."""
+    x, shared = ca.SX.sym("x", 2), ca.SX.sym("shared", 2)
+    slope = ca.tanh(x / shared[0])
+    outputs = [slope @ ca.DM([[1, 2, 3]]), shared[1] * x[0]]
+    return SampleFunction(ca.Function("bumps", [x, shared], outputs), lanes=True)
+
+
+@pytest.mark.parametrize("n_samples", [0, 1, LANES - 1, LANES, LANES + 1, 5 * LANES + 7])
+@pytest.mark.parametrize("compiler", ["", "none"])
+def test_side_by_side_is_one_by_one(monkeypatch, compiler, n_samples):
+    monkeypatch.setenv("SNARELAB_CC", compiler)
+    x, shared = np.random.default_rng(1).normal(size=(n_samples, 2)), np.array([0.3, 2.0])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", CompilerNotice)
+        matrix, number = bumps()(x, shared)
+    assert matrix.shape == (n_samples, 2, 3)
+    assert number.shape == (n_samples, 1, 1)
+    np.testing.assert_allclose(matrix, np.tanh(x / 0.3)[:, :, None] * [1.0, 2.0, 3.0], rtol=1e-15, atol=0)
+    np.testing.assert_array_equal(number[:, 0, 0], 2 * x[:, 0])
+    shared_by_sample = np.stack([np.full(n_samples, 0.3), np.arange(float(n_samples))], 1)
+    np.testing.assert_array_equal(bumps()(x, shared_by_sample)[1][:, 0, 0], np.arange(n_samples) * x[:, 0])
+
+
+def test_tanh_of_its_own_is_the_c_librarys_to_rounding():
+    """Within 3 units in the last place from where tanh(x) = x to where it is 1, odd, and NaN where x is."""
+    size = np.concatenate([np.geomspace(1e-300, 800, 20_001), [0.0, 5e-324, 20.0, np.inf]])
+    x = ca.SX.sym("x")
+    function = SampleFunction(ca.Function("curve", [x], [ca.tanh(x)]), lanes=True)
+    found = function(np.concatenate([size, -size])[:, None])[0][:, 0, 0]
+    wanted = np.tanh(size.astype(np.longdouble))
+    error = np.abs(found[: len(size)] - wanted) / np.spacing(np.maximum(wanted.astype(float), 5e-324))
+    assert np.max(error) <= 3
+    np.testing.assert_array_equal(found[len(size) :], -found[: len(size)])
+    assert np.isnan(function(np.full((5, 1), np.nan))[0]).all()
+
+
+def test_a_function_side_by_side_has_no_order_to_scan_in():
+    x = ca.SX.sym("x")
+    with pytest.raises(ValueError, match="side by side"):
+        SampleFunction(ca.Function("f", [x], [2 * x]), lanes=True).scan(np.zeros(1))

@@ -1,5 +1,7 @@
 """From a recording to motion and torques in one band: exact where it says so, and nothing crosses a gap."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -78,6 +80,23 @@ def test_the_band_filter_is_linear_and_treats_every_column_alike():
     np.testing.assert_allclose(motion.to_band(columns @ x), motion.to_band(columns) @ x, atol=1e-12)
     blocks = motion.to_band(columns.reshape(-1, 3, 1))
     np.testing.assert_array_equal(blocks[:, :, 0], motion.to_band(columns))
+
+
+@pytest.mark.parametrize("thinning", [2, 3, 7])
+def test_the_band_filter_is_one_convolution_at_the_kept_samples(thinning):
+    """Its taps are read off the filter itself, from impulses; every length about its own groups of samples is right."""
+    t, rng = clock(), np.random.default_rng(0)
+    motion = condition(recording(t, sine(t, 1.0)[0]), ["joint1"], BAND)
+
+    def filtered(x):
+        return replace(motion, thinning=thinning, segments=(slice(0, len(x)),)).to_band(x)
+
+    taps = filtered(np.eye(8 * thinning + 1))[0]
+    np.testing.assert_allclose(taps, taps[::-1], atol=1e-15)
+    for n in [*range(1, 8 * thinning + 3), *range(40 * thinning, 60 * thinning), 3000]:
+        x = rng.normal(size=n)
+        whole = np.convolve(x, taps, mode="valid") if n >= len(taps) else x[:0]
+        np.testing.assert_allclose(filtered(x), whole[::thinning], atol=1e-14)
 
 
 def test_the_band_filter_passes_the_band_and_stops_what_would_alias():

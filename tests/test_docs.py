@@ -123,7 +123,11 @@ def test_every_field_of_a_diagnosis_is_described():
         "a sentence",
         "",
         "arm3",
-        (Finding("viscous_friction", "joint1", 0.9, {"x_coefficient": Estimate(1.0, 0.1, "1")}, "it is", (rival,)),),
+        (
+            Finding(
+                "viscous_friction", "joint1", 1.0, 0.9, {"x_coefficient": Estimate(1.0, 0.1, "1")}, "it is", (rival,)
+            ),
+        ),
         (Location("tau.joint1", 1.0, ((0.0, 1.0),), "throughout"),),
         (ChannelFit("x_channel", "N*m", misfit, misfit, 0.1),),
         (Step("model as given", 0.1, 0.1),),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.optimize
 
-from snarelab.identification.least_squares import Normal, minimise
+from snarelab.identification.least_squares import Normal, Objective, minimise
 
 INF = np.inf
 reference: Any = scipy.optimize.least_squares
@@ -54,7 +54,9 @@ def decays(rng):
 @pytest.mark.parametrize("start", [(-1.2, 1.0), (3.0, -4.0), (0.0, 0.0), (1.0, 1.0)])
 def test_rosenbrock(start):
     found = minimise(
-        normal(rosenbrock, rosenbrock_jacobian), np.array(start), np.full(2, -INF), np.full(2, INF), max_steps=200
+        Objective(normal(rosenbrock, rosenbrock_jacobian), np.full(2, -INF), np.full(2, INF)),
+        np.array(start),
+        max_steps=200,
     )
     assert found.settled
     np.testing.assert_allclose(found.theta, [1.0, 1.0], atol=1e-6)
@@ -73,7 +75,7 @@ def test_rosenbrock(start):
 def test_rosenbrock_with_active_bounds(low, high):
     low, high = np.array(low), np.array(high)
     evaluate = normal(rosenbrock, rosenbrock_jacobian)
-    found = minimise(evaluate, np.array([5.0, 5.0]), low, high, max_steps=300, tolerance=1e-12)
+    found = minimise(Objective(evaluate, low, high), np.array([5.0, 5.0]), max_steps=300, tolerance=1e-12)
     # Brute force on a grid, then scipy's own polish: a global reference.
     x, y = np.meshgrid(np.linspace(low[0], high[0], 301), np.linspace(low[1], high[1], 301))
     k = np.argmin((10 * (y - x**2)) ** 2 + (1 - x) ** 2)
@@ -91,7 +93,7 @@ def test_rosenbrock_with_active_bounds(low, high):
 def test_exponentials_as_scipy(seed):
     truth, residual, jacobian = decays(np.random.default_rng(seed))
     start, low, high = truth * 1.6, np.zeros(4), np.full(4, 10.0)
-    found = minimise(normal(residual, jacobian), start, low, high, max_steps=200, tolerance=1e-13)
+    found = minimise(Objective(normal(residual, jacobian), low, high), start, max_steps=200, tolerance=1e-13)
     wanted = reference(
         residual, start, jacobian, bounds=(low, high), x_scale="jac", xtol=1e-13, ftol=1e-13, gtol=1e-13, max_nfev=2000
     )
@@ -106,7 +108,7 @@ def test_exponentials_with_a_bound_in_the_way(seed):
     low, high = np.zeros(4), np.array([10.0, 10.0, 0.7 * truth[2], 0.8 * truth[3]])
     start = np.minimum(truth, 0.9 * high)
     evaluate = normal(residual, jacobian)
-    found = minimise(evaluate, start, low, high, max_steps=300, tolerance=1e-13)
+    found = minimise(Objective(evaluate, low, high), start, max_steps=300, tolerance=1e-13)
     wanted = reference(
         residual, start, jacobian, bounds=(low, high), x_scale="jac", xtol=1e-13, ftol=1e-13, gtol=1e-13, max_nfev=5000
     )
@@ -122,7 +124,9 @@ def test_linear_problem_with_bounds_is_scipys_lsq_linear(seed):
     centre = np.linalg.lstsq(a, b, rcond=None)[0]
     width = np.abs(centre) * rng.uniform(0.1, 1.0, 7)
     low, high = centre - width * rng.choice([-0.5, 1.0], 7), centre + 3 * width
-    found = minimise(normal(lambda x: a @ x - b, lambda x: a), rng.normal(size=7), low, high, tolerance=1e-13)
+    found = minimise(
+        Objective(normal(lambda x: a @ x - b, lambda x: a), low, high), rng.normal(size=7), tolerance=1e-13
+    )
     wanted = scipy.optimize.lsq_linear(a, b, (low, high), method="bvls", tol=1e-14)
     assert found.normal.cost == pytest.approx(wanted.cost, rel=1e-7)
     np.testing.assert_allclose(found.theta, wanted.x, rtol=1e-3, atol=1e-4 * np.abs(wanted.x).max())
@@ -131,7 +135,7 @@ def test_linear_problem_with_bounds_is_scipys_lsq_linear(seed):
 def test_an_infeasible_start_is_moved_inside():
     evaluate = normal(rosenbrock, rosenbrock_jacobian)
     low, high = np.array([0.0, 0.0]), np.array([2.0, 2.0])
-    found = minimise(evaluate, np.array([-7.0, 9.0]), low, high, max_steps=200)
+    found = minimise(Objective(evaluate, low, high), np.array([-7.0, 9.0]), max_steps=200)
     np.testing.assert_array_equal(evaluate.seen[0], [0.0, 2.0])
     np.testing.assert_allclose(found.theta, [1.0, 1.0], atol=1e-6)
 
@@ -140,14 +144,15 @@ def test_rounding_never_leads_past_a_bound():
     rng = np.random.default_rng(0)
     for start, high in rng.uniform(0, 1, (500, 2)) * [-1.0, 0.1]:
         evaluate = normal(lambda x: x - 5.0, lambda x: np.ones((1, 1)))
-        found = minimise(evaluate, np.array([start]), np.array([-1.0]), np.array([high]))
+        found = minimise(Objective(evaluate, np.array([-1.0]), np.array([high])), np.array([start]))
         assert max(float(theta[0]) for theta in evaluate.seen) <= high
         assert found.theta[0] == pytest.approx(high, rel=1e-14)
 
 
 def test_a_parameter_pinned_between_equal_bounds_stays_there():
     evaluate = normal(rosenbrock, rosenbrock_jacobian)
-    found = minimise(evaluate, np.array([0.2, 0.0]), np.array([-9.0, 0.49]), np.array([9.0, 0.49]), max_steps=200)
+    objective = Objective(evaluate, np.array([-9.0, 0.49]), np.array([9.0, 0.49]))
+    found = minimise(objective, np.array([0.2, 0.0]), max_steps=200)
     assert all(theta[1] == 0.49 for theta in evaluate.seen)
     one = scipy.optimize.minimize_scalar(lambda x: np.sum(rosenbrock([x, 0.49]) ** 2), bounds=(0, 2), method="bounded")
     assert found.theta[0] == pytest.approx(one.x, abs=1e-4)
@@ -156,7 +161,8 @@ def test_a_parameter_pinned_between_equal_bounds_stays_there():
 def test_parameters_that_the_data_do_not_ask_for_do_no_harm():
     a = np.stack([TIME, TIME, 0 * TIME], 1)  # two alike, one that does nothing
     found = minimise(
-        normal(lambda x: a @ x - 3 * TIME, lambda x: a), np.array([0.0, 0.0, 5.0]), np.full(3, -INF), np.full(3, INF)
+        Objective(normal(lambda x: a @ x - 3 * TIME, lambda x: a), np.full(3, -INF), np.full(3, INF)),
+        np.array([0.0, 0.0, 5.0]),
     )
     assert found.theta[:2].sum() == pytest.approx(3.0, abs=1e-5)
     assert found.theta[2] == 5.0
@@ -171,13 +177,15 @@ def test_where_the_model_cannot_be_evaluated_the_step_is_shortened():
         r, j = np.log(theta) + 1.0, 1 / theta
         return Normal(0.5 * float(r @ r), j * r, np.diag(j**2))
 
-    found = minimise(evaluate, np.array([3.0]), np.full(1, -INF), np.full(1, INF))
+    found = minimise(Objective(evaluate, np.full(1, -INF), np.full(1, INF)), np.array([3.0]))
     assert found.theta[0] == pytest.approx(np.exp(-1.0), abs=1e-6)
 
 
 def test_running_out_of_steps_is_said():
     found = minimise(
-        normal(rosenbrock, rosenbrock_jacobian), np.array([-1.2, 1.0]), np.full(2, -INF), np.full(2, INF), max_steps=8
+        Objective(normal(rosenbrock, rosenbrock_jacobian), np.full(2, -INF), np.full(2, INF)),
+        np.array([-1.2, 1.0]),
+        max_steps=8,
     )
     assert not found.settled
     assert found.steps == 8

@@ -160,7 +160,7 @@ def test_a_mistake_is_named(folder, line, words):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ('system = "zero_g_rig"\nurdf = "arm.urdf"\n', ("'zero_g_rig'", "allowed: arm")),
+        ('system = "snare_capture"\nurdf = "arm.urdf"\n', ("'snare_capture'", "allowed: arm, zero_g_rig")),
         ('system = "arm"\n', ("key 'urdf' is missing",)),
         ("urdf = 3\n", ("urdf = 3", "text in quotes")),
         ('name = 3\nurdf = "arm.urdf"\n', ("name = 3", "text in quotes")),

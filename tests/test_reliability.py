@@ -55,11 +55,11 @@ def test_stored_curve_never_falls_and_is_never_certain():
 def test_bank_goes_on_where_it_stopped(tmp_path):
     path, told = tmp_path / "bank.jsonl", []
     run = partial(run_case, seconds=6.0, holdout=6.0)
-    (first,) = fill(path, 1, 7, 1, run, told.append)
+    (first,) = fill(path, range(1), 7, 1, run, told.append)
     path.write_text(path.read_text() + '{"case": 1, "ki')  # stopped while it wrote
-    both = fill(path, 2, 7, 1, run, told.append)
+    both = fill(path, range(2), 7, 1, run, told.append)
     assert both[0] == first
     assert [r["kind"] for r in both] == ["coulomb_friction", "stribeck_friction"]
     assert [json.loads(line) for line in path.read_text().splitlines()] == both
-    assert fill(path, 2, 7, 1, run, told.append) == both
+    assert fill(path, range(2), 7, 1, run, told.append) == both
     assert len(told) == 2

@@ -96,6 +96,7 @@ def missing_physics() -> Diagnosis:
         Finding(
             "coulomb_friction",
             "joint2",
+            1.0,
             0.994,
             {"level": Estimate(7.0123, 0.0432, "N*m")},
             "Torque steps by 14 N·m wherever joint2 turns round, whatever its speed and position.",
@@ -104,6 +105,7 @@ def missing_physics() -> Diagnosis:
         Finding(
             "stribeck_friction",
             "joint5",
+            0.9,
             0.87,
             {
                 "level": Estimate(2.81, 0.061, "N*m"),
@@ -119,6 +121,7 @@ def missing_physics() -> Diagnosis:
         Finding(
             "joint_elasticity",
             "joint3",
+            0.75,
             0.71,
             {"stiffness": Estimate(5423.0, 61.0, "N*m/rad"), "damping": Estimate(3.2e-5, 4e-6, "N*m*s/rad")},
             "joint3 rings at 7.5 Hz after each acceleration, and the ringing dies out as a spring's would.",

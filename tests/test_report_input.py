@@ -46,7 +46,7 @@ def spelt(text: str) -> Diagnosis:
         sentence=text,
         description=text,
         model=text,
-        effects=(Finding(text, text, 0.9, {text: Estimate(1.0, 0.1, text)}, text, (rival,)),),
+        effects=(Finding(text, text, 0.95, 0.9, {text: Estimate(1.0, 0.1, text)}, text, (rival,)),),
         location=(Location(text, 0.5, ((1.0, 2.0),), text),),
         fit=(ChannelFit(text, text, misfit, misfit, 0.1),),
         steps=(Step(text, 0.5, 0.5), Step(text, 0.05, 0.05)),

@@ -107,7 +107,7 @@ def shot(page: Path, size: tuple[int, int], folder: Path) -> tuple[np.ndarray, s
     target = folder / "shot.png"
     command = [BROWSER or "", *FLAGS.split(), f"--user-data-dir={folder / 'profile'}", f"--screenshot={target}"]
     command += [f"--window-size={size[0]},{size[1]}", page.resolve().as_uri()]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=True)
     said = [s for s in done.stderr.splitlines() if "CONSOLE" in s and "GL Driver Message" not in s]
     return imread(target)[..., :3], "\n".join(said)
 
@@ -146,7 +146,7 @@ def test_page_unpacks_its_playback_in_a_browser(tmp_path: Path, monkeypatch: pyt
     path = write_page("demo", "Test", "It moves.", QUANTITIES, [Section("One", (), [picture()])], moving().html(1.0))
     assert path.stat().st_size < 3e6
     # The browser's virtual time does not wait for the unpacking: a busy timer makes it pass slowly.
-    busy = "<script>setInterval(() => { for (let i = 0; i < 5e6; i++); }, 20)</script></body>"
+    busy = "<script>setInterval(() => { for (let i = 0; i < 2e6; i++); }, 20)</script></body>"
     path.write_text(path.read_text(encoding="utf-8").replace("</body>", busy), encoding="utf-8")
     pixels, said = shot(path, (1000, 1600), tmp_path)
     assert said == ""
