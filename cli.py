@@ -167,9 +167,8 @@ def _parameter_table(result: dict[str, Any]) -> str:
     lines = [f"{'effect':<26}{'at':<16}{'parameter':<24}{'value':>12}{'std':>11}  unit"]
     for p in result["parameters"]:
         flag = "  (at its bound)" if p["at_bound"] else ""
-        lines.append(
-            f"{p['effect']:<26}{p['at']:<16}{p['name']:<24}{p['value']:>12.5g}{p['std']:>11.2g}  {p['unit']}{flag}"
-        )
+        std = "unknown" if p["std"] is None else f"{p['std']:.2g}"
+        lines.append(f"{p['effect']:<26}{p['at']:<16}{p['name']:<24}{p['value']:>12.5g}{std:>11}  {p['unit']}{flag}")
     for channel, fit in result["fit"].items():
         for role in ("train", "holdout"):
             if role in fit:

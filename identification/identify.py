@@ -42,7 +42,7 @@ class Identified:
                 "at": s.at,
                 "name": s.name,
                 "value": float(value),
-                "std": min(float(std), 1e300),  # where it is inf, null says so once the table can print that
+                "std": float(std) if np.isfinite(std) else None,
                 "unit": s.unit,
                 "at_bound": bool(bound),
                 "identifiable": bool(carried),
