@@ -48,17 +48,17 @@ class ImpulseSnareParticipant(SnareParticipant):
             shown += [(f"momentum.{kind}.{axis}", unit, "of cables and floating target") for axis in "xyz"]
         shown += [(f"energy.{name}", "J", "of the snare, since the start where it is lost") for name in _ENERGIES]
         self.variables = (*self.variables, *(Variable(name, "output", unit, 0.0, text) for name, unit, text in shown))
-        self._passed, self._pin = np.zeros(6), np.zeros(6)
+        self._passed, self._pin, self._momentum = np.zeros(6), np.zeros(6), np.zeros(6)
 
     def initialize(self, time: float = 0.0, parameters: Mapping[str, float] | None = None) -> None:
         """As `SnareParticipant.initialize`."""
         super().initialize(time, parameters)
-        self._passed, self._pin = np.zeros(6), np.zeros(6)
+        self._passed, self._pin, self._momentum = np.zeros(6), np.zeros(6), np.zeros(6)
 
     def step(self, time: float, size: float) -> None:
         """Step, and add up what passed."""
         model, pin = self._built(), self._pin
-        before, foot = momentum(model.assembly), model.assembly.pin[0].copy()
+        before, foot = self._momentum, model.assembly.pin[0].copy()
         effector = model.effector_pose().position
         try:
             super().step(time, size)
@@ -67,12 +67,16 @@ class ImpulseSnareParticipant(SnareParticipant):
             raise
         effector = 0.5 * (effector + model.effector_pose().position) - model.origin
         foot = 0.5 * (foot + model.assembly.pin[0])
-        self._passed = self._passed + left_over(momentum(model.assembly) - before, effector, foot, self._pin - pin)
+        self._momentum = momentum(model.assembly)
+        self._passed = self._passed + left_over(self._momentum - before, effector, foot, self._pin - pin)
 
     def _built(self) -> SnareModel:
         """The model; where the pin is moved from outside, its wrench is summed up at each of the model's own steps."""
-        if self._model is None and self._moves_target:
-            model = super()._built()
+        if self._model is not None:
+            return self._model
+        model = super()._built()
+        self._momentum = momentum(model.assembly)
+        if self._moves_target:
             recorder = model._recorder
 
             def after_step(_system: Any, now: float) -> bool:
@@ -83,13 +87,13 @@ class ImpulseSnareParticipant(SnareParticipant):
                 return True
 
             model.assembly.system.SetPostStepUserFunction(after_step)
-        return super()._built()
+        return model
 
     def outputs(self) -> np.ndarray:
         """What `SnareParticipant` shows, then impulses, momentum and energies."""
         model = self._built()
         passed = [self._passed, self._pin] if self._moves_target else [self._passed]
-        total = momentum(model.assembly)
+        total = self._momentum.copy()
         total[3:] += np.cross(model.origin, total[:3])
         return np.concatenate([super().outputs(), *passed, total, _energies(model)])
 
@@ -102,11 +106,11 @@ class ImpulseSnareParticipant(SnareParticipant):
 
     def save(self) -> Any:
         """The model's state, the inputs, and the sums."""
-        return super().save(), self._passed, self._pin
+        return super().save(), self._passed, self._pin, self._momentum
 
     def restore(self, state: Any) -> None:
         """Back to a saved state, bit for bit."""
-        own, self._passed, self._pin = state
+        own, self._passed, self._pin, self._momentum = state
         super().restore(own)
 
 

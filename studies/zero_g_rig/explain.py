@@ -1,0 +1,79 @@
+"""What the paper's own data could not have told apart, and which extra measurement would."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...models.effects import get_effect
+from ...models.model_file import Placed
+from ...models.rig import Rig
+from .alike import Alike, compare
+from .study import Friction
+
+Array = NDArray[np.float64]
+
+NOISE = 0.05
+"""[N·m] Of a torque in the analysis band; the same on all channels, so that it weighs nothing but joints' units."""
+
+TWIST, TENSION, PAYLOAD, DRIFT = "a twisted boom", "tension errors", "a payload", "sensor drift"
+
+TOGETHER = "all of these"
+
+MEASUREMENTS = {
+    "load cells on the slings": TENSION,
+    "the payload weighed": PAYLOAD,
+    "the sensors' zeros checked at the end": DRIFT,
+}
+"""An extra measurement, and the explanation that it settles."""
+
+ALIKE = 0.8
+"""Two explanations are told apart badly where one can take this share of the other's energy."""
+
+
+def explanations(rig: Rig) -> dict[str, list[Placed]]:
+    """Explanations of what is left on joints 2 and 6, each with the parameters that would be free."""
+
+    def placed(name: str, at: str, *free: str) -> Placed:
+        effect = get_effect(name)
+        return Placed(effect, at, tuple(p.name for p in effect.parameters if p.name not in free))
+
+    last = rig.links[-1].name
+    return {
+        TWIST: [placed("link_torsion", "link3", "torque")],
+        TENSION: [placed("sling_tension_error", s.name, "share") for s in rig.slings],
+        PAYLOAD: [placed("payload_mass", last, "mass"), placed("com_offset", last, "x", "y", "z")],
+        DRIFT: [placed("sensor_drift", f"tau.joint{k}", "rate") for k in (2, 6)],
+    }
+
+
+def tell_apart(rig: Rig, friction: Friction) -> list[Alike]:
+    """Every pair of explanations, and what all but the first can do together, with and without each measurement."""
+    named = explanations(rig)
+    others = {name: placed for name, placed in named.items() if name != TWIST}
+    named[TOGETHER] = [p for placed in others.values() for p in placed]
+    for measured, known in MEASUREMENTS.items():
+        named[f"{TOGETHER}, with {measured}"] = [p for name, placed in others.items() if name != known for p in placed]
+    return compare(friction.fit, named, friction.experiments, np.full(rig.n_joints, NOISE))
+
+
+def alike_in_words(pairs: Sequence[Alike]) -> list[str]:
+    """One sentence a pair of single explanations that is hard to tell apart, worst first."""
+    hard = [p for p in pairs if p.mimicked > ALIKE and TOGETHER not in p.name + p.other]
+    return [
+        f"{p.other[0].upper()}{p.other[1:]} can pose as {p.name}: {100 * p.mimicked:.0f} % of its torque, "
+        f"smallest angle {p.angle:.1f} degrees."
+        for p in sorted(hard, key=lambda p: -p.mimicked)
+    ]
+
+
+def remedy(pairs: Sequence[Alike]) -> str:
+    """What torques and joint angles alone could not have settled, and the measurement that would help most."""
+    taken = {p.other: p.mimicked for p in pairs if p.name == TWIST}
+    shares = ", ".join(f"{100 * taken[other]:.0f} % by {other}" for other in (TENSION, PAYLOAD, DRIFT))
+    left = {measured: taken[f"{TOGETHER}, with {measured}"] for measured in MEASUREMENTS}
+    best = min(left, key=lambda measured: left[measured])
+    return (
+        f"From torques and joint angles alone, as the paper had them, {TWIST} can be mimicked to {shares}, and to "
+        f"{100 * taken[TOGETHER]:.0f} % by all of these; what would help most is {best}: then {100 * left[best]:.0f} %."
+    )
