@@ -259,7 +259,7 @@ def test_identify_writes_what_is_asked_and_says_it(folder, capfd):
     out, err = capfd.readouterr()
     assert err == ""
     found = json.loads((folder / "out.json").read_text())
-    keys = {"effect", "at", "name", "value", "std", "unit", "at_bound"}
+    keys = {"effect", "at", "name", "value", "std", "unit", "at_bound", "identifiable"}
     assert [(set(p), p["effect"], p["at"]) for p in found["parameters"]] == [
         (keys, "viscous_friction", "joint1"),
         (keys, "viscous_friction", "joint2"),
