@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 SOURCES := $(shell git ls-files '*.py' '*.toml' '*.urdf' '*.csv' '*.json' 2>/dev/null | grep -v -e '^tests/' -e '^bench/')
-STUDIES := emps free-floating ground-capture zero-g-rig orbit-inspection orbit-hover
+STUDIES := emps free-floating ground-capture zero-g-rig orbit-inspection orbit-hover tolerance
 
 .PHONY: help demo test check bench fmus clean $(STUDIES:%=study-%)
 

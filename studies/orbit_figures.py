@@ -68,14 +68,19 @@ def base_motion(capture: Capture) -> Picture:
 
 def ledgers(capture: Capture, energies: Mapping[str, Array], momentum: Momentum) -> list[Picture]:
     """Energy shares, and the momentum's with the total's change."""
-    colours = (MEASURED, AFTER, BEFORE, SHADE, "#009E73", "#CC79A7", "#E69F00", GREY, "#56616B", "#CC1111")
+    colours = (MEASURED, BEFORE, SHADE, "#009E73", AFTER, "#E69F00", GREY, "#CC79A7", "#CC1111")
+    shown = {"motor and cables' strain": energies["motor"] - energies["cables, strain"]}
+    shown |= {name: values for name, values in energies.items() if name not in ("motor", "cables, strain")}
     with drawing():
         figure, axes = _plain(3.6)
-        for (name, values), colour in zip(energies.items(), colours, strict=True):
-            line(axes, capture.times, 1e3 * values, colour, 2.0 if name == "motor" else 1.1, name)
+        for (name, values), colour in zip(shown.items(), colours, strict=True):
+            line(axes, capture.times, 1e3 * values, colour, 2.0 if colour == MEASURED else 1.1, name)
         axes.set(xlabel="time [s]", ylabel="energy [mJ]")
         axes.legend(ncols=2, loc="upper left", fontsize=7.5)
-        text = "What the ring's motor has put in, and where it is. The residual is what is left unexplained."
+        text = (
+            "What the ring's motor and the cables, which straighten, have handed on, and where it is. The residual is "
+            f"what is left unexplained, {1e3 * np.abs(energies['residual']).max():.2g} mJ at most."
+        )
         pictures = [Picture(svg(figure), "Energies over time", text)]
     with drawing():
         figure, axes = _panels(2, 4.2)
@@ -89,7 +94,10 @@ def ledgers(capture: Capture, energies: Mapping[str, Array], momentum: Momentum)
             share = np.linalg.norm(change[:, row], axis=1) / momentum.scale[row]
             line(axes[1], capture.times, np.maximum(share, 1e-18), colour, 1.0, name)
         axes[0].set(ylabel="linear momentum [N·s]")
-        axes[1].set(ylabel="change of the total [1]", yscale="log")
+        axes[1].set(ylabel="change of the total [1]", yscale="log", ylim=(1e-19, 1e-5))
+        exponents = range(-18, -5, 4)
+        axes[1].set_yticks([10.0**k for k in exponents], [f"1e{k}" for k in exponents])
+        axes[1].minorticks_off()
         for panel in axes:
             panel.legend(loc="upper left")
         text = "Above: x, y and z of what each has. Below: change of the total over what was exchanged at most."
@@ -108,7 +116,7 @@ def passive_map(cells: Sequence[Cell]) -> Picture:
             ("peak_force", "peak [N]", 0),
         )
         for axes, (name, label, bar) in zip(all_axes, shown, strict=True):
-            for stiffness, colour in zip(STIFFNESSES, (AFTER, BEFORE, "#009E73"), strict=True):
+            for stiffness, colour in zip(STIFFNESSES, (AFTER, BEFORE), strict=True):
                 row = [c for c in cells if c.stiffness == stiffness]
                 factor = 1.0 if name == "peak_force" else 1e3
                 values = [factor * getattr(c, name) for c in row]

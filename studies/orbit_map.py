@@ -19,9 +19,9 @@ from .orbit import Passive, Setting, capture_of, co_simulate
 from .orbit_ledger import peak_force
 from .outcome import FOLDER
 
-LEVELS = (3.0, 10.0, 30.0)
+LEVELS = (1.0, 3.0, 10.0, 30.0, 100.0)
 """Coulomb level of each joint [N·m]; Stribeck level and viscous coefficient go with it."""
-STIFFNESSES = (0.0, 300.0, 3000.0)
+STIFFNESSES = (0.0, 3000.0)
 """Of a spring at each joint [N·m/rad]."""
 _STEP = 2e-3
 _MODELS = Path(__file__).parents[1] / "models"

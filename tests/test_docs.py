@@ -25,6 +25,7 @@ from snarelab.identification.diagnosis import (
 )
 from snarelab.models.effects import FAMILIES, effects
 from snarelab.models.model_file import load_model
+from snarelab.tolerance.study import load_study
 
 ROOT = Path(__file__).resolve().parents[1]
 README, DOCS = ROOT / "README.md", ROOT / "docs"
@@ -93,6 +94,11 @@ def test_every_make_target_mentioned_exists():
 @pytest.mark.parametrize(("page", "block"), blocks("toml"))
 def test_every_model_shown_loads(page, block, tmp_path):
     given = tomllib.loads(block)
+    if "capture" in given:
+        study = tmp_path / "study.toml"
+        study.write_text(block, encoding="utf-8")
+        assert set(load_study(study).ranges) == set(given["ranges"])
+        return
     shutil.copy(BUNDLED / "arm3.urdf", tmp_path)
     model = tmp_path / "arm3.toml"
     model.write_text(block if "urdf" in given else f'urdf = "arm3.urdf"\n{block}', encoding="utf-8")

@@ -110,8 +110,9 @@ class ImpulseSnareParticipant(SnareParticipant):
 
     def restore(self, state: Any) -> None:
         """Back to a saved state, bit for bit."""
-        own, self._passed, self._pin, self._momentum = state
-        super().restore(own)
+        own, passed, pin, total = state
+        super().restore(own)  # which may build the model anew
+        self._passed, self._pin, self._momentum = passed, pin, total
 
 
 def _energies(model: Any) -> np.ndarray:

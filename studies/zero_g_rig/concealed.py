@@ -70,7 +70,7 @@ def conceal(kind: str, seed: int) -> Concealed:
     sign = float(rng.choice([-1.0, 1.0]))
     spread = float(rng.uniform(0.8, 1.25))
     if kind == "link_torsion":
-        boom, misfit = 2, sign * 0.003 * spread
+        boom, misfit = 2, sign * 0.0015 * spread
         hung = replace(plant, arm=arm.with_boom(boom, misfit=misfit), suspension=Suspension(height_stiffness=700.0))
         return Concealed(hung, kind, f"link{boom + 1}", misfit, "rad")
     if kind == "sling_tension_error":

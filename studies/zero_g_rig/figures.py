@@ -55,6 +55,7 @@ def errors(joints: Sequence[str], steps: Mapping[str, Array], caption: str) -> P
             )
         axes.set_xticks(np.arange(len(joints)), joints)
         axes.set(ylabel="mean error [N·m]", yscale="log")
+        axes.yaxis.set_major_formatter("{x:g}")
         axes.legend(ncols=3, loc="upper right")
         picture = svg(figure)
     return Picture(picture, "Bars of the mean torque error of each joint under each model.", caption)

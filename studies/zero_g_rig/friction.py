@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 FRICTION = "slide_friction"
 
-BINS = 8
+BINS = 4
 """Of speed, each way, in which the law's misfit is judged."""
 
 
