@@ -114,7 +114,9 @@ def measure(result: Result) -> list[Quantity]:
     peaks = [peak_force(c), peak_force(narrow), *(cell.peak_force for cell in cells)]
     total = result.single_momentum
     own = np.linalg.norm((total - total[0])[:, :3], axis=1).max() / result.momentum.scale[0]
-    residual = np.abs(result.energies["residual"]).max() / np.abs(result.energies["motor"]).max()
+    handed = result.energies["motor"] - result.energies["cables, strain"]
+    residual = np.abs(result.energies["residual"]).max() / np.abs(handed).max()
+    at_ten = c.relative[np.searchsorted(c.times, 10.0 - 1e-9)] if c.times[-1] > 10 else c.relative[-1]
     base = np.linalg.norm(c.base[:, 0] - c.base[0, 0], axis=1).max()
     spin = np.linalg.norm(c.base[:, 2], axis=1).max()
     controlled, chosen = result.controlled, result.controlled_capture
@@ -125,6 +127,8 @@ def measure(result: Result) -> list[Quantity]:
         ),
         Quantity("final_radial_y", "m", float(ends[0, 0]), "predicted", PAPER_Y, *_range(ends[:, 0])),
         Quantity("final_radial_z", "m", float(ends[0, 1]), "predicted", PAPER_Z, *_range(ends[:, 1])),
+        Quantity("radial_y_at_10s", "m", float(at_ten[1]), "predicted", PAPER_Y),
+        Quantity("radial_z_at_10s", "m", float(at_ten[2]), "predicted", PAPER_Z),
         Quantity("peak_force", "N", peaks[0], "reference", None, min(peaks), max(peaks)),
         Quantity("momentum_drift", "1", result.momentum.drift, "reference"),
         Quantity("momentum_drift_one_system", "1", float(own), "reference"),
@@ -151,8 +155,8 @@ def sentence(result: Result) -> str:
     return (
         f"First contact at {_contact(c):.2f} s (paper: about 7 s); the pin ends {y:.1f} and {z:.1f} mm off the axis "
         f"(paper: below 5 and 10 mm). Of the {len(result.cells)} resistances of the joints that were tried, "
-        f"{len(inside)} end inside the paper's figures{_span(inside)}. Co-simulated and as one system, the pin's places "
-        f"differ by {1e6 * position_error(c, result.single):.2g} µm at most."
+        f"{len(inside)} end inside the paper's figures{_span(inside)}. Co-simulated and as one system, the pin's "
+        f"places differ by {1e6 * position_error(c, result.single):.2g} µm at most."
     )
 
 
