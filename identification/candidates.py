@@ -59,6 +59,10 @@ class Variant:
 def library(model: Model) -> list[Placed]:
     """Every effect at every place that the model does not have yet and its kind of inertia leaves room for."""
     have = {p.key for p in model.effects}
+    if f"slide_friction.{model.joints[0]}" in have:
+        # The first joint's slides act on it alone, so that the same law at the joint is the same column.
+        makkar = effects()["makkar_friction"]
+        have |= {f"{name}.{model.joints[0]}" for name in (makkar.name, *makkar.contains)}
     found = []
     for effect in effects().values():
         if effect.at == "link" and model.inertia == "free":

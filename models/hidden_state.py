@@ -29,6 +29,7 @@ from ..errors import InputError
 from .compiled import SampleFunction
 from .effect import Effect
 
+_MOST_NEWTON, _MOST_HALVINGS = 200, 40
 _GAMMA = 1 - np.sqrt(0.5)
 _JOINT = dict.fromkeys(("q", "qd", "qdd", "load", "inertia", "time", "temperature", "speed_scale"), 1)
 
@@ -247,15 +248,29 @@ def _compiled(effect: Effect, what: str, inputs: list[ca.SX], outputs: list[ca.S
 
 
 def _steady_state(effect: Effect, built: _Built, first: list[np.ndarray], p: np.ndarray) -> np.ndarray:
-    """States with zero rate, by Newton's method from zero, and their sensitivities, stacked as the step wants them."""
-    assert built.rate is not None
+    """States with zero rate and their sensitivities, stacked as the step wants them.
+
+    Newton's method from zero, each step halved until the rate falls: a dead band's corners throw full steps to and fro.
+    """
+    evaluate = built.rate
+    assert evaluate is not None
+
+    def at(x: np.ndarray) -> list[np.ndarray]:
+        return [output[0] for output in evaluate(*first, x, p)]
+
     x = np.zeros(len(effect.states))
-    for _ in range(50):
-        rate, by_state, by_parameter = (output[0] for output in built.rate(*first, x, p))
+    rate, by_state, by_parameter = at(x)
+    for _ in range(_MOST_NEWTON):
         try:
             change = np.linalg.solve(by_state, -rate[:, 0])
         except np.linalg.LinAlgError:
             break
+        before = np.linalg.norm(rate)
+        for _ in range(_MOST_HALVINGS):
+            rate, by_state, by_parameter = at(x + change)
+            if np.linalg.norm(rate) < before:
+                break
+            change = 0.5 * change
         x = x + change
         if np.all(np.abs(change) <= 1e-12 * (1e-300 + np.abs(x))) or not np.any(change):
             return np.concatenate([x, np.linalg.solve(by_state, -by_parameter).ravel()])

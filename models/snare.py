@@ -206,6 +206,14 @@ class SnareModel:
         """Force and moment [N, N·m] on the pin about its foot, and on the end effector about its origin; each (6,)."""
         return self._recorder.pin_wrench.copy(), self._recorder.effector_wrench.copy()
 
+    def pin_impulse(self) -> np.ndarray:
+        """Impulse of the cables on the pin since the start, and its moment about the foot (6,) [N·s, N·m·s]."""
+        return self._recorder.pin_impulse
+
+    def energies(self) -> dict[str, float]:
+        """What `SnareHistory` calls energies, now [J]."""
+        return self._recorder.energies()
+
     @property
     def ring_angle(self) -> float:
         """How far the ring has turned [rad]."""

@@ -12,7 +12,8 @@ from .snare_forces import measure
 from .snare_history import SnareHistory
 
 _IMPULSE = slice(0, 3)
-_RING_WORK, _DAMPED, _FRICTION, _TIME = 3, 4, 5, 6
+_RING_WORK, _DAMPED, _FRICTION = 3, 4, 5
+_PIN_IMPULSE, _TIME = slice(6, 12), 12
 
 
 class Recorder:
@@ -39,8 +40,8 @@ class Recorder:
         self.pin_wrench = np.zeros(6)
         self.effector_wrench = np.zeros(6)
         self._energies = np.zeros(7)
-        self._rates = np.zeros(6)  # time derivatives of the first six totals
-        self._totals = np.zeros(7)
+        self._rates = np.zeros(12)  # time derivatives of the totals before the time
+        self._totals = np.zeros(13)
         self._contacts = np.zeros((0, 6))
         self.first_contact: float | None = None
         self.clear()
@@ -57,7 +58,7 @@ class Recorder:
             return
         before = self._rates
         self._read(time)
-        self._totals[:6] += 0.5 * step * (before + self._rates)
+        self._totals[:_TIME] += 0.5 * step * (before + self._rates)
         self._totals[_TIME] = time
         if len(self._contacts) and self.first_contact is None:
             self.first_contact = time
@@ -79,6 +80,7 @@ class Recorder:
                 work,
                 self._energies[3] + self._energies[4] + self._energies[5],
                 self._energies[6],
+                *self.pin_wrench,
             ]
         )
 
@@ -89,6 +91,24 @@ class Recorder:
         ends = nodes[:, [0, -1], 0].reshape(6, 3)
         a.ends_at(time)
         return float(np.max(np.abs(ends - a.ends)))
+
+    @property
+    def pin_impulse(self) -> np.ndarray:
+        """Of the cables on the pin since the start, and its moment about the pin's foot (6,) [N·s, N·m·s]."""
+        return self._totals[_PIN_IMPULSE].copy()
+
+    def energies(self) -> dict[str, float]:
+        """What `SnareHistory` calls energies, now [J]."""
+        totals, now = self._totals, self._energies
+        return {
+            "ring_work": float(totals[_RING_WORK]),
+            "strain": float(now[STRAIN]),
+            "kinetic": float(now[KINETIC]),
+            "overlap": float(now[OVERLAP]),
+            "target": self._target_energy(),
+            "damped": float(totals[_DAMPED]),
+            "friction": float(totals[_FRICTION]),
+        }
 
     @property
     def overlap(self) -> float:

@@ -16,10 +16,8 @@ from typing import Any
 import numpy as np
 
 from ...models.snare import SnareModel
-from ...models.snare_energy import KINETIC, OVERLAP, STRAIN
 from ...models.snare_momentum import left_over, momentum
-from ...models.snare_recorder import _TIME
-from ..participant import StepError, Variable
+from ..participant import Variable
 from .snare import SnareParticipant
 
 _ENERGIES = ("ring_work", "strain", "kinetic", "overlap", "target", "damped", "friction")
@@ -48,54 +46,39 @@ class ImpulseSnareParticipant(SnareParticipant):
             shown += [(f"momentum.{kind}.{axis}", unit, "of cables and floating target") for axis in "xyz"]
         shown += [(f"energy.{name}", "J", "of the snare, since the start where it is lost") for name in _ENERGIES]
         self.variables = (*self.variables, *(Variable(name, "output", unit, 0.0, text) for name, unit, text in shown))
-        self._passed, self._pin, self._momentum = np.zeros(6), np.zeros(6), np.zeros(6)
+        self._passed, self._momentum = np.zeros(6), np.zeros(6)
 
     def initialize(self, time: float = 0.0, parameters: Mapping[str, float] | None = None) -> None:
         """As `SnareParticipant.initialize`."""
         super().initialize(time, parameters)
-        self._passed, self._pin, self._momentum = np.zeros(6), np.zeros(6), np.zeros(6)
+        self._passed, self._momentum = np.zeros(6), np.zeros(6)
 
     def step(self, time: float, size: float) -> None:
         """Step, and add up what passed."""
-        model, pin = self._built(), self._pin
-        before, foot = self._momentum, model.assembly.pin[0].copy()
+        model = self._built()
+        before, pin, foot = self._momentum, model.pin_impulse(), model.assembly.pin[0].copy()
         effector = model.effector_pose().position
-        try:
-            super().step(time, size)
-        except StepError:
-            self._pin = pin
-            raise
+        super().step(time, size)
         effector = 0.5 * (effector + model.effector_pose().position) - model.origin
         foot = 0.5 * (foot + model.assembly.pin[0])
+        on_pin = model.pin_impulse() - pin if self._moves_target else np.zeros(6)
         self._momentum = momentum(model.assembly)
-        self._passed = self._passed + left_over(self._momentum - before, effector, foot, self._pin - pin)
+        self._passed = self._passed + left_over(self._momentum - before, effector, foot, on_pin)
 
     def _built(self) -> SnareModel:
-        """The model; where the pin is moved from outside, its wrench is summed up at each of the model's own steps."""
         if self._model is not None:
             return self._model
         model = super()._built()
         self._momentum = momentum(model.assembly)
-        if self._moves_target:
-            recorder = model._recorder
-
-            def after_step(_system: Any, now: float) -> bool:
-                since, before = now - recorder._totals[_TIME], recorder.pin_wrench
-                recorder.after_step(now)
-                if since > 0:
-                    self._pin = self._pin + 0.5 * since * (before + recorder.pin_wrench)
-                return True
-
-            model.assembly.system.SetPostStepUserFunction(after_step)
         return model
 
     def outputs(self) -> np.ndarray:
         """What `SnareParticipant` shows, then impulses, momentum and energies."""
         model = self._built()
-        passed = [self._passed, self._pin] if self._moves_target else [self._passed]
+        passed = [self._passed, model.pin_impulse()] if self._moves_target else [self._passed]
         total = self._momentum.copy()
         total[3:] += np.cross(model.origin, total[:3])
-        return np.concatenate([super().outputs(), *passed, total, _energies(model)])
+        return np.concatenate([super().outputs(), *passed, total, list(model.energies().values())])
 
     def cables(self) -> np.ndarray:
         """Where the cables' nodes are now, in the world [m]; (3, n_nodes, 3)."""
@@ -106,18 +89,10 @@ class ImpulseSnareParticipant(SnareParticipant):
 
     def save(self) -> Any:
         """The model's state, the inputs, and the sums."""
-        return super().save(), self._passed, self._pin, self._momentum
+        return super().save(), self._passed, self._momentum
 
     def restore(self, state: Any) -> None:
         """Back to a saved state, bit for bit."""
-        own, passed, pin, total = state
+        own, passed, total = state
         super().restore(own)  # which may build the model anew
-        self._passed, self._pin, self._momentum = passed, pin, total
-
-
-def _energies(model: Any) -> np.ndarray:
-    recorder = model._recorder
-    totals, now = recorder._totals, recorder._energies
-    return np.array(
-        [totals[3], now[STRAIN], now[KINETIC], now[OVERLAP], recorder._target_energy(), totals[4], totals[5]]
-    )
+        self._passed, self._momentum = passed, total

@@ -73,7 +73,8 @@ def remedy(pairs: Sequence[Alike]) -> str:
     shares = ", ".join(f"{100 * taken[other]:.0f} % by {other}" for other in (TENSION, PAYLOAD, DRIFT))
     left = {measured: taken[f"{TOGETHER}, with {measured}"] for measured in MEASUREMENTS}
     best = min(left, key=lambda measured: left[measured])
+    settles = "what would help most is" if left[best] < ALIKE else "no single measurement settles it, not even"
     return (
         f"From torques and joint angles alone, as the paper had them, {TWIST} can be mimicked to {shares}, and to "
-        f"{100 * taken[TOGETHER]:.0f} % by all of these; what would help most is {best}: then {100 * left[best]:.0f} %."
+        f"{100 * taken[TOGETHER]:.0f} % by all of these; {settles} {best}, with which {100 * left[best]:.0f} % remain."
     )
