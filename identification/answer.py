@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..models.floating_tree import channel
 from ..models.model_file import Model
 from .diagnosis import Candidate, ChannelFit, Diagnosis, Estimate, Finding, Misfit, Moved, Rival, Step, Trace
 from .experiment import Experiment
@@ -53,14 +54,14 @@ def report_on(
     steps : tuple of Step
     train, locked : sequence of Experiment
     """
-    joints = model.joints
-    findings = tuple(_finding(t, final, trials, joints) for t in confirmed)
+    channels = [channel(model.tree, c) for c in range(model.tree.n_joints)]
+    findings = tuple(_finding(t, final, trials, channels) for t in confirmed)
     fits = _fits(model, found.first, final, train, locked)
     nameless = {c: x for c, x in found.closing.nameless.items() if x > NAMELESS}
     size = {c: float(np.sqrt(x)) * fits[c].train.relative_after for c, x in nameless.items()}
     words = {
         c: (
-            f"on tau.{joints[c]}, smooth curves over position, speed, load and time together still explain "
+            f"on {channels[c]}, smooth curves over position, speed, load and time together still explain "
             f"{percent(x)} of the residual in blocks that they were not fitted to "
             f"({percent(size[c])} of the channel's torque)"
         )
@@ -91,7 +92,7 @@ def report_on(
     explained = [_explained(found.first, final, e) for e in train]
     if not findings:
         # What has no name stands in the residual itself, on the channels where smooth curves could follow it.
-        loud = [c in nameless and size[c] >= MATERIAL for c in range(len(joints))]
+        loud = [c in nameless and size[c] >= MATERIAL for c in range(len(channels))]
         explained = [(e.measured - e.motion.to_band(final.assembly.torque(e, final.theta))) * loud for e in train]
     return Diagnosis(
         verdict,
@@ -117,7 +118,7 @@ def _explained(first: Fit, final: Fit, experiment: Experiment) -> Array:
     return experiment.motion.to_band(change)
 
 
-def _finding(t: Taken, final: Fit, trials: Mapping[str, tuple[float, float]], joints: Sequence[str]) -> Finding:
+def _finding(t: Taken, final: Fit, trials: Mapping[str, tuple[float, float]], every: Sequence[str]) -> Finding:
     placed = t.judged.placed
     parameters = {
         final.assembly.slots[i].name: Estimate(
@@ -126,7 +127,7 @@ def _finding(t: Taken, final: Fit, trials: Mapping[str, tuple[float, float]], jo
         for i in final.assembly.index_of(placed)
     }
     with_it, without_it = trials[placed.key]
-    channels = [f"tau.{joints[c]}" for c in t.judged.channels]
+    channels = [every[c] for c in t.judged.channels]
     # How often a name with this margin was right on the bank, shared out as the bootstrap was.
     right = reliability(t.probability)
     rivals = tuple(
@@ -155,8 +156,14 @@ def _fits(
         )
     floors = _noise_floor(train, final)
     return tuple(
-        ChannelFit(f"tau.{j.name}", "N" if j.kind == "prismatic" else "N*m", fitted, held_out, float(floor))
-        for j, fitted, held_out, floor in zip(model.tree.joints, *pairs, floors, strict=True)
+        ChannelFit(
+            channel(model.tree, c),
+            "N" if j.kind == "prismatic" else "N*m",
+            fitted,
+            held_out,
+            float(floor),
+        )
+        for c, (j, fitted, held_out, floor) in enumerate(zip(model.tree.joints, *pairs, floors, strict=True))
     )
 
 
@@ -192,10 +199,10 @@ def _traces(first: Fit, final: Fit, train: Sequence[Experiment], locked: Sequenc
             bring = e.motion.to_band
             before, after = (bring(f.assembly.torque(e, f.theta)) for f in (first, final))
             time, q, qd = bring(e.motion.time), bring(e.motion.q), bring(e.motion.qd)
-            for c, joint in enumerate(e.motion.joints):
-                unit = "N" if e.body.tree.joints[c].kind == "prismatic" else "N*m"
+            for c, joint in enumerate(e.body.tree.joints):
+                unit = "N" if joint.kind == "prismatic" else "N*m"
                 columns = (x[:, c] for x in (q, qd, e.measured, before, after))
-                found.append(Trace(Path(e.motion.path).name, role, f"tau.{joint}", unit, time, *columns))
+                found.append(Trace(Path(e.motion.path).name, role, channel(e.body.tree, c), unit, time, *columns))
     return tuple(found)
 
 

@@ -143,7 +143,7 @@ class Assembly:
         """Index of the joint that an effect's place belongs to."""
         if isinstance(self.tree, Rig) and p.effect.at == "sling":
             return sling_of(self.tree, p.at).link
-        if p.effect.at in ("link", "boom"):
+        if p.effect.at in ("link", "boom", "base"):
             return self._links.index(p.at)
         return self._joints.index(p.at.removeprefix("tau.").removeprefix("q."))
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from ..models.effect import Effect, Parameter
 from ..models.effects import effects
+from ..models.floating_tree import n_carriers
 from ..models.model_file import Model, Placed, places
 from .assembly import Assembly, Evaluation
 from .effect_terms import contributions
@@ -70,7 +71,8 @@ def library(model: Model) -> list[Placed]:
         spots = places(effect, model.tree)
         if effect.name == "sensor_delay":
             # A torque channel is late or, where the encoder is late, early: one of the two.
-            other = {f"tau.{j}": f"q.{j}" for j in model.joints} | {f"q.{j}": f"tau.{j}" for j in model.joints}
+            arm = model.joints[n_carriers(model.tree) :]
+            other = {f"tau.{j}": f"q.{j}" for j in arm} | {f"q.{j}": f"tau.{j}" for j in arm}
             spots = tuple(at for at in other if f"{effect.name}.{other[at]}" not in have)
         found += [Placed(effect, at) for at in spots if f"{effect.name}.{at}" not in have]
     return found

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt, welch
 
+from ..models.floating_tree import n_carriers
 from .candidates import smooth_columns
 from .experiment import Experiment
 from .fit import Fit
@@ -75,7 +76,8 @@ def _bands(found: Fit, experiments: Sequence[Experiment]) -> Array:
         longest = max(e.motion.band_segments(), key=lambda s: s.stop - s.start)
         acceleration, speed = e.motion.to_band(e.motion.qdd)[longest], e.motion.to_band(e.motion.qd)[longest]
         length = min(len(acceleration), int(8 * rate))
-        for c in range(n_joints):
+        # Nothing is asked of a floating base: what disturbs it is its motion.
+        for c in range(n_carriers(assembly.tree), n_joints):
             index, own = gather(blocks, c)
             fitted = [own] if len(index) else []
             columns = np.concatenate([*fitted, smooth_columns(e, state, c), _directed(e, c)], axis=1)

@@ -7,12 +7,13 @@ from numpy.typing import NDArray
 from scipy.signal import fftconvolve
 
 from ..models.effect import Effect
-from ..models.hidden_state import evaluate_law
+from ..models.hidden_state import evaluate_law, rows
 from ..models.model_file import Placed
 from ..models.rig import Rig
 from ..models.rig_kinematics import far_end
 from ..models.tree import Tree
 from .experiment import Experiment
+from .floating_terms import base_signals
 from .rig_terms import rig_signals, rig_terms
 
 Array = NDArray[np.float64]
@@ -66,6 +67,10 @@ def contributions(
         read = rig_signals(experiment, tree, effect, placed.at)
         values, by_parameter, _ = _by_segment(experiment, effect, read, parameters)
         return rig_terms(experiment, tree, effect, placed.at, values, by_parameter), None, None
+    if effect.at == "base":
+        values, by_parameter, _ = _by_segment(experiment, effect, base_signals(experiment), parameters)
+        # What the effect gives to the base, nothing else has to supply.
+        return [(c, -values[:, c], -by_parameter[:, c]) for c in rows(effect)], None, None
     signals = {
         "q": motion.q[:, joint],
         "qd": motion.qd[:, joint],

@@ -1,7 +1,7 @@
 """A conditioned recording with everything the rigid body contributes worked out once."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -10,12 +10,14 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..models.floating_tree import CARRIERS, FloatingTree
 from ..models.model_file import Model
 from ..models.rig import Rig
 from ..models.rig_kinematics import sling_map
 from ..models.rigid_body import RigidBody
 from ..recordings import JointKind, read_recording
 from ..recordings.condition import Motion, condition
+from .floating_terms import as_carriers, with_twist
 
 Array = NDArray[np.float64]
 
@@ -53,10 +55,17 @@ class Experiment:
     def carried(self) -> Array:
         """Torque that a rig's slings take off the joints (n, J) [N·m or N]; zero on an arm without slings.
 
+        On a floating base: the force and moment that its own momentum asks for, which its channels have as measured.
+
         In balance that is the weight of the arm as the model gives it, so that all which differs from the model's
         masses shows under gravity. A measured tension adds what it exceeds the balance by.
         """
         rig, q = self.body.tree, self.motion.q
+        if isinstance(rig, FloatingTree):
+            own = np.zeros_like(q)
+            columns = slice(10 * (CARRIERS - 1), 10 * CARRIERS)
+            own[:, :CARRIERS] = self.regressor[:, :CARRIERS, columns] @ rig.links[CARRIERS - 1].phi
+            return own
         if not isinstance(rig, Rig):
             return np.zeros_like(q)
         total = self.body.torque(q, np.zeros_like(q), np.zeros_like(q))
@@ -109,16 +118,27 @@ def load_experiments(
     kinds: dict[str, JointKind] = {j.name: j.kind for j in model.tree.joints}
     datasets = [read_recording(path, model.signals, kinds) for path in paths]
     measured = [_tensions(d, model) for d in datasets]
+    tree = model.tree
+    if isinstance(tree, FloatingTree):
+        datasets = [with_twist(d, tree) for d in datasets]
     datasets = [_without_gaps_in(t, d) for t, d in zip(measured, datasets, strict=True)]
     wanted = band or model.bandwidth
     motions = [condition(d, model.joints, wanted) for d in datasets]
     narrowest = min(m.band for m in motions)
     if any(m.band > 1.01 * narrowest for m in motions):
         motions = [condition(d, model.joints, narrowest) for d in datasets]
+    if isinstance(tree, FloatingTree):
+        return [_balanced(Experiment(as_carriers(m, tree), body)) for m in motions]
     return [
         Experiment(m, body, {name: np.interp(m.time, d["time"].values, x) for name, x in t.items()})
         for m, d, t in zip(motions, datasets, measured, strict=True)
     ]
+
+
+def _balanced(experiment: Experiment) -> Experiment:
+    """With what the floating base's own momentum asks for on the measured side."""
+    motion = experiment.motion
+    return replace(experiment, motion=replace(motion, tau=motion.tau - experiment.carried))
 
 
 def _tensions(dataset: xr.Dataset, model: Model) -> dict[str, Array]:

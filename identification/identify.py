@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..models.floating_tree import channel
 from ..models.inertia import Array
 from ..models.model_file import Model
 from ..models.rigid_body import RigidBody
@@ -56,10 +57,10 @@ class Identified:
         for role, experiments in (("train", self.train), ("holdout", self.holdout)):
             if experiments:
                 rms, measured = channel_rms(found.assembly, experiments, found.theta)
-                for joint, r, m in zip(self.model.tree.joints, rms, measured, strict=True):
-                    channel = fits.setdefault(f"tau.{joint.name}", {})
-                    channel[role] = {"rms": float(r), "relative": float(r / m)}
-                    channel["unit"] = "N" if joint.kind == "prismatic" else "N*m"
+                for c, (joint, r, m) in enumerate(zip(self.model.tree.joints, rms, measured, strict=True)):
+                    entry = fits.setdefault(channel(self.model.tree, c), {})
+                    entry[role] = {"rms": float(r), "relative": float(r / m)}
+                    entry["unit"] = "N" if joint.kind == "prismatic" else "N*m"
         answer: dict[str, Any] = {
             "model": self.model.name,
             "parameters": parameters,

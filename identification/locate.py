@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ..models.floating_tree import channel
 from .diagnosis import Location
 from .experiment import Experiment
 
@@ -42,9 +43,9 @@ def locate(experiments: Sequence[Experiment], explained: Sequence[Array]) -> tup
         share = float(weight[c] / total)
         if share < 0.01:
             break
-        joint = experiments[0].motion.joints[c]
         windows = _windows(experiments[0], explained[0][:, c])
-        found.append(Location(f"tau.{joint}", share, windows, _state(experiments, explained, c)))
+        name = channel(experiments[0].body.tree, int(c))
+        found.append(Location(name, share, windows, _state(experiments, explained, c)))
     return tuple(found)
 
 
@@ -89,7 +90,7 @@ def _state(experiments: Sequence[Experiment], changed: Sequence[Array], c: int) 
     for label, x, u in (
         (f"|qd.{joint}|", np.abs(qd), unit),
         (f"|qdd.{joint}|", np.abs(qdd), unit + "^2"),
-        (f"|tau.{joint}|", np.abs(tau), torque),
+        (f"|{channel(experiments[0].body.tree, c)}|", np.abs(tau), torque),
         (f"q.{joint}", q, place),
     ):
         for level in np.quantile(x, [0.25, 0.5, 0.75]):

@@ -131,6 +131,8 @@ def reached(assembly: Assembly, p: Placed) -> tuple[int, ...]:
     tree = assembly.tree
     if isinstance(tree, Rig) and p.effect.at in PLACES:
         return reached_joints(tree, p.effect.at, p.at, rows(p.effect))
+    if p.effect.at == "base":
+        return rows(p.effect)
     everywhere = p.effect.at == "link" or p.effect.acts_on == "position"
     return tuple(range(tree.n_joints)) if everywhere else (assembly.joint_of(p),)
 

@@ -194,7 +194,7 @@ def _together(result: Screening, several: Sequence[Judged]) -> float:
 def _holds_in_motion(result: Screening, j: Judged) -> bool:
     """Does it still pass with the samples near rest left out? Stuck friction poses as delay, elasticity and
     Stribeck."""
-    if j.placed.effect.at_rest or j.placed.effect.at in PLACES:
+    if j.placed.effect.at_rest or j.placed.effect.at in (*PLACES, "base"):
         return True  # what a sling does shows on joints that stand still while others move
     moving = result.moving
     products = moving.products([(c, x[~result.at_rest[c]]) for c, x in j.columns.items()])

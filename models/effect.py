@@ -10,6 +10,8 @@ place (a joint, a link, a sling, a sensor channel) and one instant, in CasADi sy
   in the world frame; ``at="slide"``, the friction force [N] at the slides that a joint moves; ``at="boom"``, for
   torsion and for bending of a link (2,), the upward force per lever [N/m] on the slings beyond it. The rig's geometry
   takes each to the torque of every joint.
+- On a free-floating arm: ``at="base"``, the wrench (6,) on the base, force [N] and moment [N·m] about the origin of its
+  frame, in its own axes.
 
 Hidden state (a spring's twist, a delayed signal) is a system of ordinary differential equations: ``states`` names it,
 ``rate`` is its right-hand side, and the law may read it.
@@ -72,7 +74,7 @@ class Effect:
         The vocabulary's word; also the file's name.
     family : str
         Heading of the vocabulary it stands under.
-    at : "joint", "link", "sensor", "sling", "slide" or "boom"
+    at : "joint", "link", "sensor", "sling", "slide", "boom" or "base"
         Where it acts; a slide goes by the name of its joint, a boom by that of its link.
     sentence : str
         What a test engineer would say: "friction that does not depend on speed".
@@ -90,6 +92,8 @@ class Effect:
         returns 10. Sensor: ``value`` (true value), ``time``, and the joint signals of its joint. Sling: ``velocity``
         (3 numbers [m/s], of the hang point), ``weight`` and ``tension`` [N] in balance, ``time``. Slide: the signals of
         its joint. Boom: ``spread``, the sum of squared levers of the slings beyond it [m²], in torsion and in bending.
+        Base: ``spin`` [rad/s], ``spin_rate`` [rad/s²] and ``acceleration`` [m/s²] (of the frame's origin), 3 numbers
+        each in the base's axes, and ``time``.
         A state is read as ``s[state_name]``.
     states : tuple of str
         Names of hidden states, all starting at rest (zero rate).
@@ -112,7 +116,7 @@ class Effect:
 
     name: str
     family: str
-    at: Literal["joint", "link", "sensor", "sling", "slide", "boom"]
+    at: Literal["joint", "link", "sensor", "sling", "slide", "boom", "base"]
     sentence: str
     equation: str
     source: str

@@ -41,6 +41,7 @@ SIGNALS = {
     "sling": {"velocity": 3, "weight": 1, "tension": 1, "time": 1},
     "slide": _JOINT,
     "boom": {"spread": 2, "time": 1},
+    "base": {"spin": 3, "spin_rate": 3, "acceleration": 3, "time": 1},
 }
 
 #: The signal, by place, that itself depends on the model's parameters; none on a rig's slings, slides and booms.
@@ -137,6 +138,8 @@ def evaluate_law(
         if dt is None:
             raise ValueError(f"{effect.name} has states: dt is needed")
         carried = _carried(effect, built, signals, p, dt)
+    if not built.signals:  # a constant reads nothing that says how many samples there are
+        p = np.tile(p, (len(next(iter(inputs.values()))), 1))
     values, by_parameter, *by_signal = built.law(*signals, carried, p)
     return Evaluation(values[:, :, 0], by_parameter, by_signal[0] if by_signal else None)
 

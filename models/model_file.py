@@ -16,6 +16,7 @@ from ..errors import InputError
 from ..recordings.signals import FORMS, Signal, is_signal, joint_of
 from .effect import Effect
 from .effects import get_effect
+from .floating_tree import FloatingTree, n_carriers, read_floating
 from .hidden_state import rows
 from .rig import Rig, built_in_rig
 from .rig_file import read_slings, sling_table
@@ -23,10 +24,22 @@ from .rig_kinematics import booms, reached_joints, slides
 from .tree import Tree
 from .urdf import load_urdf
 
-SYSTEMS = ("arm", "zero_g_rig")
-"""Systems that this version can fit; the format reserves free_floating_arm and snare_capture."""
+SYSTEMS = ("arm", "zero_g_rig", "free_floating_arm")
+"""Systems that this version can fit; the format reserves snare_capture."""
 
-_KEYS = ("name", "system", "urdf", "gravity", "inertia", "effects", "slings", "signals", "bandwidth", "parameters")
+_KEYS = (
+    "name",
+    "system",
+    "urdf",
+    "base",
+    "gravity",
+    "inertia",
+    "effects",
+    "slings",
+    "signals",
+    "bandwidth",
+    "parameters",
+)
 
 
 @dataclass(frozen=True)
@@ -57,9 +70,10 @@ class Model:
         The file.
     name, system : str
     urdf : Path or None
-        None for the built-in rig.
+        None for the built-in rig, and for the built-in ETS-VII.
     tree : Tree
-        Joints, links, nominal inertia and gravity; a `Rig` for ``zero_g_rig``, with its slings.
+        Joints, links, nominal inertia and gravity; a `Rig` for ``zero_g_rig``, with its slings; a `FloatingTree` for
+        ``free_floating_arm``, whose first six joints carry the base.
     inertia : "fixed" or "free"
     effects : tuple of Placed
         Physics that the model has, one entry a place.
@@ -94,16 +108,19 @@ class Model:
 
 def places(effect: Effect, tree: Tree) -> tuple[str, ...]:
     """Places of a tree at which an effect can act on some torque; sensor effects act on torque channels by default."""
+    carriers = n_carriers(tree)
     if effect.at == "joint":
-        return tuple(j.name for j in tree.joints)
+        return tuple(j.name for j in tree.joints[carriers:])
     if effect.at == "link":
-        return tuple(link.name for link in tree.links)
+        return tuple(link.name for link in tree.links[max(carriers - 1, 0) :])
+    if effect.at == "base":
+        return ("base",) if carriers else ()
     if effect.at != "sensor":
         if not isinstance(tree, Rig):
             return ()
         every = {"sling": tuple(s.name for s in tree.slings), "slide": slides(tree), "boom": booms(tree)}[effect.at]
         return tuple(at for at in every if reached_joints(tree, effect.at, at, rows(effect)))
-    return tuple(f"tau.{j.name}" for j in tree.joints)
+    return tuple(f"tau.{j.name}" for j in tree.joints[carriers:])
 
 
 def load_model(path: str | Path) -> Model:
@@ -134,7 +151,8 @@ def load_model(path: str | Path) -> Model:
     inertia = _text(path, raw, "inertia", "fixed")
     if inertia not in ("fixed", "free"):
         raise InputError(f"{path}: inertia = {inertia!r}; allowed are 'fixed' and 'free'")
-    gravity = _numbers(path, raw.get("gravity", [0.0, 0.0, -9.81]), "gravity", 3)
+    usual = [0.0, 0.0, 0.0 if system == "free_floating_arm" else -9.81]
+    gravity = _numbers(path, raw.get("gravity", usual), "gravity", 3)
     bandwidth = raw.get("bandwidth")
     number = isinstance(bandwidth, int | float) and not isinstance(bandwidth, bool)
     if bandwidth is not None and not (number and 0 < bandwidth < np.inf):
@@ -159,6 +177,13 @@ def _tree(path: Path, raw: Mapping[str, Any], system: str, urdf: Path | None, gr
     """The arm of a model file, on its slings where the system is a rig."""
     if "slings" in raw and (system != "zero_g_rig" or urdf is None):
         raise InputError(f"{path}: [slings] belong to system = 'zero_g_rig' with a URDF of your own; take them out")
+    if system == "free_floating_arm":
+        try:
+            return read_floating(urdf, tuple(gravity), _text(path, raw, "base", "base"))
+        except InputError as error:
+            raise InputError(str(error) if str(error).startswith(str(urdf)) else f"{path}: {error}") from None
+    if "base" in raw:
+        raise InputError(f"{path}: key 'base' belongs to system = 'free_floating_arm'; take it out")
     if urdf is not None:
         tree = load_urdf(urdf, tuple(gravity))
         if system != "zero_g_rig":
@@ -203,6 +228,8 @@ def save_model(model: Model, path: str | Path, note: str) -> None:
     ]
     if model.bandwidth is not None:
         lines.append(f"bandwidth = {_toml(model.bandwidth)}")
+    if isinstance(model.tree, FloatingTree):
+        lines.append(f"base = {_toml(model.tree.body)}")
     if isinstance(model.tree, Rig) and model.urdf is not None:
         lines += ["", "[slings]"]
         for name, fields in sling_table(model.tree).items():

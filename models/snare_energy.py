@@ -18,6 +18,8 @@ STRAIN, KINETIC, OVERLAP, BENDING_LOSS, AXIAL_LOSS, CONTACT_LOSS, FRICTION_LOSS 
 TENSION_POINTS = np.array([[0.0, 1 / 6], [0.5, 4 / 6], [1.0, 1 / 6]])
 BENDING_POINTS = np.array([[0.5 - np.sqrt(1 / 12), 0.5], [0.5 + np.sqrt(1 / 12), 0.5]])
 """ξ and weight where an element's tension and bending are integrated."""
+STRAIGHT = 1e-3
+"""Curvature below which a cable counts as straight [1/m]: its size has no rate there, see `snare_damping`."""
 _MASS_POINTS = np.array(
     [
         [0.5 + 0.5 * x, 0.5 * w]
@@ -56,8 +58,9 @@ def cable_energies(
             curvature = scale(1.0 / square, cross(tangent, bow))
             turned = add(cross(tangent_rate, bow), cross(tangent, bow_rate))
             rate = subtract(scale(1.0 / square, turned), scale(2.0 * dot(tangent, tangent_rate) / square, curvature))
-            result[STRAIN] += 0.5 * share * dot(curvature, curvature)
-            result[BENDING_LOSS] += share * section[4] * dot(rate, rate)
+            bent = dot(curvature, curvature)
+            result[STRAIN] += 0.5 * share * bent
+            result[BENDING_LOSS] += share * section[4] * dot(curvature, rate) ** 2 / (bent + STRAIGHT * STRAIGHT)
         for i in range(4):
             speed = combine(weights(_MASS_POINTS[i, 0], size), rates)
             result[KINETIC] += 0.5 * _MASS_POINTS[i, 1] * size * section[0] * dot(speed, speed)

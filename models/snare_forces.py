@@ -1,7 +1,7 @@
 """What Exudyn calls at each iteration, each in one compiled call: all forces that are not its own, and their Jacobian.
 
 `fixed` and `moving` bundle what the compiled functions see: (reference coordinates, elements per cable, their length,
-number of the pin's coordinates, its cylinders, constants of the contact law, cable radius, end stiffness), and the
+number of the pin's coordinates, its cylinders, constants of the laws, cable radius, end stiffness), and the
 arrays that they fill, (pin, Euler parameters and rates, contacts, crossings, rest directions of the ends).
 """
 
@@ -10,11 +10,14 @@ import numpy as np
 from .snare_contact import MOST_CONTACTS, add_pin_contact, contact_force, find_contacts
 from .snare_contact_jacobian import add_pin_jacobian, turn_column
 from .snare_crossing import MOST_CROSSINGS, add_crossing_jacobian, add_crossings, find_crossings
+from .snare_damping import TRIPLETS_PER_ELEMENT, add_damping, add_damping_jacobian
 from .snare_ends import add_end_jacobian, add_end_springs, end_moment
 from .snare_energy import STRAIN, cable_energies
+from .snare_law import DAMPING
 from .snare_vector import compiled, cross, dot, row, subtract
 
 MOST_TRIPLETS = MOST_CONTACTS * 19 * 19 + MOST_CROSSINGS * 24 * 24 + 54
+"""Beside those of damping."""
 
 
 @compiled
@@ -58,6 +61,7 @@ def system_forces(q, rates, fixed, moving):
     add_crossings(positions, velocities, n_elements, size, law, radius, crossings, forces)
     if stiffness > 0.0:
         add_end_springs(positions, n_elements, stiffness, directions, forces)
+    add_damping(positions, velocities, n_elements, size, law[DAMPING], forces)
     for k in range(min(n_pin, 3)):
         result[n_cables + k] = push[k]
     if n_pin == 7:
@@ -76,7 +80,8 @@ def system_jacobian(q, rates, fixed, moving, factor, rate_factor):
     n_cables = q.size - n_pin
     positions = coordinates[:n_cables].reshape(-1, 3)
     velocities = rates[:n_cables].reshape(-1, 3)
-    triplets = np.empty((MOST_TRIPLETS, 3))
+    n_all = positions.shape[0] // 2 // (n_elements + 1) * n_elements
+    triplets = np.empty((MOST_TRIPLETS + n_all * TRIPLETS_PER_ELEMENT, 3))
     factors = (factor, rate_factor)
     count = find_contacts(positions, n_elements, size, cylinders, pin, radius, contacts)
     count = add_pin_jacobian(
@@ -86,6 +91,8 @@ def system_jacobian(q, rates, fixed, moving, factor, rate_factor):
     count = add_crossing_jacobian(positions, velocities, size, law, crossings, n_crossings, factors, triplets, count)
     if stiffness > 0.0:
         count = add_end_jacobian(positions, n_elements, stiffness, directions, factor, triplets, count)
+    if rate_factor != 0.0:
+        count = add_damping_jacobian(positions, n_elements, size, law[DAMPING], rate_factor, triplets, count)
     return triplets[:count].copy()
 
 

@@ -20,11 +20,24 @@ import numpy as np
 from .snare_parameters import SnareParameters
 from .snare_vector import add, add_scaled, compiled, dot, scale
 
+DAMPING = 5
+"""Entry of `law_constants`."""
+
 
 def law_constants(parameters: SnareParameters) -> np.ndarray:
-    """K [N/m^1.5], c [s/m], μ, v_s [m/s], 1/(3EI) [1/(N·m²)]: shape (5,)."""
+    """K [N/m^1.5], c [s/m], μ, v_s [m/s], 1/(3EI) [1/(N·m²)], and τ EI of `snare_damping` [N·m²·s]: shape (6,)."""
     p = parameters
-    return np.array([p.hertz_stiffness, p.contact_damping, p.friction, p.slip_velocity, 1 / (3 * p.bending_stiffness)])
+    stiffness = p.bending_stiffness
+    return np.array(
+        [
+            p.hertz_stiffness,
+            p.contact_damping,
+            p.friction,
+            p.slip_velocity,
+            1 / (3 * stiffness),
+            p.bending_damping * stiffness,
+        ]
+    )
 
 
 @compiled

@@ -55,9 +55,9 @@ class SnareParameters:
         For a value that is not finite or not in its range.
     """
 
-    ring_radius: float = _dimension(0.126, "m", "calibrated", _CONTACT_TIME)
+    ring_radius: float = _dimension(0.1275, "m", "calibrated", _CONTACT_TIME)
     ring_distance: float = _dimension(0.10, "m", "chosen", "axial distance of the rings; not in the paper")
-    cable_length: float = _dimension(0.2822, "m", "derived", "lies against the rings' wall (Li et al.): `wall_length`")
+    cable_length: float = _dimension(0.2851, "m", "derived", "lies against the rings' wall (Li et al.): `wall_length`")
     cable_diameter: float = _dimension(0.004, "m", "chosen", "wire rope of 4 mm; not in the paper")
     young_modulus: float = _dimension(20e9, "Pa", "paper", "Li et al., ground test")
     density: float = _dimension(7800.0, "kg/m**3", "paper", "Li et al., ground test")
@@ -67,7 +67,7 @@ class SnareParameters:
     ring_rate: float = _dimension(8 * pi / 180, "rad/s", "paper", "Li et al.: 8 deg/s")
     ring_travel: float = _dimension(80 * pi / 180, "rad", "paper", "Li et al.: 80 deg")
     ring_direction: float = _dimension(
-        -1.0, "1", "calibrated", f"{_CONTACT_TIME}; about +x; turning the other way it would be 3.3 s", "1 or -1"
+        -1.0, "1", "calibrated", f"{_CONTACT_TIME}; about +x; turning the other way it would be 3.5 s", "1 or -1"
     )
     ring_ramp: float = _dimension(0.1, "s", "chosen", "time in which the ring starts and stops")
     pin_radius: float = _dimension(0.0075, "m", "calibrated", _CONTACT_TIME)

@@ -12,6 +12,7 @@ import pint
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
+from scipy.signal import lsim
 
 import snarelab.models.effects
 from snarelab.errors import InputError
@@ -71,7 +72,14 @@ def signals():
         "tension": np.full(TIME.size, 475.0),
     }
     links |= slings | {"spread": np.stack([4 + 3 * q**2, 20 + qd**2], axis=1)}
+    links |= {"spin_rate": shaken(TIME)[0], "acceleration": shaken(TIME)[1]}
     return scalars | links | {"points": points, "masses": masses}
+
+
+def shaken(time):
+    """A base's angular and linear acceleration (2, n, 3) [rad/s², m/s²] that start from rest."""
+    x, y, z = wave(time, (0.2, 0.31, 0.0), (0.1, 1.1, 0.0)), wave(time, (0.3, 0.23, 0.0)), wave(time, (0.1, 0.7, 0.0))
+    return np.stack([[x[0], y[0], z[0]], [y[0], z[0], -x[0]]]).transpose(0, 2, 1)
 
 
 def inertial_parameters(masses, points):
@@ -114,6 +122,34 @@ def makkar(s, stribeck_level, stribeck_speed, stribeck_ratio, coulomb_level, cou
     steep, shallow, slope = 1 / stribeck_speed, 1 / (stribeck_ratio * stribeck_speed), 1 / coulomb_speed
     bump = stribeck_level * (exponential_tanh(steep * s["qd"]) - exponential_tanh(shallow * s["qd"]))
     return bump + coulomb_level * exponential_tanh(slope * s["qd"]) + viscous * s["qd"]
+
+
+def rung(driven, frequency, damping):
+    """Relative acceleration of an oscillator on a ground that accelerates (n, 3), by SciPy's state-space matrices."""
+    w = 2 * np.pi * frequency
+    system = ([[0, 1], [-(w**2), -2 * damping * w]], [[0], [-1]], [[-(w**2), -2 * damping * w]], [[-1]])
+    return np.stack([lsim(system, x, TIME)[1] for x in driven.T], axis=1)
+
+
+def bending_panels(s, inertia_x, inertia_y, inertia_z, frequency, damping):
+    """Moment of three rotors on springs, about one axis each."""
+    moment = -rung(s["spin_rate"], frequency, damping) * [inertia_x, inertia_y, inertia_z]
+    return np.hstack([np.zeros_like(moment), moment])
+
+
+def mass_on_springs(s, mass, x, y, z, frequency, damping):
+    """Wrench of a point mass that springs hold at a point of the base."""
+    wx, wy, wz = s["spin_rate"].T
+    carried = s["acceleration"] + np.stack([wy * z - wz * y, wz * x - wx * z, wx * y - wy * x], axis=1)
+    fx, fy, fz = force = -mass * rung(carried, frequency, damping).T
+    return np.stack([*force, y * fz - z * fy, z * fx - x * fz, x * fy - y * fx], axis=1)
+
+
+def steady_moment(s, x, y, z):
+    """Two equal and opposite forces on arms of 1 m for each axis."""
+    arms, forces = np.eye(3), np.array([[0, z, 0], [0, 0, x], [y, 0, 0]]) / 2
+    moment = sum(np.cross(side * arm, side * force) for side in (1, -1) for arm, force in zip(arms, forces, strict=True))
+    return np.tile(np.concatenate([np.zeros(3), moment]), (TIME.size, 1))
 
 
 def late_friction(s, level, travel):
@@ -252,6 +288,13 @@ REFERENCES = {
     "com_offset": Reference({"x": 0.2, "y": -0.1, "z": 0.3}, with_shift),
     "inertia_error": Reference(dict(zip(TEN, inertial_parameters(*EXTRA), strict=True)), extra_bodies),
     "harness_stiffness": Reference({"stiffness": 6.0, "torque_at_zero": 2.4}, spring),
+    "external_torque": Reference({"x": 0.4, "y": -0.2, "z": 0.7}, steady_moment),
+    "flexible_appendage": Reference(
+        {"inertia_x": 4.0, "inertia_y": 9.0, "inertia_z": 2.0, "frequency": 0.6, "damping": 0.03}, bending_panels
+    ),
+    "propellant_slosh": Reference(
+        {"mass": 30.0, "x": 0.4, "y": -0.3, "z": 0.6, "frequency": 0.4, "damping": 0.05}, mass_on_springs
+    ),
     "sensor_bias": Reference({"offset": 0.3}, lambda s, offset: np.polyval([1.0, offset], s["value"])),
     "sensor_drift": Reference({"rate": 0.05}, lambda s, rate: np.interp(TIME, [0, 9], [0, 9 * rate]) + s["value"]),
     "sensor_gain": Reference({"error": -0.07}, lambda s, error: np.polyval([1 + error, 0.0], s["value"])),

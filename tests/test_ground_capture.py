@@ -51,6 +51,7 @@ def test_study_writes_page_and_numbers(
     assert found["peak_force"]["low"] <= found["peak_force"]["ours"] <= found["peak_force"]["high"]
     assert found["peak_force"]["low"] < found["peak_force"]["high"]  # A heavier target is hit harder.
     assert found["final_radial_y"]["ours"] == pytest.approx(PAPER_POSITION[1], rel=0.2)  # 3 s only
+    assert [p.name for p in tmp_path.iterdir()] == ["build"]  # Exudyn would leave a folder of its own
     page = (tmp_path / "build/studies/ground-capture/report.html").read_text(encoding="utf-8")
     assert "in 0 of 3 captures" in page  # after 3 s
     assert "in 0 of 3 captures" in said

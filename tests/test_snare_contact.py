@@ -16,7 +16,8 @@ from snarelab.models.snare_parameters import SnareParameters
 from snarelab.models.snare_pin import distance, pin_cylinders, surface
 from snarelab.models.snare_settled import settled
 
-P = SnareParameters()
+P = SnareParameters(bending_damping=0.0)
+"""Damping in bending has a file of its own, and gives its Jacobian by rates alone."""
 N = 10
 SIZE = P.cable_length / N
 

@@ -16,7 +16,7 @@ from snarelab.models.snare_settled import settled
 
 
 def test_a_cable_against_the_wall_is_an_arc_of_120_degrees_about_the_ring_itself():
-    p = SnareParameters(cable_length=wall_length(0.126, 0.1))
+    p = SnareParameters(cable_length=wall_length(SnareParameters().ring_radius, 0.1))
     shape = arc(p)
     assert shape.angle == pytest.approx(2 * pi / 3, abs=1e-9)
     assert shape.radius == pytest.approx(p.ring_radius, rel=1e-9)

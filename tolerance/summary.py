@@ -63,7 +63,7 @@ def worst_reach(study: Study, boundary: Boundary, axes: tuple[str, ...], directi
     return Interval(*(float(np.min([getattr(f, k) for f in signless])) for k in ("value", "low", "high")))
 
 
-def sensitivities(study: Study, boundary: Boundary, samples: int = 1024) -> pd.DataFrame:
+def sensitivities(study: Study, boundary: Boundary, samples: int = 4096) -> pd.DataFrame:
     """Sobol indices of the probability of success over the ranges, with bootstrap intervals.
 
     Columns ``first`` and ``total`` (Saltelli et al. 2010), each with ``_low`` and ``_high``; one row a varied axis.

@@ -1,0 +1,96 @@
+"""A floating base in a recording: its twist in its own axes, what that says of its momentum, and what effects read.
+
+The base's six channels are force and moment on it, in its own axes about its frame's origin. Nothing drives a base
+that floats, so that what the channel "measures" is what the base's own momentum rate asks for, with the sign turned
+(plus a recorded force on it), and what is modelled is the arm's share. Their difference is the momentum balance of the
+whole system, and the error is relative to the base's own momentum rate.
+"""
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from ..errors import InputError
+from ..models.floating_tree import CARRIERS, FloatingTree
+from ..recordings.condition import Motion
+
+if TYPE_CHECKING:
+    from .experiment import Experiment
+
+Array = NDArray[np.float64]
+
+
+def with_twist(dataset: xr.Dataset, tree: FloatingTree) -> xr.Dataset:
+    """The recording with the base's twist in its own axes, and the force on it, under the names of its carriers.
+
+    The twist stands where positions do, so that conditioning smooths it and takes its rate; `as_carriers` puts it in
+    its place.
+
+    Raises
+    ------
+    InputError
+        Where the base's velocity, angular velocity or attitude is not recorded, or a quaternion is zero.
+    """
+    path, body = dataset.attrs.get("path", "recording"), tree.body
+    sets = {kind: [f"{kind}.{body}.{a}" for a in axes] for kind, axes in _NEEDED}
+    for name in [name for names in sets.values() for name in names]:
+        if name not in dataset:
+            raise InputError(
+                f"{path}: no signal {name!r} of the floating base; needed are vel, omega (world frame) and quat of "
+                f"it: add the column, map it under [signals], or name the body by 'base' in the model file"
+            )
+    quaternion, velocity, spin = (
+        np.stack([np.asarray(dataset[name].values, float) for name in sets[kind]], 1) for kind in sets
+    )
+    good = np.isfinite(quaternion).all(1)
+    size = np.linalg.norm(np.where(good[:, None], quaternion, 1.0), axis=1)
+    if np.any(np.abs(size - 1) > 0.1):
+        row = int(np.argmax(np.abs(size - 1)))
+        raise InputError(
+            f"{path}: quat.{body} in row {row} has length {size[row]:.3g}; give unit quaternions, w first"
+        )
+    back = Rotation.from_quat(np.where(good[:, None], quaternion, [1.0, 0, 0, 0]), scalar_first=True).inv()
+    twist = np.hstack([back.apply(velocity), back.apply(spin)])
+    twist[~good] = np.nan
+    columns = {}
+    for c, joint in enumerate(tree.joints[:CARRIERS]):
+        given = f"{'force' if c < 3 else 'torque'}.{body}.{'xyz'[c % 3]}"
+        force = np.asarray(dataset[given].values, float) if given in dataset else np.zeros(len(twist))
+        columns |= {f"q.{joint.name}": ("time", twist[:, c]), f"tau.{joint.name}": ("time", force)}
+    return dataset.assign(columns)
+
+
+_NEEDED = (("quat", "wxyz"), ("vel", "xyz"), ("omega", "xyz"))
+
+
+def as_carriers(motion: Motion, tree: FloatingTree) -> Motion:
+    """Motion of the carriers that give the base this twist: at zero, their rates are the twist.
+
+    Second rates differ from the twist's, since the carriers turn in one another: by the base's spin cross its velocity,
+    and by ``(w_y w_z, -w_x w_z, w_x w_y)``.
+    """
+    q, qd, qdd, tau = (x.copy("F") for x in (motion.q, motion.qd, motion.qdd, motion.tau))
+    velocity, spin = q[:, :3].copy(), q[:, 3:CARRIERS].copy()
+    rate = qd[:, :CARRIERS].copy()
+    x, y, z = spin.T
+    q[:, :CARRIERS] = 0.0
+    qd[:, :3], qd[:, 3:CARRIERS] = velocity, spin
+    qdd[:, :3] = rate[:, :3] + np.cross(spin, velocity)
+    qdd[:, 3:CARRIERS] = rate[:, 3:] - np.stack([y * z, -x * z, x * y], 1)
+    return replace(motion, q=q, qd=qd, qdd=qdd, tau=tau)
+
+
+def base_signals(experiment: "Experiment") -> dict[str, Array]:
+    """What a law at the base reads, each (n, 3), and time (n,)."""
+    motion = experiment.motion
+    x, y, z = spin = motion.qd[:, 3:CARRIERS].T
+    return {
+        "spin": spin.T,
+        "spin_rate": motion.qdd[:, 3:CARRIERS] + np.stack([y * z, -x * z, x * y], 1),
+        "acceleration": motion.qdd[:, :3],
+        "time": experiment.elapsed,
+    }

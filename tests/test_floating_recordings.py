@@ -1,0 +1,129 @@
+"""Recordings of a free-floating arm that MuJoCo made: what identify and diagnose find in them."""
+
+import mujoco
+import numpy as np
+import pytest
+import xarray as xr
+
+from snarelab.errors import InputError
+from snarelab.identification.diagnose import diagnose
+from snarelab.identification.identify import identify
+from snarelab.models.model_file import load_model, save_model
+from snarelab.recordings import write_recording
+
+PERIOD, STEP, DURATION = 0.02, 0.002, 60.0
+URDF = """<robot name="servicer">
+<link name="hub"><inertial><origin xyz="0.1 0 0.05"/><mass value="400"/>
+<inertia ixx="90" iyy="120" izz="100" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="shoulder" type="revolute"><parent link="hub"/><child link="upper"/><origin xyz="0.6 0.2 0.1"/>
+<axis xyz="0 0 1"/><limit lower="-3" upper="3" effort="100" velocity="2"/></joint>
+<link name="upper"><inertial><origin xyz="0.6 0 0"/><mass value="20"/>
+<inertia ixx="0.3" iyy="2.5" izz="2.5" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="elbow" type="revolute"><parent link="upper"/><child link="fore"/><origin xyz="1.2 0 0"/>
+<axis xyz="0 1 0"/><limit lower="-3" upper="3" effort="100" velocity="2"/></joint>
+<link name="fore"><inertial><origin xyz="0.5 0 0"/><mass value="15"/>
+<inertia ixx="0.2" iyy="1.4" izz="1.4" ixy="0" ixz="0" iyz="0"/></inertial></link></robot>"""
+MJCF = """<mujoco><option timestep="{step}" gravity="0 0 0" integrator="RK4"/><worldbody>
+<body name="hub"><freejoint/>{hub}
+<body pos="0.6 0.2 0.1"><joint name="shoulder" axis="0 0 1"/><inertial pos="0.6 0 0" mass="20"
+ diaginertia="0.3 2.5 2.5"/>
+<body pos="1.2 0 0"><joint name="elbow" axis="0 1 0"/><inertial pos="0.5 0 0" mass="15" diaginertia="0.2 1.4 1.4"/>
+</body></body></body></worldbody></mujoco>"""
+RIGID = '<inertial pos="0.1 0 0.05" mass="400" diaginertia="90 120 100"/>'
+PANELS = """<inertial pos="0.1 0 0.05" mass="399.999" diaginertia="78 112 92"/><body pos="0.1 0 0.05">
+<joint name="panels" axis="1 0 0" stiffness="{k}" damping="{c}"/><inertial pos="0 0 0" mass="0.001"
+ diaginertia="12 8 8"/></body>"""
+JOINTS = ("shoulder", "elbow")
+NOISE = {"q": 1e-6, "tau": 0.02, "vel": 2e-6, "omega": 2e-6}
+
+
+def recorded(path, seed, torque=(0.0, 0.0, 0.0), friction=0.0, hub=RIGID):
+    """Servo both joints along sines, with a torque on the base in its own axes and Coulomb friction in the shoulder."""
+    plant = mujoco.MjModel.from_xml_string(MJCF.format(step=STEP, hub=hub))
+    data, rng = mujoco.MjData(plant), np.random.default_rng(seed)
+    at = [plant.joint(name).qposadr[0] for name in JOINTS], [plant.joint(name).dofadr[0] for name in JOINTS]
+    periods, phases = rng.uniform(5, 9, (2, 2)), rng.uniform(0, 2 * np.pi, (2, 2))
+    drive = np.zeros(2)
+    every, rows = round(PERIOD / STEP), []
+    for k in range(round(DURATION / STEP)):
+        turn = 2 * np.pi * data.time / periods + phases
+        ramp = min(data.time / 3, 1.0)
+        target = ramp * np.sum([[0.5, 0.3], [0.5, 0.3]] * np.sin(turn), axis=1)
+        q, qd = data.qpos[at[0]], data.qvel[at[1]]
+        last = drive
+        drive = 300 * (target - q) - 150 * qd
+        slip = friction * np.tanh(qd[0] / 1e-3)
+        data.qfrc_applied[:] = 0.0
+        data.qfrc_applied[3:6] = torque  # MuJoCo's free joint: moment in the body's axes
+        data.qfrc_applied[at[1]] = drive - [slip, 0.0]
+        # A step holds its torque: at the step's start the mean of two is what acts.
+        if k % every == 0:
+            mujoco.mj_forward(plant, data)
+            turned = np.zeros(9)
+            mujoco.mju_quat2Mat(turned, data.qpos[3:7])
+            omega = turned.reshape(3, 3) @ data.qvel[3:6]
+            rows.append(np.concatenate([[data.time], q, (last + drive) / 2, data.qvel[:3], omega, data.qpos[3:7]]))
+        mujoco.mj_step(plant, data)
+    names = [f"q.{j}" for j in JOINTS] + [f"tau.{j}" for j in JOINTS]
+    names += [f"{kind}.hub.{a}" for kind in ("vel", "omega") for a in "xyz"] + [f"quat.hub.{a}" for a in "wxyz"]
+    table = np.array(rows)
+    columns = {}
+    for name, x in zip(names, table[:, 1:].T, strict=True):
+        columns[name] = ("time", x + NOISE.get(name.split(".")[0], 0.0) * rng.normal(size=len(x)))
+    write_recording(xr.Dataset(columns, coords={"time": table[:, 0]}), path)
+    return path
+
+
+def model(folder, text="", base="hub"):
+    (folder / "servicer.urdf").write_text(URDF, encoding="utf-8")
+    path = folder / "servicer.toml"
+    path.write_text(f'system = "free_floating_arm"\nurdf = "servicer.urdf"\nbase = "{base}"\n{text}', encoding="utf-8")
+    return load_model(path)
+
+
+def test_external_torque_is_named(tmp_path):
+    torque = (0.1, -0.05, 0.2)
+    train, held = (recorded(tmp_path / f"{k}.csv", k, torque) for k in (1, 2))
+    found = diagnose(model(tmp_path), [train], held).diagnosis
+    assert [(e.name, e.at) for e in found.effects] == [("external_torque", "base")]
+    got = found.effects[0].parameters
+    np.testing.assert_allclose([got[a].value for a in "xyz"], torque, atol=1e-3)
+    assert {place.channel for place in found.location} <= {f"torque.base.{a}" for a in "xyz"}
+
+
+def test_rigid_body_is_adequate_and_reads_back(tmp_path):
+    train, held = (recorded(tmp_path / f"{k}.csv", k) for k in (1, 2))
+    believed = model(tmp_path)
+    assert diagnose(believed, [train], held).diagnosis.verdict == "adequate"
+    fits = identify(believed, [train]).to_json()["fit"]
+    assert all(fits[f"torque.base.{a}"]["train"]["relative"] < 2e-3 for a in "xyz")
+    save_model(believed, tmp_path / "again.toml", "")
+    again = load_model(tmp_path / "again.toml")
+    assert again.joints == believed.joints
+    np.testing.assert_array_equal(again.tree.phi, believed.tree.phi)
+
+
+def test_friction_shows_at_its_joint_only(tmp_path):
+    train, held = (recorded(tmp_path / f"{k}.csv", k, friction=1.0) for k in (1, 2))
+    found = diagnose(model(tmp_path), [train], held).diagnosis
+    assert ("coulomb_friction", "shoulder") in [(e.name, e.at) for e in found.effects]
+    assert {place.channel for place in found.location} == {"tau.shoulder"}
+
+
+def test_bending_panels_are_named(tmp_path):
+    w = 2 * np.pi * 0.35
+    hub = PANELS.format(k=12 * w**2, c=12 * 2 * 0.02 * w)
+    train, held = (recorded(tmp_path / f"{k}.csv", k, hub=hub) for k in (1, 2))
+    found = diagnose(model(tmp_path), [train], held).diagnosis
+    assert [(e.name, e.at) for e in found.effects] == [("flexible_appendage", "base")]
+    got = found.effects[0].parameters
+    assert got["frequency"].value == pytest.approx(0.35, rel=0.02)
+    assert got["inertia_x"].value == pytest.approx(12.0, rel=0.05)
+
+
+def test_bad_input(tmp_path):
+    train = recorded(tmp_path / "1.csv", 1)
+    with pytest.raises(InputError, match=r"no signal 'quat.base.w' of the floating base"):
+        identify(model(tmp_path, base="base"), [train])
+    with pytest.raises(InputError, match="nothing to hold it would fall"):
+        model(tmp_path, "gravity = [0.0, 0.0, -9.81]")
