@@ -38,6 +38,8 @@ results and in reports. This page is written from the code by `python docs/make_
   moment on the arm at the hang point, z up. A *slide* goes by the name of the joint that moves it, and its effect is a
   friction force at the contacts. A *boom* is a link with slings beyond it, by the link's name. The rig's geometry takes
   each to the torque of every joint that it can turn.
+- On a free-floating arm (`system = "free_floating_arm"`): an effect at the *base* is a force and moment on it, in its
+  own axes, about the origin of its frame.
 - Units are those of a rotary joint. For a sliding joint read N for N·m, and m for rad. U is the channel's own unit.
 - `q`, `qd` and `qdd` are the joint's position, speed and acceleration. `load` is the rigid-body torque at the joint,
   from the model. `sgn` is the direction of motion, smoothed over 0.1 % of the joint's peak speed.

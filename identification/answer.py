@@ -7,11 +7,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..models.floating_tree import channel
+from ..models.floating_tree import channel, n_carriers
 from ..models.model_file import Model
 from .diagnosis import Candidate, ChannelFit, Diagnosis, Estimate, Finding, Misfit, Moved, Rival, Step, Trace
 from .experiment import Experiment
 from .fit import Fit, channel_rms
+from .floating_terms import momentum_floor
 from .locate import locate
 from .reliability import probability as reliability
 from .search import Found, Taken
@@ -179,6 +180,9 @@ def _noise_floor(experiments: Sequence[Experiment], final: Fit) -> Array:
         top = frequency > min(2 * e.motion.band, 0.4 / e.motion.period)
         # The median of a periodogram is ln 2 of its mean, and is not moved by single lines.
         floors.append(np.sqrt(np.median(density[top], axis=0) / np.log(2) * e.motion.band))
+        carriers = n_carriers(e.body.tree)
+        if carriers:
+            floors[-1][:carriers] = momentum_floor(e)
     return np.min(floors, axis=0)
 
 

@@ -17,7 +17,7 @@ from ..models.rig_kinematics import sling_map
 from ..models.rigid_body import RigidBody
 from ..recordings import JointKind, read_recording
 from ..recordings.condition import Motion, condition
-from .floating_terms import as_carriers, with_twist
+from .floating_terms import as_carriers, twist_noise, with_twist
 
 Array = NDArray[np.float64]
 
@@ -128,7 +128,10 @@ def load_experiments(
     if any(m.band > 1.01 * narrowest for m in motions):
         motions = [condition(d, model.joints, narrowest) for d in datasets]
     if isinstance(tree, FloatingTree):
-        return [_balanced(Experiment(as_carriers(m, tree), body)) for m in motions]
+        return [
+            _balanced(Experiment(as_carriers(m, tree), body, store={"twist_noise": twist_noise(d, tree)}))
+            for m, d in zip(motions, datasets, strict=True)
+        ]
     return [
         Experiment(m, body, {name: np.interp(m.time, d["time"].values, x) for name, x in t.items()})
         for m, d, t in zip(motions, datasets, measured, strict=True)

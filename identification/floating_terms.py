@@ -46,13 +46,11 @@ def with_twist(dataset: xr.Dataset, tree: FloatingTree) -> xr.Dataset:
     quaternion, velocity, spin = (
         np.stack([np.asarray(dataset[name].values, float) for name in sets[kind]], 1) for kind in sets
     )
-    good = np.isfinite(quaternion).all(1)
+    good = np.asarray(np.isfinite(quaternion).all(1))
     size = np.linalg.norm(np.where(good[:, None], quaternion, 1.0), axis=1)
     if np.any(np.abs(size - 1) > 0.1):
         row = int(np.argmax(np.abs(size - 1)))
-        raise InputError(
-            f"{path}: quat.{body} in row {row} has length {size[row]:.3g}; give unit quaternions, w first"
-        )
+        raise InputError(f"{path}: quat.{body} in row {row} has length {size[row]:.3g}; give unit quaternions, w first")
     back = Rotation.from_quat(np.where(good[:, None], quaternion, [1.0, 0, 0, 0]), scalar_first=True).inv()
     twist = np.hstack([back.apply(velocity), back.apply(spin)])
     twist[~good] = np.nan
@@ -82,6 +80,24 @@ def as_carriers(motion: Motion, tree: FloatingTree) -> Motion:
     qdd[:, :3] = rate[:, :3] + np.cross(spin, velocity)
     qdd[:, 3:CARRIERS] = rate[:, 3:] - np.stack([y * z, -x * z, x * y], 1)
     return replace(motion, q=q, qd=qd, qdd=qdd, tau=tau)
+
+
+def twist_noise(dataset: xr.Dataset, tree: FloatingTree) -> Array:
+    """Variance of white noise on each component of the twist (6,), from fourth differences: motion hardly has any."""
+    columns = np.stack([np.asarray(dataset[f"q.{j.name}"].values, float) for j in tree.joints[:CARRIERS]], 1)
+    return np.nanmean(np.diff(columns, 4, axis=0) ** 2, axis=0) / 70.0
+
+
+def momentum_floor(experiment: "Experiment") -> Array:
+    """RMS that the twist's noise leaves in the base's channels in the analysis band (6,) [N, N·m].
+
+    Noise of density S [unit²/Hz] has the derivative's variance (2 pi)² S band³ / 3 up to the band's edge, and comes
+    through the base's mass matrix.
+    """
+    motion = experiment.motion
+    density = 2 * motion.period * experiment.store["twist_noise"]
+    inertia = np.mean(experiment.mass_matrix[:, :CARRIERS, :CARRIERS], axis=0)
+    return np.sqrt(inertia**2 @ density * (2 * np.pi) ** 2 * motion.band**3 / 3)
 
 
 def base_signals(experiment: "Experiment") -> dict[str, Array]:

@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from ..errors import InputError
+from ..models.floating_tree import FloatingTree
 from ..models.model_file import Model
 from ..models.rigid_body import RigidBody
 from .assembly import Assembly
@@ -33,6 +34,11 @@ def simulate(model: Model, motion: str | Path) -> xr.Dataset:
     InputError
         A parameter without a value, or whatever is wrong with the recording.
     """
+    if isinstance(model.tree, FloatingTree):
+        raise InputError(
+            f"{model.path}: system = 'free_floating_arm' cannot be simulated along a recorded motion; "
+            f"'snarelab identify' and 'diagnose' read such recordings"
+        )
     experiment = load_experiments(model, [motion], RigidBody(model.tree))[0]
     assembly = Assembly(model.tree, model.effects, None, scales([experiment]), model.values)
     needed = [f"{p.key}.{x.name}" for p in model.effects for x in p.effect.parameters]

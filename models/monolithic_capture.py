@@ -98,7 +98,14 @@ class MonolithicCapture:
         self._data = a.system.systemData
         self._ends = self._data.GetObjectLTGAE(a.ends_object)
         self._section = np.array(
-            [p.mass_per_length, p.axial_stiffness, p.bending_stiffness, p.axial_damping, p.bending_damping]
+            [
+                p.mass_per_length,
+                p.axial_stiffness,
+                p.bending_stiffness,
+                p.axial_damping,
+                p.bending_damping,
+                p.swing_damping,
+            ]
         )
         self._wrench, self._impulse, self._time = np.zeros(12), np.zeros(3), 0.0
         self.first_contact: float | None = None

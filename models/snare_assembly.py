@@ -2,7 +2,7 @@
 
 Coordinates are ordered cable by cable, node by node, (r, r') each; the target's follow. Cables are straight when free
 of stress (`strainIsRelativeToReference` = 0): Exudyn's other choice is not frame-indifferent in three dimensions.
-Nor is its damping in bending, which is left at 0: `snare_damping` takes its place.
+Nor is its damping in bending: `snare_damping` takes its place, but for a little of it (`swing_damping`).
 """
 
 from dataclasses import dataclass, field
@@ -255,6 +255,7 @@ def add_cable(system: Any, nodes: np.ndarray, parameters: SnareParameters) -> li
                 bendingStiffness=p.bending_stiffness,
                 axialStiffness=p.axial_stiffness,
                 axialDamping=p.axial_damping * p.axial_stiffness,
+                bendingDamping=p.swing_damping * p.bending_stiffness,
                 strainIsRelativeToReference=0.0,
                 nodeNumbers=[first, second],
                 useReducedOrderIntegration=2,

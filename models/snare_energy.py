@@ -34,7 +34,7 @@ def cable_energies(
 ):
     """Energies and losses of all cables, shape (7,), in the order above.
 
-    `section`: ρA, EA, EI, and the stiffness-proportional damping of tension and of bending [s].
+    `section`: ρA, EA, EI, and the stiffness-proportional damping of tension, of bending and of the swing [s].
     """
     result = np.zeros(7)
     for first_row in range(0, positions.shape[0] - 2, 2):
@@ -61,6 +61,7 @@ def cable_energies(
             bent = dot(curvature, curvature)
             result[STRAIN] += 0.5 * share * bent
             result[BENDING_LOSS] += share * section[4] * dot(curvature, rate) ** 2 / (bent + STRAIGHT * STRAIGHT)
+            result[BENDING_LOSS] += share * section[5] * dot(rate, rate)
         for i in range(4):
             speed = combine(weights(_MASS_POINTS[i, 0], size), rates)
             result[KINETIC] += 0.5 * _MASS_POINTS[i, 1] * size * section[0] * dot(speed, speed)

@@ -46,6 +46,11 @@ def _dimension(value: float, unit: str, kind: Kind, source: str, allowed: str = 
 class SnareParameters:
     """Dimensions of rings, cables, pin and contact; `dimensions` lists each with unit and source.
 
+    Bending is damped in two ways. `bending_damping` acts on the rate of the curvature's size and leaves a swing of the cable
+    about its chord alone. `swing_damping` acts on the rate of the curvature vector and so brakes that swing too, as friction
+    in the ends' bearings would: little of it makes vibrations across the bend die, without which results converge slowly
+    with the step. Set it to 0 to compare with rods whose ends turn freely; first contact then comes 20 ms earlier.
+
     The end effector's frame has x along its axis: the fixed ring lies at x = 0, the rotating one at `ring_distance`.
     The target's frame has its origin at the foot of the pin, which points along −x and ends in a knob.
 
@@ -62,6 +67,7 @@ class SnareParameters:
     young_modulus: float = _dimension(20e9, "Pa", "paper", "Li et al., ground test")
     density: float = _dimension(7800.0, "kg/m**3", "paper", "Li et al., ground test")
     bending_damping: float = _dimension(1e-3, "s", "chosen", "ratio of damping to stiffness in bending", ">= 0")
+    swing_damping: float = _dimension(6e-6, "s", "chosen", "rate of the whole curvature vector; see below", ">= 0")
     axial_damping: float = _dimension(1e-4, "s", "chosen", "ratio of damping to stiffness in tension", ">= 0")
     end_stiffness: float = _dimension(0.0, "N*m/rad", "chosen", "spherical joints, as in the paper", ">= 0")
     ring_rate: float = _dimension(8 * pi / 180, "rad/s", "paper", "Li et al.: 8 deg/s")

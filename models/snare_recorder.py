@@ -35,7 +35,14 @@ class Recorder:
         self._ends = data.GetObjectLTGAE(assembly.ends_object)
         p = assembly.parameters
         self._section = np.array(
-            [p.mass_per_length, p.axial_stiffness, p.bending_stiffness, p.axial_damping, p.bending_damping]
+            [
+                p.mass_per_length,
+                p.axial_stiffness,
+                p.bending_stiffness,
+                p.axial_damping,
+                p.bending_damping,
+                p.swing_damping,
+            ]
         )
         self.pin_wrench = np.zeros(6)
         self.effector_wrench = np.zeros(6)

@@ -137,18 +137,12 @@ def bending_panels(s, inertia_x, inertia_y, inertia_z, frequency, damping):
     return np.hstack([np.zeros_like(moment), moment])
 
 
-def mass_on_springs(s, mass, x, y, z, frequency, damping):
-    """Wrench of a point mass that springs hold at a point of the base."""
-    wx, wy, wz = s["spin_rate"].T
-    carried = s["acceleration"] + np.stack([wy * z - wz * y, wz * x - wx * z, wx * y - wy * x], axis=1)
-    fx, fy, fz = force = -mass * rung(carried, frequency, damping).T
-    return np.stack([*force, y * fz - z * fy, z * fx - x * fz, x * fy - y * fx], axis=1)
-
-
 def steady_moment(s, x, y, z):
     """Two equal and opposite forces on arms of 1 m for each axis."""
     arms, forces = np.eye(3), np.array([[0, z, 0], [0, 0, x], [y, 0, 0]]) / 2
-    moment = sum(np.cross(side * arm, side * force) for side in (1, -1) for arm, force in zip(arms, forces, strict=True))
+    moment = sum(
+        np.cross(side * arm, side * force) for side in (1, -1) for arm, force in zip(arms, forces, strict=True)
+    )
     return np.tile(np.concatenate([np.zeros(3), moment]), (TIME.size, 1))
 
 
@@ -291,9 +285,6 @@ REFERENCES = {
     "external_torque": Reference({"x": 0.4, "y": -0.2, "z": 0.7}, steady_moment),
     "flexible_appendage": Reference(
         {"inertia_x": 4.0, "inertia_y": 9.0, "inertia_z": 2.0, "frequency": 0.6, "damping": 0.03}, bending_panels
-    ),
-    "propellant_slosh": Reference(
-        {"mass": 30.0, "x": 0.4, "y": -0.3, "z": 0.6, "frequency": 0.4, "damping": 0.05}, mass_on_springs
     ),
     "sensor_bias": Reference({"offset": 0.3}, lambda s, offset: np.polyval([1.0, offset], s["value"])),
     "sensor_drift": Reference({"rate": 0.05}, lambda s, rate: np.interp(TIME, [0, 9], [0, 9 * rate]) + s["value"]),

@@ -1,5 +1,6 @@
 """Recordings of a free-floating arm that MuJoCo made: what identify and diagnose find in them."""
 
+# pyright: reportAttributeAccessIssue=false
 import mujoco
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Three equal oscillators on a base that accelerates, one along each axis: what bends or sloshes there."""
+"""Three equal oscillators on a base that accelerates, one for each axis: what bends there."""
 
 import casadi as ca
 
@@ -13,10 +13,10 @@ FREQUENCY = Parameter(
     zero=0.3,
     low=0.01,
     high=20.0,
-    grid=tuple(round(0.05 * 1.25**k, 4) for k in range(24)),
+    grid=tuple(round(0.05 * 1.12**k, 4) for k in range(36)),
 )
 
-DAMPING = Parameter("damping", "", "share of critical damping", zero=0.02, low=1e-5, high=1.0, grid=(0.02,))
+DAMPING = Parameter("damping", "", "share of critical damping", zero=0.1, low=1e-5, high=1.0, grid=(0.1,))
 
 
 def second_rates(s: Symbols, p: Symbols, driven: ca.SX) -> ca.SX:
