@@ -46,10 +46,11 @@ def _dimension(value: float, unit: str, kind: Kind, source: str, allowed: str = 
 class SnareParameters:
     """Dimensions of rings, cables, pin and contact; `dimensions` lists each with unit and source.
 
-    Bending is damped in two ways. `bending_damping` acts on the rate of the curvature's size and leaves a swing of the cable
-    about its chord alone. `swing_damping` acts on the rate of the curvature vector and so brakes that swing too, as friction
-    in the ends' bearings would: little of it makes vibrations across the bend die, without which results converge slowly
-    with the step. Set it to 0 to compare with rods whose ends turn freely; first contact then comes 20 ms earlier.
+    Bending is damped in two ways. `bending_damping` acts on the rate of the curvature's size and leaves a swing of the
+    cable about its chord alone. `swing_damping` acts on the rate of the curvature vector and so brakes that swing too,
+    as friction in the ends' bearings would: a little of it makes vibrations across the bend die, without which results
+    converge slowly with the step. Set it to 0 to compare with rods whose ends turn freely; first contact then comes
+    20 ms earlier.
 
     The end effector's frame has x along its axis: the fixed ring lies at x = 0, the rotating one at `ring_distance`.
     The target's frame has its origin at the foot of the pin, which points along −x and ends in a knob.

@@ -227,7 +227,7 @@ def test_baseline_with_columns_that_depend_on_each_other():
 def test_candidate_columns_that_are_alike_count_once():
     problem = Problem(4, k=1)
     evidence = problem.evidence()
-    one = evidence.gain(problem.products(evidence), *(b[:1] for b in FREE))
+    one = evidence.gain(problem.products(evidence), FREE[0][:1], FREE[1][:1])
     twice = evidence.products([(k, np.hstack([c, 3 * c])) for k, c in enumerate(problem.candidate)])
     for bounds in (FREE, (np.array([0.0, 0.0]), np.array([0.1, np.inf]))):
         assert evidence.gain(twice, *bounds).total == pytest.approx(one.total, rel=1e-6)
@@ -243,7 +243,7 @@ def test_a_column_that_the_baseline_can_mimic_gains_nothing():
         for i, x in zip(problem.index, problem.columns, strict=True)
     ]
     evidence = problem.evidence()
-    gain = evidence.gain(problem.products(evidence), *(b[:1] for b in FREE))
+    gain = evidence.gain(problem.products(evidence), FREE[0][:1], FREE[1][:1])
     assert gain.total == 0.0
     assert gain.unabsorbed < 1e-5
 

@@ -65,5 +65,5 @@ def _winding(loop: np.ndarray, foot: np.ndarray, axis: np.ndarray) -> int:
     on_line = foot + ((loop[:, 0] - foot[0]) / axis[0])[:, None] * axis
     across = loop - on_line
     angles = np.arctan2(across[:, 2], across[:, 1])
-    steps = np.diff(np.append(angles, angles[0]))
-    return round(float(np.sum((steps + np.pi) % (2 * np.pi) - np.pi)) / (2 * np.pi))
+    steps: np.ndarray = np.diff(np.append(angles, angles[0]))
+    return round(float(np.sum(np.mod(steps + np.pi, 2 * np.pi) - np.pi)) / (2 * np.pi))
