@@ -176,6 +176,8 @@ def test_an_interpreter_without_the_package_is_told(tmp_path):
     write_hosted("left_oscillator", tmp_path / "x.fmu", 2)
 
     def change(name, data):
+        if name == "resources/host.json":  # the folders of this test's own packages would serve it
+            return json.dumps({**json.loads(data), "path": []}).encode()
         return f"{bare}\n".encode() if name == "resources/python.txt" else data
 
     path, logged = rewritten(tmp_path / "x.fmu", tmp_path / "bad.fmu", change), []
