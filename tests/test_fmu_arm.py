@@ -1,7 +1,7 @@
 """The self-contained arm against other engines: accelerations, motion, order, floating base, springs, sensors."""
 
-from dataclasses import ctypes
-from pathlib import Path
+import ctypes
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
