@@ -2,12 +2,12 @@
 
 import ctypes
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 import pytest
-import replace
 from scipy.integrate import solve_ivp
 
 from bench.fmu_models import Slave, everywhere, write_model
