@@ -71,13 +71,14 @@ def run(kind: str, seed: int, only_curves: bool) -> dict[str, Any]:
 
 def table(lines: list[dict[str, Any]]) -> str:
     """Counts by kind, and the share of the true friction curves inside the 2σ bands."""
-    heads = ("diagnosed", "named", "in class", "at its place", "seeds", "coverage")
+    heads = ("diagnosed", "named", "in class", "at its place", "wrong extra", "seeds", "coverage")
     rows = [f"{'concealed':<22}" + "".join(f"{h:>14}" for h in heads)]
     for kind in KINDS:
         own = {x["seed"]: x for x in lines if x["kind"] == kind}.values()
         if own:
             scores = [x["score"] for x in own if "score" in x]
             counts = [f"{sum(s[key] for s in scores)} / {len(scores)}" for key in ("named", "in_class", "placed")]
+            counts.append(f"{sum(s['wrong'] > 0 for s in scores)} / {len(scores)}")
             inside = np.mean([list(x["coverage"].values()) for x in own])
             cells = [str(len(scores)), *counts, str(len(own)), f"{inside:.3f}"]
             rows.append(f"{kind:<22}" + "".join(f"{c:>14}" for c in cells))

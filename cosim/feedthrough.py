@@ -88,7 +88,7 @@ class FeedThrough:
         try:
             self._participants[participant].set_inputs(factor * outputs[source] + offset)
             outputs[shown] = self._participants[participant].outputs()
-        except Exception as error:
+        except Exception as error:  # another's code may raise anything; it is named and passed on
             raise self.failure(participant, error) from error
 
     def failure(self, participant: int, error: Exception, when: str = "") -> StepError:

@@ -191,7 +191,7 @@ class Instance:
         """The status of a call through FMPy, which raises instead."""
         try:
             call()
-        except Exception as error:
+        except Exception as error:  # FMPy raises bare exceptions; those without a status go on
             status = getattr(error, "status", None)
             if status is None:
                 raise

@@ -80,6 +80,7 @@ class Participant(ABC):
 
         Called after each `set_inputs` where `input_order` is 1 (``second`` is then zero) or 2, and then only.
         """
+        # Optional in FMI: called only where `input_order` says so.
         raise NotImplementedError(f"{self.name}: takes no input derivatives")
 
     def begin(self, time: float, size: float) -> None:
@@ -95,6 +96,7 @@ class Participant(ABC):
 
     def save(self) -> Any:
         """Everything that decides the future; to be treated as opaque."""
+        # Optional in FMI, as is `restore`: called only where `can_restore` says so.
         raise NotImplementedError(f"{self.name}: cannot save its state")
 
     def restore(self, state: Any) -> None:

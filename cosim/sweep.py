@@ -151,7 +151,7 @@ class Sweep:
         for i in begun:
             try:
                 self._participants[i].finish()
-            except Exception as error:
+            except Exception as error:  # every one must be waited for, whatever the others raise
                 failures.append(self.failure(i, time, error))
         if failures:
             raise failures[0]
@@ -159,7 +159,7 @@ class Sweep:
         for i, participant in enumerate(self._participants):
             try:
                 outputs[self._layout.output_slices[i]] = participant.outputs()
-            except Exception as error:
+            except Exception as error:  # another's code may raise anything; it is named and passed on
                 raise self.failure(i, time, error) from error
         return outputs
 
@@ -185,7 +185,7 @@ class Sweep:
                     self._feed.ask(i, outputs)
                 else:
                     outputs[where] = participant.outputs()
-            except Exception as error:
+            except Exception as error:  # another's code may raise anything; it is named and passed on
                 raise self.failure(i, time, error) from error
             known = [outputs[where], *(value[where] for value in past)]
             for order in orders:

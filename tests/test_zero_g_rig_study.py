@@ -148,13 +148,16 @@ def test_a_score_asks_for_name_and_place():
     elsewhere = _Diagnosis(effects=[_Effect("link_torsion", "link4")])
     alike = _Diagnosis(effects=[_Effect("com_offset", "link3", (_Rival("link_torsion", "link3", False),))])
     apart = _Diagnosis(effects=[_Effect("com_offset", "link3", (_Rival("link_torsion", "link3", True),))])
-    told = [score(answer, d, [CURVE]) for d in (right, elsewhere, alike, apart)]  # pyright: ignore[reportArgumentType]
+    extra = _Diagnosis(effects=[_Effect("link_torsion", "link3"), _Effect("makkar_friction", "joint1")])
+    told = [score(answer, d, [CURVE]) for d in (right, elsewhere, alike, apart, extra)]  # pyright: ignore[reportArgumentType]
     assert [(s.named, s.placed, s.in_class) for s in told] == [
         (True, True, True),
         (True, False, True),
         (False, False, True),
         (False, False, False),
+        (True, True, True),
     ]
+    assert [s.wrong for s in told] == [0, 1, 1, 1, 1]
     assert told[0].coverage == pytest.approx(0.5)
 
 

@@ -15,6 +15,7 @@ implicit cosimulation methods: stability and convergence analysis for different 
 J. Comput. Nonlinear Dynam. 10).
 """
 
+from abc import abstractmethod
 from collections.abc import Mapping
 
 import numpy as np
@@ -56,9 +57,9 @@ class _LinearHalf(Participant):
         self._n, self._m = n, m
         self._maps.clear()
 
+    @abstractmethod
     def _equations(self, values: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """A (n, n), B (n, m) and the outputs' matrix on state and input (n_outputs, n + m)."""
-        raise NotImplementedError
 
     def set_inputs(self, values: np.ndarray) -> None:
         """Hold the inputs, without a slope."""

@@ -107,6 +107,7 @@ def numbers(friction: Friction, found: Diagnosis, result: Score) -> list[Quantit
         *quantities,
         Quantity("named", "", named, "reference"),
         Quantity("named_rightly", "1", float(result.placed), "reference"),
+        Quantity("named_wrongly", "1", float(result.wrong), "reference"),
         Quantity("friction_band_coverage", "1", result.coverage, "reference"),
     ]
 

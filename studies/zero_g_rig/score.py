@@ -26,6 +26,8 @@ class Score:
         ... at its own place.
     in_class : bool
         It is named, or is a rival that the diagnosis says it cannot tell from one it named.
+    wrong : int
+        Effects found that are not concealed, or not at that place.
     coverage : float
         Share of the true friction curves inside the 2σ bands.
     """
@@ -33,6 +35,7 @@ class Score:
     named: bool
     placed: bool
     in_class: bool
+    wrong: int
     coverage: float
 
 
@@ -50,7 +53,7 @@ def score(answer: Mapping[str, Any], diagnosis: Diagnosis, drawn: Sequence[Curve
     covered = coverage(drawn, true_curves(answer, drawn))
     if effect is None:
         quiet = diagnosis.verdict == "adequate"
-        return Score(quiet, quiet, quiet, covered)
+        return Score(quiet, quiet, quiet, len(diagnosis.effects), covered)
     found = {(e.name, e.at) for e in diagnosis.effects}
     rivals = {(r.name, r.at) for e in diagnosis.effects for r in e.rivals if not r.separable}
     names = {name for name, _ in found}
@@ -58,6 +61,7 @@ def score(answer: Mapping[str, Any], diagnosis: Diagnosis, drawn: Sequence[Curve
         effect["name"] in names,
         (effect["name"], effect["at"]) in found,
         effect["name"] in names | {name for name, _ in rivals},
+        len(found - {(effect["name"], effect["at"])}),
         covered,
     )
 
