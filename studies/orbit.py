@@ -38,8 +38,8 @@ MACRO_STEP = 1e-3
 OFFSET, AHEAD, TILT = 0.02, 0.12, np.deg2rad(2.0)
 """Start of the pin's foot in the end effector's frame: radial, each way, and axial [m]; turn about each axis [rad]."""
 SNARE = WIDE_RING
-"""Of the two sets of sizes that meet the ground test's first contact, the one that also meets the paper's orbits: chosen
-by the result, so that agreement proves nothing. The other one is a case of each study."""
+"""Of the two sets of sizes that meet the ground test's first contact, the one that also meets the paper's orbits:
+chosen by the result, so that agreement proves nothing. The other one is a case of each study."""
 TARGET_MASS, TARGET_SIDE = 1e4, 2.0
 """Of the floating target: mass [kg] (Li et al.); side of a uniform cube, pin in a face's middle [m], chosen."""
 ALONG_TIP = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
