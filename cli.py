@@ -83,7 +83,8 @@ def _parser() -> argparse.ArgumentParser:
 
 def _identify(given: argparse.Namespace) -> None:
     from .identification.identify import identify  # engines load only for a command that needs them
-    from .models.model_file import load_model, save_model
+    from .models.model_file import load_model
+    from .models.model_write import save_model
 
     _writable([given.json, given.save_model], [*given.recordings, given.holdout])
     model = load_model(given.model)
@@ -101,7 +102,8 @@ def _identify(given: argparse.Namespace) -> None:
 def _diagnose(given: argparse.Namespace) -> None:
     from .identification.diagnose import diagnose
     from .identification.report import write_report
-    from .models.model_file import load_model, save_model
+    from .models.model_file import load_model
+    from .models.model_write import save_model
 
     _writable([given.json, given.report, given.save_model], [*given.recordings, given.holdout])
     model = load_model(given.model)

@@ -28,7 +28,7 @@ from snarelab.cosim.master import HoldName, Master, Scheme
 from snarelab.cosim.participant import StepError
 from snarelab.cosim.participants.oscillator import LeftOscillator, RightOscillator
 from snarelab.cosim.system import System
-from snarelab.identification.report_drawing import drawing, svg
+from snarelab.report.drawing import drawing, svg
 
 CONNECTIONS = (("right.force", "left.force"), ("left.x", "right.x_left"), ("left.v", "right.v_left"))
 HOLDS: tuple[HoldName, ...] = ("constant", "midpoint", "linear", "quadratic")

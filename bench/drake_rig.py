@@ -19,7 +19,7 @@ from pydrake.multibody.tree import (
 )
 
 from snarelab.models.inertia import to_central
-from snarelab.models.rig import Rig
+from snarelab.models.rig.rig import Rig
 from snarelab.models.tree import Tree
 
 Array = NDArray[np.float64]

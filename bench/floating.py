@@ -26,13 +26,13 @@ import pinocchio as pin
 from mujoco import rollout
 from scipy.spatial.transform import Rotation
 
-from snarelab.models.ets_vii import ets_vii
-from snarelab.models.floating_arm import FloatingArm
-from snarelab.models.floating_dynamics import in_world, tip_pose
-from snarelab.models.floating_motion import FloatingMotion
-from snarelab.models.floating_plant import FloatingPlant
+from snarelab.models.floating.arm import FloatingArm
+from snarelab.models.floating.dynamics import in_world, tip_pose
+from snarelab.models.floating.ets_vii import ets_vii
+from snarelab.models.floating.joint_drive import Drive
+from snarelab.models.floating.motion import FloatingMotion
+from snarelab.models.floating.plant import FloatingPlant
 from snarelab.models.inertia import Array, from_central, to_central
-from snarelab.models.joint_drive import Drive
 from snarelab.models.tree import Link
 from snarelab.studies.free_floating import DURATION, TARGET, gains
 

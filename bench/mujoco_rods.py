@@ -20,9 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from snarelab.models.snare_drive import ring_motion
-from snarelab.models.snare_parameters import SnareParameters
-from snarelab.models.snare_target import Target
+from snarelab.models.snare.drive import ring_motion
+from snarelab.models.snare.parameters import SnareParameters
+from snarelab.models.snare.target import Target
 
 Array = NDArray[np.float64]
 STIFF = 'solimp="0.9999 0.9999 0.001 0.5 2"'

@@ -24,10 +24,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.mujoco_rods import capture
-from snarelab.models.snare import SnareModel
-from snarelab.models.snare_parameters import SnareParameters
-from snarelab.models.snare_settled import settled
-from snarelab.models.snare_target import PAPER_POSITION, Target
+from snarelab.models.snare.model import SnareModel
+from snarelab.models.snare.parameters import SnareParameters
+from snarelab.models.snare.settled import settled
+from snarelab.models.snare.target import PAPER_POSITION, Target
 
 Array = NDArray[np.float64]
 DURATION, EVERY = 10.0, 0.01

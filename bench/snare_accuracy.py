@@ -22,9 +22,9 @@ os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from snarelab.models.snare import ACCURACIES, Accuracy, SnareModel
-from snarelab.models.snare_parameters import SnareParameters
-from snarelab.models.snare_target import Target
+from snarelab.models.snare.model import ACCURACIES, Accuracy, SnareModel
+from snarelab.models.snare.parameters import SnareParameters
+from snarelab.models.snare.target import Target
 
 SEED = 3
 REFERENCE = Accuracy(2.5e-4, 28, 1e-4)

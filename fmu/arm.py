@@ -19,10 +19,10 @@ from typing import Any
 import casadi as ca
 
 from ..errors import InputError
-from ..models.floating_arm import FloatingArm
-from ..models.floating_symbols import Tip, quaternion_rate, rotation_of, tip
-from ..models.model_file import Model, Placed
-from ..models.rig import Rig
+from ..models.floating.arm import FloatingArm
+from ..models.floating.symbols import Tip, quaternion_rate, rotation_of, tip
+from ..models.model import Model, Placed
+from ..models.rig.rig import Rig
 from ..models.rigid_body import symbolic_torque
 from .equations import Equations, Ledger
 from .placed_laws import PlacedLaws, identifier

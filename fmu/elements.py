@@ -7,9 +7,9 @@ import casadi as ca
 import numpy as np
 
 from ..models.effects import get_effect
-from ..models.ets_vii import ets_vii
-from ..models.model_file import Model
-from ..models.space_arm import CAPTURE_POSE, space_arm, space_arm_drive
+from ..models.floating.ets_vii import ets_vii
+from ..models.floating.space_arm import CAPTURE_POSE, space_arm, space_arm_drive
+from ..models.model import Model
 from .arm import Servo, arm_equations
 from .equations import Equations, Ledger
 
@@ -89,7 +89,7 @@ def ets_vii_arm() -> Equations:
 
 
 def station_arm() -> Equations:
-    """The arm of seven joints on a base of 40 t: servo, friction and rotors of `snarelab.models.space_arm`."""
+    """The arm of seven joints on a base of 40 t: servo, friction and rotors of `snarelab.models.floating.space_arm`."""
     arm = space_arm()
     drive = space_arm_drive(arm)
     speeds = {f"speed_scale.{joint.name}": joint.speed for joint in arm.tree.joints}

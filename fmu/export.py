@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
-from ..models.floating_arm import FloatingArm, load_arm
-from ..models.model_file import Model, load_model
+from ..models.floating.arm import FloatingArm, load_arm
+from ..models.model import Model
+from ..models.model_file import load_model
 from .arm import arm_equations
 from .build import write_fmu
 from .elements import ELEMENTS

@@ -11,8 +11,8 @@ import casadi as ca
 import numpy as np
 
 from ..errors import InputError
-from ..models.model_file import Model, Placed
-from ..models.rig import Rig
+from ..models.model import Model, Placed
+from ..models.rig.rig import Rig
 from ..models.rigid_body import symbolic_torque
 from .equations import Equations, Ledger
 from .placed_laws import PlacedLaws, identifier

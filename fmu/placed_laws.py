@@ -8,8 +8,8 @@ import numpy as np
 from ..errors import InputError
 from ..models.effect import Effect, Parameter
 from ..models.hidden_state import SIGNALS
-from ..models.model_file import Model, Placed
-from ..models.rig_kinematics import far_end
+from ..models.model import Model, Placed
+from ..models.rig.kinematics import far_end
 from .equations import Ledger
 from .symbolic import root
 

@@ -7,8 +7,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..models.floating_tree import channel, n_carriers
-from ..models.model_file import Model
+from ..models.floating.tree import channel, n_carriers
+from ..models.model import Model
 from .diagnosis import Candidate, ChannelFit, Diagnosis, Estimate, Finding, Misfit, Moved, Rival, Step, Trace
 from .experiment import Experiment
 from .fit import Fit, channel_rms

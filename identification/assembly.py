@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..models.effect import Parameter
-from ..models.model_file import Placed
-from ..models.rig import Rig
-from ..models.rig_kinematics import sling_of
+from ..models.model import Placed
+from ..models.rig.kinematics import sling_of
+from ..models.rig.rig import Rig
 from ..models.tree import Tree
 from .base_parameters import INERTIAL, BaseParameters
 from .effect_terms import contributions

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..models.floating_tree import n_carriers
+from ..models.floating.tree import n_carriers
 from ..models.inertia import Array
 from ..models.rigid_body import RigidBody
 from ..models.tree import Tree

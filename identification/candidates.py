@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from ..models.effect import Effect, Parameter
 from ..models.effects import effects
-from ..models.floating_tree import n_carriers
-from ..models.model_file import Model, Placed, places
+from ..models.floating.tree import n_carriers
+from ..models.model import Model, Placed, places
 from .assembly import Assembly, Evaluation
 from .effect_terms import contributions
 from .experiment import Experiment

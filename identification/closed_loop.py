@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt, welch
 
-from ..models.floating_tree import n_carriers
+from ..models.floating.tree import n_carriers
 from .candidates import smooth_columns
 from .experiment import Experiment
 from .fit import Fit

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..models.effects import effects
 from ..models.hidden_state import prepare
-from ..models.model_file import Model
+from ..models.model import Model
 from ..models.rigid_body import RigidBody
 from .answer import report_on
 from .assembly import Assembly

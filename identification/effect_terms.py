@@ -8,9 +8,9 @@ from scipy.signal import fftconvolve
 
 from ..models.effect import Effect
 from ..models.hidden_state import evaluate_law, rows
-from ..models.model_file import Placed
-from ..models.rig import Rig
-from ..models.rig_kinematics import far_end
+from ..models.model import Placed
+from ..models.rig.kinematics import far_end
+from ..models.rig.rig import Rig
 from ..models.tree import Tree
 from .experiment import Experiment
 from .floating_terms import base_signals

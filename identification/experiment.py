@@ -10,10 +10,10 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..models.floating_tree import CARRIERS, FloatingTree
-from ..models.model_file import Model
-from ..models.rig import Rig
-from ..models.rig_kinematics import sling_map
+from ..models.floating.tree import CARRIERS, FloatingTree
+from ..models.model import Model
+from ..models.rig.kinematics import sling_map
+from ..models.rig.rig import Rig
 from ..models.rigid_body import RigidBody
 from ..recordings import JointKind, read_recording
 from ..recordings.condition import Motion, condition

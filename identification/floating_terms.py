@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ..errors import InputError
-from ..models.floating_tree import CARRIERS, FloatingTree
+from ..models.floating.tree import CARRIERS, FloatingTree
 from ..recordings.condition import Motion
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..models.hidden_state import evaluate_law, reads
-from ..models.model_file import Placed
+from ..models.model import Placed
 from .experiment import Experiment
 from .fit import Fit
 

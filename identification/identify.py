@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ..models.floating_tree import channel
+from ..models.floating.tree import channel
 from ..models.inertia import Array
-from ..models.model_file import Model
+from ..models.model import Model
 from ..models.rigid_body import RigidBody
 from .assembly import Assembly
 from .base_parameters import INERTIAL, BaseParameters, base_parameters

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..models.floating_tree import channel
+from ..models.floating.tree import channel
 from .diagnosis import Location
 from .experiment import Experiment
 

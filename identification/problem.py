@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..models.hidden_state import rows
-from ..models.model_file import Placed
-from ..models.rig import Rig
-from ..models.rig_kinematics import reached_joints
+from ..models.model import Placed
+from ..models.rig.kinematics import reached_joints
+from ..models.rig.rig import Rig
 from .assembly import Assembly, Block
 from .experiment import Experiment
 from .least_squares import Normal, Objective, Solution

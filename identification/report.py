@@ -5,10 +5,10 @@ from datetime import date
 from pathlib import Path
 
 from ..errors import InputError
+from ..report.html import page
 from .diagnosis import Diagnosis
 from .report_findings import STATUS, missing, verdict, where
 from .report_fit import notes, parameters, screened, shape, step_by_step, unseen
-from .report_page import page
 
 
 def write_report(diagnosis: Diagnosis, path: str | Path) -> None:

@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..report.drawing import AFTER, BEFORE, GREY, drawing, margins, svg
 from .diagnosis import Array, Trace
-from .report_drawing import AFTER, BEFORE, GREY, drawing, margins, svg
 from .report_words import unit_words
 
 _BINS = 40

@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..report.drawing import AFTER, BEFORE, GREY, MEASURED, SHADE, drawing, line, margins, svg
 from .diagnosis import Array, Candidate, Location, Step, Trace
-from .report_drawing import AFTER, BEFORE, GREY, MEASURED, SHADE, drawing, line, margins, svg
 from .report_words import percent, unit_words, words
 
 _WIDTH = 10.0

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from datetime import date
 from html import escape
 
+from ..report.html import bar, figure, flag, paragraph, table
 from .diagnosis import Diagnosis, Finding, Limit, Rival, Trace
 from .report_figures import residual_over_time
-from .report_page import bar, figure, flag, paragraph, table
 from .report_words import chance, number, percent, spans, unit_words, with_std, words
 
 STATUS = {"missing_physics": "missing physics", "adequate": "adequate", "unknown_effect": "unknown effect"}

@@ -5,11 +5,11 @@ from html import escape
 
 import numpy as np
 
+from ..report.html import figure, flag, folded, paragraph, table
 from .diagnosis import Array, Diagnosis, Trace
 from .report_curves import residual_curves
 from .report_figures import before_and_after, candidates, steps
 from .report_findings import detection_limits
-from .report_page import figure, flag, folded, paragraph, table
 from .report_words import number, percent, unit_words, with_std, words
 
 _OPEN = 4

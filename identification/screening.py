@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..models.model_file import Model, Placed
+from ..models.model import Model, Placed
 from .assembly import Block, Evaluation
 from .candidates import Variant, candidate_columns, free_parameters, library, smooth_columns, variants
 from .closed_loop import REST

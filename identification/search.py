@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..models.model_file import Model, Placed
+from ..models.model import Model, Placed
 from .assembly import Assembly
 from .base_parameters import BaseParameters
 from .closed_loop import planned

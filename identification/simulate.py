@@ -6,8 +6,8 @@ import numpy as np
 import xarray as xr
 
 from ..errors import InputError
-from ..models.floating_tree import FloatingTree
-from ..models.model_file import Model
+from ..models.floating.tree import FloatingTree
+from ..models.model import Model
 from ..models.rigid_body import RigidBody
 from .assembly import Assembly
 from .base_parameters import INERTIAL

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from ..models.model_file import Placed
+from ..models.model import Placed
 from .diagnosis import ChannelFit, Finding
 from .report_words import words
 

@@ -1,12 +1,8 @@
-"""Model files (TOML): what is believed of a system, read with every mistake named, and written with what was found."""
+"""Model files (TOML) read, with every mistake named."""
 
 import difflib
-import json
-import os
 import tomllib
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +10,11 @@ import numpy as np
 
 from ..errors import InputError
 from ..recordings.signals import FORMS, Signal, is_signal, joint_of
-from .effect import Effect
 from .effects import get_effect
-from .floating_tree import FloatingTree, n_carriers, read_floating
-from .hidden_state import rows
-from .rig import Rig, built_in_rig
-from .rig_file import read_slings, sling_table
-from .rig_kinematics import booms, reached_joints, slides
+from .floating.tree import read_floating
+from .model import Model, Placed, places
+from .rig.file import read_slings
+from .rig.rig import Rig, built_in_rig
 from .tree import Tree
 from .urdf import load_urdf
 
@@ -40,87 +34,6 @@ _KEYS = (
     "bandwidth",
     "parameters",
 )
-
-
-@dataclass(frozen=True)
-class Placed:
-    """An effect and the one place it acts at: a joint, a link, a sling, or a sensor channel such as ``tau.joint1``.
-
-    Parameters named in ``hold`` are not identified: the recordings did not ask for them, or another effect carries
-    them.
-    """
-
-    effect: Effect
-    at: str
-    hold: tuple[str, ...] = ()
-
-    @property
-    def key(self) -> str:
-        """``effect.at``, by which parameters are stored."""
-        return f"{self.effect.name}.{self.at}"
-
-
-@dataclass(frozen=True)
-class Model:
-    """A model file, read and checked.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    name, system : str
-    urdf : Path or None
-        None for the built-in rig, and for the built-in ETS-VII.
-    tree : Tree
-        Joints, links, nominal inertia and gravity; a `Rig` for ``zero_g_rig``, with its slings; a `FloatingTree` for
-        ``free_floating_arm``, whose first six joints carry the base.
-    inertia : "fixed" or "free"
-    effects : tuple of Placed
-        Physics that the model has, one entry a place.
-    signals : mapping of str to Signal
-        Where a recording with columns of its own has each signal.
-    bandwidth : float or None
-        Edge of the analysis band [Hz]; None: chosen from the recordings.
-    values : mapping of str to float
-        Parameters known so far, by ``effect.at.parameter`` (``inertia.<link>.<parameter>`` for inertial parameters).
-    """
-
-    path: Path
-    name: str
-    system: str
-    urdf: Path | None
-    tree: Tree
-    inertia: str
-    effects: tuple[Placed, ...]
-    signals: Mapping[str, Signal]
-    bandwidth: float | None
-    values: Mapping[str, float]
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        """Joint names in order."""
-        return tuple(j.name for j in self.tree.joints)
-
-    def with_effects(self, added: Sequence[Placed], values: Mapping[str, float]) -> "Model":
-        """The model with more effects, and with parameters that a fit found."""
-        return replace(self, effects=(*self.effects, *added), values={**self.values, **values})
-
-
-def places(effect: Effect, tree: Tree) -> tuple[str, ...]:
-    """Places of a tree at which an effect can act on some torque; sensor effects act on torque channels by default."""
-    carriers = n_carriers(tree)
-    if effect.at == "joint":
-        return tuple(j.name for j in tree.joints[carriers:])
-    if effect.at == "link":
-        return tuple(link.name for link in tree.links[max(carriers - 1, 0) :])
-    if effect.at == "base":
-        return ("base",) if carriers else ()
-    if effect.at != "sensor":
-        if not isinstance(tree, Rig):
-            return ()
-        every = {"sling": tuple(s.name for s in tree.slings), "slide": slides(tree), "boom": booms(tree)}[effect.at]
-        return tuple(at for at in every if reached_joints(tree, effect.at, at, rows(effect)))
-    return tuple(f"tau.{j.name}" for j in tree.joints[carriers:])
 
 
 def load_model(path: str | Path) -> Model:
@@ -194,72 +107,6 @@ def _tree(path: Path, raw: Mapping[str, Any], system: str, urdf: Path | None, gr
         return built_in_rig(gravity) if urdf is None else read_slings(path, raw.get("slings"), tree)
     except InputError as error:
         raise InputError(str(error) if str(error).startswith(str(path)) else f"{path}: {error}") from None
-
-
-def save_model(model: Model, path: str | Path, note: str) -> None:
-    """Write a model file that `load_model` reads back, all or nothing.
-
-    ``effects`` lists an effect by its name alone where it acts at every place, as ``{ name, at, hold }`` where it
-    does not.
-    """
-    path = Path(path)
-    by_name: dict[str, list[Placed]] = {}
-    for placed in model.effects:
-        by_name.setdefault(placed.effect.name, []).append(placed)
-    listed = []
-    for name, members in by_name.items():
-        everywhere = sorted(p.at for p in members) == sorted(places(get_effect(name), model.tree))
-        if everywhere and not any(p.hold for p in members):
-            listed.append(_toml(name))
-            continue
-        for p in members:
-            hold = f", hold = {_toml(list(p.hold))}" if p.hold else ""
-            listed.append(f"{{ name = {_toml(name)}, at = {_toml(p.at)}{hold} }}")
-    lines = [f"# {line}" for line in note.splitlines()]
-    lines += [
-        f"name = {_toml(model.name)}",
-        f"system = {_toml(model.system)}",
-        *([] if model.urdf is None else [f"urdf = {_toml(Path(os.path.relpath(model.urdf, path.parent)).as_posix())}"]),
-        f"gravity = {_toml([float(g) for g in model.tree.gravity])}",
-        f"inertia = {_toml(model.inertia)}",
-        "effects = [",
-        *(f"    {entry}," for entry in listed),
-        "]",
-    ]
-    if model.bandwidth is not None:
-        lines.append(f"bandwidth = {_toml(model.bandwidth)}")
-    if isinstance(model.tree, FloatingTree):
-        lines.append(f"base = {_toml(model.tree.body)}")
-    if isinstance(model.tree, Rig) and model.urdf is not None:
-        lines += ["", "[slings]"]
-        for name, fields in sling_table(model.tree).items():
-            lines.append(f"{_toml(name)} = {{ {', '.join(f'{k} = {_toml(v)}' for k, v in fields.items())} }}")
-    if model.signals:
-        lines += ["", "[signals]"]
-        for name, signal in model.signals.items():
-            fields = {"column": signal.column, "unit": signal.unit, "gain": signal.gain}
-            inner = ", ".join(f"{k} = {_toml(v)}" for k, v in fields.items() if v is not None)
-            lines.append(f"{_toml(name)} = {{ {inner} }}")
-    if model.values:
-        lines += ["", "[parameters]", *(f"{_toml(k)} = {float(v)!r}" for k, v in model.values.items())]
-    scratch = path.with_name(path.name + ".part")
-    try:
-        scratch.write_text("\n".join(lines) + "\n", encoding="utf-8")
-        scratch.replace(path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}; choose a folder that exists") from None
-    finally:
-        with suppress(OSError):
-            scratch.unlink()
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, str):
-        # JSON's escapes are TOML's, but for one character that TOML wants escaped too.
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    if isinstance(value, list):
-        return "[" + ", ".join(_toml(v) for v in value) + "]"
-    return repr(float(value)) if isinstance(value, float) else repr(value)  # NumPy's floats show their type
 
 
 def _text(path: Path, raw: Mapping[str, Any], key: str, default: str) -> str:

@@ -17,7 +17,8 @@ from ..identification.diagnose import Answer, diagnose
 from ..identification.diagnosis import Diagnosis
 from ..identification.identify import identify
 from ..identification.report import write_report
-from ..models.model_file import load_model, save_model
+from ..models.model_file import load_model
+from ..models.model_write import save_model
 from ..recordings import find_recording
 
 HERE = Path(__file__).parent

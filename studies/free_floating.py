@@ -13,10 +13,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from pydrake.geometry import Box, Sphere
 
-from ..identification.report_drawing import AFTER, BEFORE, MEASURED, drawing, line, margins, svg
-from ..models.ets_vii import ets_vii
-from ..models.floating_arm import FloatingArm
-from ..models.floating_dynamics import (
+from ..models.floating.arm import FloatingArm
+from ..models.floating.dynamics import (
     base_twist,
     generalized_inertia,
     generalized_jacobian,
@@ -26,13 +24,15 @@ from ..models.floating_dynamics import (
     tip_pose,
     world_momentum,
 )
-from ..models.floating_motion import FloatingMotion
-from ..models.floating_plant import FloatingPlant, Run
+from ..models.floating.ets_vii import ets_vii
+from ..models.floating.joint_drive import Drive
+from ..models.floating.motion import FloatingMotion
+from ..models.floating.plant import FloatingPlant, Run
 from ..models.inertia import Array, to_central
-from ..models.joint_drive import Drive
+from ..report.drawing import AFTER, BEFORE, MEASURED, drawing, line, margins, svg
+from ..report.playback import Playback
 from .outcome import Quantity, table, write_result
 from .page import Picture, Section, write_page
-from .playback import Playback
 
 STUDY = "free-floating"
 TARGET = np.arange(1, 7) / 10  # rad

@@ -13,14 +13,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..models.snare import SnareModel
-from ..models.snare_history import SnareHistory
-from ..models.snare_parameters import WIDE_RING, SnareParameters
-from ..models.snare_target import Target
+from ..models.snare.history import SnareHistory
+from ..models.snare.model import SnareModel
+from ..models.snare.parameters import WIDE_RING, SnareParameters
+from ..models.snare.target import Target
+from ..report.snare_scene import snare_scene
 from .ground_capture_figures import sections
 from .outcome import Quantity, table, write_result
 from .page import write_page
-from .snare_scene import snare_scene
 
 STUDY = "ground-capture"
 DURATION = 10.0

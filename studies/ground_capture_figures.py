@@ -9,9 +9,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..identification.report_drawing import AFTER, BEFORE, GREY, MEASURED, SHADE, drawing, line, margins, svg
-from ..models.snare_history import SnareHistory
-from ..models.snare_parameters import Dimension, SnareParameters
+from ..models.snare.history import SnareHistory
+from ..models.snare.parameters import Dimension, SnareParameters
+from ..report.drawing import AFTER, BEFORE, GREY, MEASURED, SHADE, drawing, line, margins, svg
 from .page import Picture, Section
 
 if TYPE_CHECKING:

@@ -2,7 +2,7 @@
 
 import sys
 
-from .orbit_capture import study
+from .orbit.capture import study
 
 
 def main() -> int:

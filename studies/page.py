@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 
-from ..identification.report_page import figure, page, paragraph, table
+from ..report.html import figure, page, paragraph, table
 from .outcome import FOLDER, Quantity
 
 _KINDS = {

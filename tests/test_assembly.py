@@ -11,7 +11,7 @@ from snarelab.identification.assembly import Assembly
 from snarelab.identification.base_parameters import base_parameters
 from snarelab.identification.experiment import Experiment, scales
 from snarelab.models.effects import get_effect
-from snarelab.models.model_file import Placed
+from snarelab.models.model import Placed
 from snarelab.models.rigid_body import RigidBody
 from snarelab.models.urdf import load_urdf
 from snarelab.recordings.condition import Motion

@@ -13,7 +13,7 @@ from snarelab.identification.least_squares import Normal, Objective
 from snarelab.identification.problem import Problem, split
 from snarelab.identification.projection import minimise_projected
 from snarelab.models.effects import get_effect
-from snarelab.models.model_file import Placed
+from snarelab.models.model import Placed
 from snarelab.models.rigid_body import RigidBody
 from snarelab.models.urdf import load_urdf
 from snarelab.recordings.condition import Motion

@@ -10,11 +10,11 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from snarelab.errors import InputError
-from snarelab.models import floating_dynamics as dynamics
-from snarelab.models.ets_vii import ets_vii
-from snarelab.models.floating_arm import FloatingArm, load_arm
-from snarelab.models.floating_motion import FloatingMotion
-from snarelab.models.floating_plant import FloatingPlant
+from snarelab.models.floating import dynamics
+from snarelab.models.floating.arm import FloatingArm, load_arm
+from snarelab.models.floating.ets_vii import ets_vii
+from snarelab.models.floating.motion import FloatingMotion
+from snarelab.models.floating.plant import FloatingPlant
 from snarelab.models.inertia import from_central, is_physical, nearest_physical, to_central
 from snarelab.models.tree import Joint, Link, Tree
 

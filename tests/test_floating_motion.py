@@ -8,14 +8,14 @@ from scipy.spatial.transform import Rotation
 from snarelab.errors import InputError
 from snarelab.models.dormand_prince import DormandPrince, StepFault
 from snarelab.models.effects import effects, get_effect
-from snarelab.models.ets_vii import ets_vii
-from snarelab.models.floating_arm import FloatingArm
-from snarelab.models.floating_dynamics import generalized_inertia, kinetic_energy, world_momentum
-from snarelab.models.floating_motion import FloatingMotion
-from snarelab.models.floating_plant import FloatingPlant
+from snarelab.models.floating.arm import FloatingArm
+from snarelab.models.floating.dynamics import generalized_inertia, kinetic_energy, world_momentum
+from snarelab.models.floating.ets_vii import ets_vii
+from snarelab.models.floating.joint_drive import Drive
+from snarelab.models.floating.motion import FloatingMotion
+from snarelab.models.floating.plant import FloatingPlant
 from snarelab.models.inertia import from_central
-from snarelab.models.joint_drive import Drive
-from snarelab.models.model_file import Placed
+from snarelab.models.model import Placed
 from snarelab.models.tree import Joint, Link, Tree
 
 TARGET = np.arange(1, 7) / 10

@@ -7,9 +7,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from snarelab.cosim.participants.floating_arm import FloatingArmParticipant
-from snarelab.models.floating_dynamics import inverse_dynamics
-from snarelab.models.floating_motion import FloatingMotion
-from snarelab.models.space_arm import CAPTURE_POSE, space_arm
+from snarelab.models.floating.dynamics import inverse_dynamics
+from snarelab.models.floating.motion import FloatingMotion
+from snarelab.models.floating.space_arm import CAPTURE_POSE, space_arm
 
 PLACE, TURN = np.array([2.0, -0.5, 1.0]), Rotation.from_euler("xyz", [0.3, -0.2, 0.5])
 AT_TIP, AT_MOUNT = np.array([30.0, -20.0, 40.0, 5.0, 10.0, -7.0]), np.array([-25.0, 60.0, 10.0, -40.0, 3.0, 20.0])

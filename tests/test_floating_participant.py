@@ -9,9 +9,9 @@ import pytest
 from snarelab.cosim.participant import StepError
 from snarelab.cosim.participants.floating_arm import FloatingArmParticipant
 from snarelab.errors import InputError
-from snarelab.models.floating_dynamics import tip_pose
-from snarelab.models.floating_motion import FloatingMotion
-from snarelab.models.space_arm import CAPTURE_POSE, space_arm, space_arm_drive
+from snarelab.models.floating.dynamics import tip_pose
+from snarelab.models.floating.motion import FloatingMotion
+from snarelab.models.floating.space_arm import CAPTURE_POSE, space_arm, space_arm_drive
 
 POSE = np.array(CAPTURE_POSE)
 STEP = 1e-3

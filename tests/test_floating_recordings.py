@@ -9,7 +9,8 @@ import xarray as xr
 from snarelab.errors import InputError
 from snarelab.identification.diagnose import diagnose
 from snarelab.identification.identify import identify
-from snarelab.models.model_file import load_model, save_model
+from snarelab.models.model_file import load_model
+from snarelab.models.model_write import save_model
 from snarelab.recordings import write_recording
 
 PERIOD, STEP, DURATION = 0.02, 0.002, 60.0

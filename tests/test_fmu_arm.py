@@ -18,10 +18,11 @@ from snarelab.fmu.build import write_fmu
 from snarelab.fmu.elements import ELEMENTS
 from snarelab.fmu.export import model_equations
 from snarelab.models.effects import get_effect
-from snarelab.models.ets_vii import ets_vii
-from snarelab.models.floating_arm import FloatingArm
-from snarelab.models.joint_drive import Drive
-from snarelab.models.model_file import Model, Placed, load_model
+from snarelab.models.floating.arm import FloatingArm
+from snarelab.models.floating.ets_vii import ets_vii
+from snarelab.models.floating.joint_drive import Drive
+from snarelab.models.model import Model, Placed
+from snarelab.models.model_file import load_model
 
 ENGINE: Any = pin  # its stubs lack most names
 GRAVITY = np.array([0.3, -1.0, -9.7])

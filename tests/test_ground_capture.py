@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from snarelab.models.snare_history import SnareHistory
-from snarelab.models.snare_parameters import SnareParameters
-from snarelab.models.snare_target import PAPER_POSITION, Target
+from snarelab.models.snare.history import SnareHistory
+from snarelab.models.snare.parameters import SnareParameters
+from snarelab.models.snare.target import PAPER_POSITION, Target
 from snarelab.studies import ground_capture
 
 SHORT = 3.0

@@ -9,7 +9,9 @@ import pytest
 from bench.arm import random_arm
 from snarelab.errors import InputError
 from snarelab.models.effects import get_effect
-from snarelab.models.model_file import Placed, load_model, places, save_model
+from snarelab.models.model import Placed, places
+from snarelab.models.model_file import load_model
+from snarelab.models.model_write import save_model
 from snarelab.recordings import Signal
 
 GOOD = 'name = "arm"\nsystem = "arm"\nurdf = "arm.urdf"\n'

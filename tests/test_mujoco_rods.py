@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from bench import mujoco_rods
-from snarelab.models.snare import SnareModel
-from snarelab.models.snare_parameters import SnareParameters
-from snarelab.models.snare_settled import settled
-from snarelab.models.snare_target import Target
+from snarelab.models.snare.model import SnareModel
+from snarelab.models.snare.parameters import SnareParameters
+from snarelab.models.snare.settled import settled
+from snarelab.models.snare.target import Target
 
 N_SEGMENTS, STEP = 20, 1e-3
 FAR = Target("spring", position=(0.5, 0.0, 0.0))

@@ -8,14 +8,14 @@ import pytest
 from snarelab.cosim.participants.snare_impulses import ImpulseSnareParticipant
 from snarelab.cosim.step_control import StepControl
 from snarelab.errors import InputError
-from snarelab.models.monolithic_assembly import makkar
-from snarelab.models.snare import Accuracy
-from snarelab.models.space_arm import FRICTION
-from snarelab.studies import orbit
-from snarelab.studies.orbit import Passive, capture_of, co_simulate, setting
-from snarelab.studies.orbit_capture import step_control
-from snarelab.studies.orbit_ledger import energy_ledger, force_error, momentum_ledger, position_error
-from snarelab.studies.orbit_reference import reference
+from snarelab.models.floating.space_arm import FRICTION
+from snarelab.models.monolithic.assembly import makkar
+from snarelab.models.snare.model import Accuracy
+from snarelab.studies.orbit import setting as orbit
+from snarelab.studies.orbit.capture import step_control
+from snarelab.studies.orbit.ledger import energy_ledger, force_error, momentum_ledger, position_error
+from snarelab.studies.orbit.reference import reference
+from snarelab.studies.orbit.setting import Passive, capture_of, co_simulate, setting
 
 FAST = dataclasses.replace(orbit.SNARE, ring_rate=10 * orbit.SNARE.ring_rate, ring_ramp=0.02)
 LENGTH = 0.85

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from snarelab.identification.report_curves import binned
-from snarelab.identification.report_drawing import thinned
 from snarelab.identification.report_words import chance, number, percent, spans, unit_words, with_std, words
+from snarelab.report.drawing import thinned
 
 
 def test_thinning_keeps_peaks_ends_and_gaps() -> None:

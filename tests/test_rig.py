@@ -15,9 +15,9 @@ from snarelab.identification.base_parameters import base_parameters
 from snarelab.identification.experiment import Experiment, scales
 from snarelab.models.effects import get_effect
 from snarelab.models.inertia import to_central
-from snarelab.models.model_file import Placed, places
-from snarelab.models.rig import Rig, Sling, built_in_rig, hang_unit_loads
-from snarelab.models.rig_kinematics import point_motion, slides, sling_map
+from snarelab.models.model import Placed, places
+from snarelab.models.rig.kinematics import point_motion, slides, sling_map
+from snarelab.models.rig.rig import Rig, Sling, built_in_rig, hang_unit_loads
 from snarelab.models.rigid_body import RigidBody
 from snarelab.models.urdf import load_urdf
 from snarelab.recordings.condition import Motion

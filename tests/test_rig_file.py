@@ -7,8 +7,10 @@ from bench.arm import random_arm
 from snarelab.errors import InputError
 from snarelab.models.effects import get_effect
 from snarelab.models.inertia import to_central
-from snarelab.models.model_file import load_model, places, save_model
-from snarelab.models.rig import Rig
+from snarelab.models.model import places
+from snarelab.models.model_file import load_model
+from snarelab.models.model_write import save_model
+from snarelab.models.rig.rig import Rig
 
 BUILT_IN = 'system = "zero_g_rig"\n'
 OWN = BUILT_IN + 'urdf = "arm.urdf"\n'

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from snarelab.models.rig import built_in_rig
+from snarelab.models.rig.rig import built_in_rig
 from snarelab.studies.zero_g_rig.arm import Arm, arm_of
 from snarelab.studies.zero_g_rig.concealed import KINDS, conceal
 from snarelab.studies.zero_g_rig.motion import DURATION, HOLDOUT, TRAIN, Joints, Move, varied

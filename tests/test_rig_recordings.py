@@ -13,8 +13,9 @@ from snarelab.identification.experiment import load_experiments, scales
 from snarelab.identification.fit import channel_rms
 from snarelab.identification.identify import identify
 from snarelab.identification.simulate import simulate
-from snarelab.models.model_file import load_model, save_model
-from snarelab.models.rig import built_in_rig
+from snarelab.models.model_file import load_model
+from snarelab.models.model_write import save_model
+from snarelab.models.rig.rig import built_in_rig
 from snarelab.models.rigid_body import RigidBody
 from snarelab.recordings import write_recording
 

@@ -14,7 +14,7 @@ from snarelab.identification.evidence import Channel, Evidence
 from snarelab.identification.experiment import Scales
 from snarelab.identification.search import _choose
 from snarelab.models.effects import get_effect
-from snarelab.models.model_file import Placed
+from snarelab.models.model import Placed
 from snarelab.models.urdf import load_urdf
 
 N = 2000

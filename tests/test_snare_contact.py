@@ -7,14 +7,14 @@ import pytest
 from scipy.optimize import minimize_scalar
 from scipy.spatial.transform import Rotation
 
-from snarelab.models.snare_contact import find_contacts
-from snarelab.models.snare_crossing import find_crossings
-from snarelab.models.snare_cubic import combine, first_weights, weights
-from snarelab.models.snare_forces import system_forces, system_jacobian
-from snarelab.models.snare_law import force, give, hertz_overlap, law_constants, powers
-from snarelab.models.snare_parameters import SnareParameters
-from snarelab.models.snare_pin import distance, pin_cylinders, surface
-from snarelab.models.snare_settled import settled
+from snarelab.models.snare.contact import find_contacts
+from snarelab.models.snare.crossing import find_crossings
+from snarelab.models.snare.cubic import combine, first_weights, weights
+from snarelab.models.snare.forces import system_forces, system_jacobian
+from snarelab.models.snare.law import force, give, hertz_overlap, law_constants, powers
+from snarelab.models.snare.parameters import SnareParameters
+from snarelab.models.snare.pin import distance, pin_cylinders, surface
+from snarelab.models.snare.settled import settled
 
 P = SnareParameters(bending_damping=0.0)
 """Damping in bending has a file of its own, and gives its Jacobian by rates alone."""

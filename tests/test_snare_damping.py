@@ -5,10 +5,10 @@
 import numpy as np
 import pytest
 
-from snarelab.models.snare_damping import TRIPLETS_PER_ELEMENT, add_damping, add_damping_jacobian
-from snarelab.models.snare_energy import BENDING_LOSS, cable_energies
-from snarelab.models.snare_parameters import SnareParameters
-from snarelab.models.snare_settled import settled
+from snarelab.models.snare.damping import TRIPLETS_PER_ELEMENT, add_damping, add_damping_jacobian
+from snarelab.models.snare.energy import BENDING_LOSS, cable_energies
+from snarelab.models.snare.parameters import SnareParameters
+from snarelab.models.snare.settled import settled
 
 P = SnareParameters()
 N = 10

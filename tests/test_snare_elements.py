@@ -10,12 +10,12 @@ import pytest
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
-from snarelab.models.snare import Accuracy, SnareModel
-from snarelab.models.snare_assembly import add_cable
-from snarelab.models.snare_drive import Pose
-from snarelab.models.snare_engine import exudyn, items
-from snarelab.models.snare_parameters import SnareParameters
-from snarelab.models.snare_target import Target
+from snarelab.models.snare.assembly import add_cable
+from snarelab.models.snare.drive import Pose
+from snarelab.models.snare.engine import exudyn, items
+from snarelab.models.snare.model import Accuracy, SnareModel
+from snarelab.models.snare.parameters import SnareParameters
+from snarelab.models.snare.target import Target
 
 N_ELEMENTS = 10
 

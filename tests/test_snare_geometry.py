@@ -9,10 +9,10 @@ import pytest
 from scipy.special import ellipe, ellipk
 
 from snarelab.errors import InputError
-from snarelab.models.snare_drive import frame_at, ring_ends, ring_motion
-from snarelab.models.snare_geometry import arc, helices, ring_points
-from snarelab.models.snare_parameters import WIDE_RING, SnareParameters, wall_length
-from snarelab.models.snare_settled import settled
+from snarelab.models.snare.drive import frame_at, ring_ends, ring_motion
+from snarelab.models.snare.geometry import arc, helices, ring_points
+from snarelab.models.snare.parameters import WIDE_RING, SnareParameters, wall_length
+from snarelab.models.snare.settled import settled
 
 
 def test_a_cable_against_the_wall_is_an_arc_of_120_degrees_about_the_ring_itself():

@@ -7,10 +7,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from snarelab.errors import InputError
-from snarelab.models.snare import Accuracy, SnareModel, SnareStepError
-from snarelab.models.snare_drive import Pose
-from snarelab.models.snare_parameters import SnareParameters
-from snarelab.models.snare_target import Target
+from snarelab.models.snare.drive import Pose
+from snarelab.models.snare.model import Accuracy, SnareModel, SnareStepError
+from snarelab.models.snare.parameters import SnareParameters
+from snarelab.models.snare.target import Target
 
 QUICK = SnareParameters(ring_rate=np.deg2rad(40), friction=0.2)
 """A capture in two seconds instead of ten; first contact after half a second."""

@@ -8,8 +8,8 @@ import pytest
 from snarelab.cosim.participant import StepError
 from snarelab.cosim.participants.snare import SnareParticipant
 from snarelab.errors import InputError
-from snarelab.models.snare_parameters import SnareParameters
-from snarelab.models.snare_target import Target
+from snarelab.models.snare.parameters import SnareParameters
+from snarelab.models.snare.target import Target
 
 QUICK = SnareParameters(ring_rate=np.deg2rad(40))
 PIN = [0.2369, 0.0747, 0.0402]

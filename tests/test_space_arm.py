@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from snarelab.errors import InputError
-from snarelab.models import floating_dynamics as dynamics
-from snarelab.models.floating_motion import FloatingMotion
-from snarelab.models.inertia import from_central, is_physical, to_central
-from snarelab.models.space_arm import (
+from snarelab.models.floating import dynamics
+from snarelab.models.floating.motion import FloatingMotion
+from snarelab.models.floating.space_arm import (
     BASE_MASS,
     CAPTURE_POSE,
     LENGTH,
@@ -17,6 +16,7 @@ from snarelab.models.space_arm import (
     space_arm,
     space_arm_drive,
 )
+from snarelab.models.inertia import from_central, is_physical, to_central
 
 POSE = np.array(CAPTURE_POSE)
 

@@ -13,10 +13,10 @@ from matplotlib.image import imread
 from pydrake.geometry import Cylinder, Sphere
 
 from snarelab.errors import InputError
-from snarelab.identification.report_drawing import AFTER, drawing, line, svg
+from snarelab.report.drawing import AFTER, drawing, line, svg
+from snarelab.report.playback import Playback
 from snarelab.studies.outcome import Quantity, write_result
 from snarelab.studies.page import Picture, Section, write_page
-from snarelab.studies.playback import Playback
 
 QUANTITIES = [
     Quantity("first_contact", "s", 2.57, "calibrated", paper=2.6, low=2.55, high=2.61),

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from snarelab.models.snare_parameters import SnareParameters
+from snarelab.models.snare.parameters import SnareParameters
 from snarelab.tolerance.enclosure import encloses, radial_error
 from snarelab.tolerance.ground import CAPTURE, run
 

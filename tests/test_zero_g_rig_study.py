@@ -10,8 +10,9 @@ import xarray as xr
 from snarelab.identification.assembly import Assembly
 from snarelab.identification.experiment import load_experiments, scales
 from snarelab.models.effects import get_effect
-from snarelab.models.model_file import Placed, load_model
-from snarelab.models.rig import built_in_rig
+from snarelab.models.model import Placed
+from snarelab.models.model_file import load_model
+from snarelab.models.rig.rig import built_in_rig
 from snarelab.models.rigid_body import RigidBody
 from snarelab.recordings.write import write_recording
 from snarelab.studies.zero_g_rig.alike import compare

@@ -3,8 +3,8 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ..models.snare_history import SnareHistory
-from ..models.snare_parameters import SnareParameters
+from ..models.snare.history import SnareHistory
+from ..models.snare.parameters import SnareParameters
 
 _ARC = 16
 

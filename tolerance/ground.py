@@ -9,10 +9,10 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ..models.snare import SnareModel
-from ..models.snare_history import SnareHistory
-from ..models.snare_parameters import SnareParameters
-from ..models.snare_target import PAPER_POSITION, Target
+from ..models.snare.history import SnareHistory
+from ..models.snare.model import SnareModel
+from ..models.snare.parameters import SnareParameters
+from ..models.snare.target import PAPER_POSITION, Target
 from .capture import Axis, Capture, Outcome
 from .enclosure import encloses, radial_error
 

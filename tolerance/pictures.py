@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from ..identification.report_drawing import AFTER, BEFORE, GREY, SHADE, drawing, svg
+from ..report.drawing import AFTER, BEFORE, GREY, SHADE, drawing, svg
 from .boundary import UNDECIDED, Boundary
 from .study import Study
 from .summary import Interval, nominal_point, to_unit

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..identification.report_page import figure, page, paragraph, table
+from ..report.html import figure, page, paragraph, table
 from .pictures import envelope_bars, probability_maps, sensitivity_bars, width_curve
 from .results import Results
 from .run import space_boundary

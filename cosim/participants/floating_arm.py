@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 
 from ...errors import InputError
 from ...models.dormand_prince import StepFault
-from ...models.floating_arm import FloatingArm
-from ...models.floating_motion import FloatingMotion
-from ...models.joint_drive import Drive
+from ...models.floating.arm import FloatingArm
+from ...models.floating.joint_drive import Drive
+from ...models.floating.motion import FloatingMotion
 from ..participant import Participant, StepError, Variable
 
 _AXES = "xyz"

@@ -1,6 +1,6 @@
 """The snare as a participant: poses and twists of end effector and pin in, wrenches on both and the ring's angle out.
 
-Between macro steps the bodies moved from outside go on along a smooth path (see `snarelab.models.snare_drive`), which
+Between macro steps the bodies moved from outside go on along a smooth path (see `snarelab.models.snare.drive`), which
 ends where the inputs put them: with derivatives, at pose + twist·H + … from the start of the step; with held inputs,
 which stand for the middle of the step, at pose + twist·H/2.
 """
@@ -12,10 +12,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ...errors import InputError
-from ...models.snare import Accuracy, SnareModel, SnareStepError
-from ...models.snare_drive import Pose
-from ...models.snare_parameters import SnareParameters
-from ...models.snare_target import Target, unit_quaternion
+from ...models.snare.drive import Pose
+from ...models.snare.model import Accuracy, SnareModel, SnareStepError
+from ...models.snare.parameters import SnareParameters
+from ...models.snare.target import Target, unit_quaternion
 from ..participant import Participant, StepError, Variable
 
 _POSE_SIZE = 13

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from ...models.snare import SnareModel
-from ...models.snare_momentum import left_over, momentum
+from ...models.snare.model import SnareModel
+from ...models.snare.momentum import left_over, momentum
 from ..participant import Variable
 from .snare import SnareParticipant
 

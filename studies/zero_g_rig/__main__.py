@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from ...identification.diagnose import diagnose
 from ...identification.diagnosis import Diagnosis
 from ...identification.report import write_report
-from ...models.model_file import load_model, save_model
-from ...models.rig import built_in_rig
+from ...models.model_file import load_model
+from ...models.model_write import save_model
+from ...models.rig.rig import built_in_rig
 from ..outcome import FOLDER, Quantity, table, write_result
 from ..page import Section, write_page
 from . import figures

@@ -15,7 +15,7 @@ from scipy.linalg import subspace_angles
 from ...identification.assembly import Assembly
 from ...identification.experiment import Experiment
 from ...identification.fit import Fit
-from ...models.model_file import Placed
+from ...models.model import Placed
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.rig import Rig
+from ...models.rig.rig import Rig
 
 Array = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.rig import built_in_rig
+from ...models.rig.rig import built_in_rig
 from .arm import Arm, arm_of
 from .plant import Plant, Sensors
 from .slide import Slide

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...models.effects import get_effect
-from ...models.model_file import Placed
-from ...models.rig import Rig
+from ...models.model import Placed
+from ...models.rig.rig import Rig
 from .alike import Alike, compare
 from .study import Friction
 

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from ...identification.report_drawing import AFTER, BEFORE, GREY, MEASURED, SHADE, drawing, line, svg
+from ...report.drawing import AFTER, BEFORE, GREY, MEASURED, SHADE, drawing, line, svg
 from ..page import Picture
 from .friction import Curve
 

@@ -21,9 +21,9 @@ from ...identification.problem import Problem
 from ...identification.starts import best_start
 from ...models.effects import get_effect
 from ...models.hidden_state import evaluate_law
-from ...models.model_file import Model, Placed
-from ...models.rig import Rig
-from ...models.rig_kinematics import slide_map
+from ...models.model import Model, Placed
+from ...models.rig.kinematics import slide_map
+from ...models.rig.rig import Rig
 
 Array = NDArray[np.float64]
 

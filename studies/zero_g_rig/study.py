@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ...identification.assembly import Assembly
 from ...identification.experiment import Experiment, load_experiments, scales
 from ...identification.fit import Fit
-from ...models.model_file import Model
+from ...models.model import Model
 from ...models.rigid_body import RigidBody
 from .friction import Curve, curves, jointly, tip_to_base
 

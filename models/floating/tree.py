@@ -1,0 +1,63 @@
+"""A free-floating arm as a tree that recordings can be fitted to: six carriers of the base, then the arm's joints."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..tree import Tree
+from ..urdf import load_urdf
+from .arm import FloatingArm, load_arm
+from .ets_vii import ets_vii
+
+CARRIERS = 6
+"""Leading joints that carry the base; their torques are the force and the moment on it, in its own axes."""
+
+_WRENCH = tuple(f"{kind}.base.{axis}" for kind in ("force", "torque") for axis in "xyz")
+
+
+@dataclass(frozen=True, eq=False)
+class FloatingTree(Tree):
+    """`FloatingArm.whole`: joints 0 to 5 carry the base, link 5 is the base.
+
+    ``body`` is the base's name in recordings (``quat.<body>.w`` and so on).
+    """
+
+    body: str = "base"
+
+
+def floating_tree(arm: FloatingArm, body: str = "base") -> FloatingTree:
+    """Base and arm as one tree."""
+    whole = arm.whole
+    return FloatingTree(whole.name, whole.joints, whole.links, whole.gravity, body)
+
+
+def read_floating(urdf: Path | None, gravity: tuple[float, ...], body: str) -> FloatingTree:
+    """A URDF whose root link floats, or the built-in ETS-VII where there is none.
+
+    Raises
+    ------
+    InputError
+        As `load_arm` does, for gravity too: nothing would hold the base.
+    """
+    if urdf is None:
+        built_in = ets_vii()
+        arm = FloatingArm(
+            Tree(built_in.tree.name, built_in.tree.joints, built_in.tree.links, np.array(gravity, float)),
+            built_in.base,
+            built_in.tip_link,
+            as_published=True,
+        )
+    else:
+        arm = load_arm(urdf, load_urdf(urdf, gravity).links[-1].name, gravity=gravity)
+    return floating_tree(arm, body)
+
+
+def n_carriers(tree: Tree) -> int:
+    """Number of leading joints of a tree that are no joints of the arm: 6 for a floating base, else 0."""
+    return CARRIERS if isinstance(tree, FloatingTree) else 0
+
+
+def channel(tree: Tree, index: int) -> str:
+    """Name of a torque channel: ``tau.<joint>``, or ``force.base.x`` to ``torque.base.z`` for a floating base."""
+    return _WRENCH[index] if index < n_carriers(tree) else f"tau.{tree.joints[index].name}"

@@ -1,0 +1,94 @@
+"""What is believed of a system: its tree, the effects it has, and where each of them acts."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from ..recordings.signals import Signal
+from .effect import Effect
+from .floating.tree import n_carriers
+from .hidden_state import rows
+from .rig.kinematics import booms, reached_joints, slides
+from .rig.rig import Rig
+from .tree import Tree
+
+
+@dataclass(frozen=True)
+class Placed:
+    """An effect and the one place it acts at: a joint, a link, a sling, or a sensor channel such as ``tau.joint1``.
+
+    Parameters named in ``hold`` are not identified: the recordings did not ask for them, or another effect carries
+    them.
+    """
+
+    effect: Effect
+    at: str
+    hold: tuple[str, ...] = ()
+
+    @property
+    def key(self) -> str:
+        """``effect.at``, by which parameters are stored."""
+        return f"{self.effect.name}.{self.at}"
+
+
+@dataclass(frozen=True)
+class Model:
+    """A model file, read and checked.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    name, system : str
+    urdf : Path or None
+        None for the built-in rig, and for the built-in ETS-VII.
+    tree : Tree
+        Joints, links, nominal inertia and gravity; a `Rig` for ``zero_g_rig``, with its slings; a `FloatingTree` for
+        ``free_floating_arm``, whose first six joints carry the base.
+    inertia : "fixed" or "free"
+    effects : tuple of Placed
+        Physics that the model has, one entry a place.
+    signals : mapping of str to Signal
+        Where a recording with columns of its own has each signal.
+    bandwidth : float or None
+        Edge of the analysis band [Hz]; None: chosen from the recordings.
+    values : mapping of str to float
+        Parameters known so far, by ``effect.at.parameter`` (``inertia.<link>.<parameter>`` for inertial parameters).
+    """
+
+    path: Path
+    name: str
+    system: str
+    urdf: Path | None
+    tree: Tree
+    inertia: str
+    effects: tuple[Placed, ...]
+    signals: Mapping[str, Signal]
+    bandwidth: float | None
+    values: Mapping[str, float]
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Joint names in order."""
+        return tuple(j.name for j in self.tree.joints)
+
+    def with_effects(self, added: Sequence[Placed], values: Mapping[str, float]) -> "Model":
+        """The model with more effects, and with parameters that a fit found."""
+        return replace(self, effects=(*self.effects, *added), values={**self.values, **values})
+
+
+def places(effect: Effect, tree: Tree) -> tuple[str, ...]:
+    """Places of a tree at which an effect can act on some torque; sensor effects act on torque channels by default."""
+    carriers = n_carriers(tree)
+    if effect.at == "joint":
+        return tuple(j.name for j in tree.joints[carriers:])
+    if effect.at == "link":
+        return tuple(link.name for link in tree.links[max(carriers - 1, 0) :])
+    if effect.at == "base":
+        return ("base",) if carriers else ()
+    if effect.at != "sensor":
+        if not isinstance(tree, Rig):
+            return ()
+        every = {"sling": tuple(s.name for s in tree.slings), "slide": slides(tree), "boom": booms(tree)}[effect.at]
+        return tuple(at for at in every if reached_joints(tree, effect.at, at, rows(effect)))
+    return tuple(f"tau.{j.name}" for j in tree.joints[carriers:])

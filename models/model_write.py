@@ -1,0 +1,80 @@
+"""Model files (TOML) written: what is believed of a system, with what was found."""
+
+import json
+import os
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from .effects import get_effect
+from .floating.tree import FloatingTree
+from .model import Model, Placed, places
+from .rig.file import sling_table
+from .rig.rig import Rig
+
+
+def save_model(model: Model, path: str | Path, note: str) -> None:
+    """Write a model file that `load_model` reads back, all or nothing.
+
+    ``effects`` lists an effect by its name alone where it acts at every place, as ``{ name, at, hold }`` where it
+    does not.
+    """
+    path = Path(path)
+    by_name: dict[str, list[Placed]] = {}
+    for placed in model.effects:
+        by_name.setdefault(placed.effect.name, []).append(placed)
+    listed = []
+    for name, members in by_name.items():
+        everywhere = sorted(p.at for p in members) == sorted(places(get_effect(name), model.tree))
+        if everywhere and not any(p.hold for p in members):
+            listed.append(_toml(name))
+            continue
+        for p in members:
+            hold = f", hold = {_toml(list(p.hold))}" if p.hold else ""
+            listed.append(f"{{ name = {_toml(name)}, at = {_toml(p.at)}{hold} }}")
+    lines = [f"# {line}" for line in note.splitlines()]
+    lines += [
+        f"name = {_toml(model.name)}",
+        f"system = {_toml(model.system)}",
+        *([] if model.urdf is None else [f"urdf = {_toml(Path(os.path.relpath(model.urdf, path.parent)).as_posix())}"]),
+        f"gravity = {_toml([float(g) for g in model.tree.gravity])}",
+        f"inertia = {_toml(model.inertia)}",
+        "effects = [",
+        *(f"    {entry}," for entry in listed),
+        "]",
+    ]
+    if model.bandwidth is not None:
+        lines.append(f"bandwidth = {_toml(model.bandwidth)}")
+    if isinstance(model.tree, FloatingTree):
+        lines.append(f"base = {_toml(model.tree.body)}")
+    if isinstance(model.tree, Rig) and model.urdf is not None:
+        lines += ["", "[slings]"]
+        for name, fields in sling_table(model.tree).items():
+            lines.append(f"{_toml(name)} = {{ {', '.join(f'{k} = {_toml(v)}' for k, v in fields.items())} }}")
+    if model.signals:
+        lines += ["", "[signals]"]
+        for name, signal in model.signals.items():
+            fields = {"column": signal.column, "unit": signal.unit, "gain": signal.gain}
+            inner = ", ".join(f"{k} = {_toml(v)}" for k, v in fields.items() if v is not None)
+            lines.append(f"{_toml(name)} = {{ {inner} }}")
+    if model.values:
+        lines += ["", "[parameters]", *(f"{_toml(k)} = {float(v)!r}" for k, v in model.values.items())]
+    scratch = path.with_name(path.name + ".part")
+    try:
+        scratch.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        scratch.replace(path)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror}; choose a folder that exists") from None
+    finally:
+        with suppress(OSError):
+            scratch.unlink()
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, str):
+        # JSON's escapes are TOML's, but for one character that TOML wants escaped too.
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, list):
+        return "[" + ", ".join(_toml(v) for v in value) + "]"
+    return repr(float(value)) if isinstance(value, float) else repr(value)  # NumPy's floats show their type

@@ -1,0 +1,1 @@
+"""The snare and the arm in one Exudyn system: the reference that a co-simulation is held against."""

@@ -1,0 +1,1 @@
+"""The suspension rig that fakes weightlessness: hang units, slings, slides."""

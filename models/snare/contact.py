@@ -1,0 +1,133 @@
+"""Contact of the cables with the pin, continuous along the cable: where they touch, and the forces there.
+
+On the cubic r(s) of a cable, the distance φ to a cylinder of the pin is least where h(s) = n · r'(s) changes from
+negative to positive; each such point with φ below the cable's radius carries one contact. (Points at fixed stations
+along the cable would act as bumps.) The force F acts on the cable at r(s), as N_a(s) F on coordinate a of the element,
+and −F on the pin at the same point, so that momentum, angular momentum and power balance exactly.
+
+A state is two (n_rows, 3) arrays, positions and velocities; each node has two rows, r and r'. The pin is a (6, 3)
+array: position of its foot, velocity, angular velocity, and the three rows of its rotation matrix.
+"""
+
+from .cubic import combine, first_weights, second_weights, weights
+from .law import force, give
+from .pin import distance, surface
+from .vector import add_scaled, compiled, cross, dot, rotate, rotate_back, row, subtract
+
+PIECES = 4
+"""Into which an element is cut to find a change of sign of h."""
+MOST_CONTACTS = 24
+"""Rows of the list of contacts: cable's element, cylinder, ξ, gap."""
+
+
+@compiled
+def slope_of_distance(cylinder, pin, element, fraction, size):
+    """h = n · r' at ξ, and its derivative by s, in the pin's frame."""
+    rotation = pin[3:6]
+    y = rotate_back(rotation, subtract(combine(weights(fraction, size), element), row(pin, 0)))
+    tangent = rotate_back(rotation, combine(first_weights(fraction, size), element))
+    bow = rotate_back(rotation, combine(second_weights(fraction, size), element))
+    _, normal, bend, across, roundness, around = surface(cylinder, y)
+    curvature = bend * dot(across, tangent) ** 2 + roundness * dot(around, tangent) ** 2 + dot(normal, bow)
+    return dot(normal, tangent), curvature
+
+
+@compiled
+def closest_fraction(cylinder, pin, element, low, high, size):
+    """ξ between low and high where h = 0: Newton's method, halving the bracket where it would leave it."""
+    fraction = 0.5 * (low + high)
+    for _ in range(60):
+        slope, curvature = slope_of_distance(cylinder, pin, element, fraction, size)
+        if slope < 0.0:
+            low = fraction
+        else:
+            high = fraction
+        step = -slope / (curvature * size) if curvature != 0.0 else 0.0
+        nearer = fraction + step
+        if not low <= nearer <= high or curvature <= 0.0:
+            nearer = 0.5 * (low + high)
+        if abs(nearer - fraction) < 1e-14:
+            return nearer
+        fraction = nearer
+    return fraction
+
+
+@compiled
+def find_contacts(positions, n_elements, size, cylinders, pin, radius, contacts):
+    """List the contacts of all cables with the pin; returns how many."""
+    count = 0
+    rotation = pin[3:6]
+    reach = 0.55 * size + radius  # no point of an element is farther than half its length from the nearer node
+    for cable in range(positions.shape[0] // (2 * (n_elements + 1))):
+        for number in range(n_elements):
+            first_row = 2 * (cable * (n_elements + 1) + number)
+            element = positions[first_row : first_row + 4]
+            start = rotate_back(rotation, subtract(row(element, 0), row(pin, 0)))
+            end = rotate_back(rotation, subtract(row(element, 2), row(pin, 0)))
+            for part in range(cylinders.shape[0]):
+                cylinder = cylinders[part]
+                if min(distance(cylinder, start), distance(cylinder, end)) > reach:
+                    continue
+                before, _ = slope_of_distance(cylinder, pin, element, 0.0, size)
+                for piece in range(PIECES):
+                    high = (piece + 1) / PIECES
+                    after, _ = slope_of_distance(cylinder, pin, element, high, size)
+                    if before < 0.0 <= after:
+                        fraction = closest_fraction(cylinder, pin, element, piece / PIECES, high, size)
+                        point = combine(weights(fraction, size), element)
+                        gap = distance(cylinder, rotate_back(rotation, subtract(point, row(pin, 0)))) - radius
+                        if gap < 0.0 and count < contacts.shape[0]:
+                            contacts[count, 0] = first_row
+                            contacts[count, 1] = part
+                            contacts[count, 2] = fraction
+                            contacts[count, 3] = gap
+                            count += 1
+                    before = after
+    return count
+
+
+@compiled
+def contact_force(positions, velocities, size, cylinders, pin, law, contact):
+    """Force on the cable at a listed contact, its point, normal, and velocity against the pin."""
+    first_row, part, fraction, gap = int(contact[0]), int(contact[1]), contact[2], contact[3]
+    n = weights(fraction, size)
+    point = combine(n, positions[first_row : first_row + 4])
+    arm = subtract(point, row(pin, 0))
+    _, normal, _, _, _, _ = surface(cylinders[part], rotate_back(pin[3:6], arm))
+    normal = rotate(pin[3:6], normal)
+    pin_velocity = add_scaled(row(pin, 1), 1.0, cross(row(pin, 2), arm))
+    velocity = subtract(combine(n, velocities[first_row : first_row + 4]), pin_velocity)
+    return force(law, gap, give(law, fraction, size), normal, velocity), point, normal, velocity
+
+
+@compiled
+def add_pin_contact(positions, velocities, n_elements, size, cylinders, pin, law, radius, contacts, forces):
+    """Add the generalised forces to `forces` (n_rows, 3); returns force and moment on the pin about its foot."""
+    total = (0.0, 0.0, 0.0)
+    moment = (0.0, 0.0, 0.0)
+    count = find_contacts(positions, n_elements, size, cylinders, pin, radius, contacts)
+    for index in range(count):
+        push, point, _, _ = contact_force(positions, velocities, size, cylinders, pin, law, contacts[index])
+        first_row, n = int(contacts[index, 0]), weights(contacts[index, 2], size)
+        for a in range(4):
+            for axis in range(3):
+                forces[first_row + a, axis] += n[a] * push[axis]
+        total = subtract(total, push)
+        moment = subtract(moment, cross(subtract(point, row(pin, 0)), push))
+    return total, moment
+
+
+@compiled
+def start_overlap(positions, n_elements, size, cylinders, pin, radius):
+    """Deepest overlap of any cable with the pin [m], sampled: also where a cable's axis runs inside the pin."""
+    deepest = -1e9
+    for first_row in range(0, positions.shape[0] - 2, 2):
+        if (first_row // 2 + 1) % (n_elements + 1) == 0:
+            continue
+        element = positions[first_row : first_row + 4]
+        for station in range(21):
+            point = combine(weights(station / 20, size), element)
+            y = rotate_back(pin[3:6], subtract(point, row(pin, 0)))
+            for part in range(cylinders.shape[0]):
+                deepest = max(deepest, radius - distance(cylinders[part], y))
+    return deepest

@@ -1,0 +1,1 @@
+"""What reports are drawn with: offline HTML, line drawings, and 3-D playback."""

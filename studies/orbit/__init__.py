@@ -1,0 +1,1 @@
+"""The two captures in orbit: setting, run, ledgers, figures and page."""
