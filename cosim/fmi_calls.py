@@ -5,10 +5,12 @@ argument objects that are kept and only filled anew.
 """
 
 import ctypes
+import itertools
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
+from weakref import WeakValueDictionary
 
 import numpy as np
 from fmpy import fmi2, fmi3
@@ -202,19 +204,22 @@ class Instance:
         if self.major == 3:
             self._fmu.instantiate(logMessage=self._log3)
             return
+        number = next(_NUMBERS)
+        _LISTENERS[number] = self
         callbacks = fmi2.fmi2CallbackFunctions()
-        callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(self._log2)
+        callbacks.logger = _LOGGER.logger
         callbacks.allocateMemory = fmi2.defaultCallbacks.allocateMemory
         callbacks.freeMemory = fmi2.defaultCallbacks.freeMemory
-        fmi2.addLoggerProxy(ctypes.byref(callbacks))
+        callbacks.componentEnvironment = number
         self._fmu.instantiate(callbacks=callbacks)
 
-    def _log2(self, _: object, __: bytes, status: int, ___: bytes, message: bytes) -> None:
+    def hear(self, status: int, message: bytes) -> None:
+        """Keep what the FMU says of a call that was not right."""
         if status > 0 and message:
             self.messages.append(" ".join(message.decode(errors="replace").split()))
 
     def _log3(self, _: object, status: int, __: bytes, message: bytes) -> None:
-        self._log2(_, b"", status, b"", message)
+        self.hear(status, message)
 
     def _step_arguments(self) -> tuple[Any, ...]:
         # The last one before the flags: a state may be set back to before this step.
@@ -223,6 +228,26 @@ class Instance:
         self._flags = (ctypes.c_bool(), ctypes.c_bool(), ctypes.c_bool(), ctypes.c_double())
         pointers = tuple(ctypes.byref(flag) for flag in self._flags)
         return (self.component, self._time, self._size, ctypes.c_bool(False), *pointers)
+
+
+_NUMBERS = itertools.count(1)
+_LISTENERS: "WeakValueDictionary[int, Instance]" = WeakValueDictionary()
+
+
+def _log2(environment: Any, name: bytes, status: int, category: bytes, message: bytes) -> None:
+    listener = _LISTENERS.get(environment or 0)
+    if listener is None:
+        fmi2.printLogMessage(environment, name, status, category, message)
+    else:
+        listener.hear(status, message)
+
+
+# FMPy formats messages for one logger in the whole process. One that is never freed, and that leaves to FMPy what is
+# not ours, keeps instances of FMPy's and of ours apart.
+_LOGGER = fmi2.fmi2CallbackFunctions()
+_LOGGER.logger = fmi2.fmi2CallbackLoggerTYPE(_log2)
+_KEEP = _LOGGER.logger
+fmi2.addLoggerProxy(ctypes.byref(_LOGGER))
 
 
 class Vector:

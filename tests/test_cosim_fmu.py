@@ -1,11 +1,13 @@
 """FMUs as participants: built here from C, well and badly behaved, FMI 2.0 and 3.0."""
 
+import gc
 import os
 import signal
 import sys
 import time
 from types import SimpleNamespace
 
+import fmpy
 import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
@@ -163,6 +165,26 @@ def test_failing_fmu_is_named_with_time_and_last_good_step(files, fault, said, c
         recording = master.result().recording
     assert len(recording["time"]) == 51
     assert np.isfinite(recording["left.x [m]"]).all()
+
+
+def test_each_instance_hears_its_own_fmu(files, tmp_path, capsys):
+    """FMPy formats the messages of all FMI 2.0 instances of a process for one logger."""
+    one, two = (Fmu(files["left", 2], name) for name in ("one", "two"))
+    for participant, fault in ((one, FATAL), (two, ERROR)):
+        participant.initialize(0.0, {"fault": fault, "fault_time": 0.0})
+    with pytest.raises(StepError, match=r"one: .*the model is lost"):
+        one.step(0.0, 0.01)
+    with pytest.raises(StepError, match=r"two: .*the spring has snapped"):
+        two.step(0.0, 0.01)
+    del one, two
+    gc.collect()
+    unpacked = fmpy.extract(str(files["left", 2]), str(tmp_path / "left"))
+    description = fmpy.read_model_description(unpacked)
+    with pytest.raises(Exception, match="error"):
+        fmpy.simulate_fmu(
+            unpacked, model_description=description, start_values={"fault": ERROR, "fault_time": 0.0}, stop_time=0.1
+        )
+    assert "the spring has snapped" in capsys.readouterr().out
 
 
 def quick(path):
