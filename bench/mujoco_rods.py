@@ -2,8 +2,9 @@
 
 Nothing of our model is used but its dimensions, the ring's prescribed angle, and the shape of the cables at rest at
 the start. A cable is ``n_segments`` equal capsules with ball joints between them, stiffness EI/Δs and damping τ EI/Δs,
-straight when free of stress; the first hangs on the fixed ring by a free ball joint, the last is held on the rotating
-ring by a ``connect`` constraint. The ring is a very heavy body whose angle and rate are set before each step. Tension
+straight when free of stress. The first turns freely about itself in a socket of next to no mass, which sits on the
+fixed ring by a ball joint with the bearing's friction; the last is held on the rotating ring by a ``connect``
+constraint. The ring is a very heavy body whose angle and rate are set before each step. Tension
 is rigid here (ours strains by EA⁻¹: 3e-5 at 7 N), and so is contact (ours overlaps by 3 µm).
 
 MuJoCo ≥ 3.13 is needed: its ``discrete`` integrator solves constraints in the metric M + hD + h²K, the others solve
@@ -65,7 +66,7 @@ def capture(
     Parameters
     ----------
     parameters : SnareParameters
-        Without end stiffness, which a free ball joint does not have.
+        Without end stiffness, which these sockets do not have.
     target : Target
         On a spring.
     points : (3, n_segments + 1, 3)
@@ -74,7 +75,7 @@ def capture(
         [s].
     """
     if parameters.end_stiffness or target.rotates or target.support != "spring":
-        raise ValueError("the rods have free ends, and a target on a spring that keeps its orientation")
+        raise ValueError("the rods have no end stiffness, and a target on a spring that keeps its orientation")
     model = mujoco.MjModel.from_xml_string(_mjcf(parameters, target, points.shape[1] - 1, step))  # pyright: ignore[reportAttributeAccessIssue]
     data = mujoco.MjData(model)  # pyright: ignore[reportAttributeAccessIssue]
     _bend(model, data, points)
@@ -102,14 +103,17 @@ def _mjcf(p: SnareParameters, target: Target, n_segments: int, step: float) -> s
     rod = f"""<inertial pos="{size / 2} 0 0" mass="{mass}" diaginertia="{inertia}"/>
 <geom class="cable%d" fromto="0 0 0 {size} 0 0"/>"""
     bend = f'<joint type="ball" stiffness="{stiffness}" damping="{p.bending_damping * stiffness}"/>'
+    socket = f'<joint type="ball" damping="{p.end_friction}"/>'
+    socket += '<inertial pos="0 0 0" mass="1e-6" diaginertia="1e-9 1e-9 1e-9"/>'
     chains, ends, classes, holds = "", "", "", ""
     for c in range(3):
         start = 2 * np.pi / 3 * (1 - c)
         end = start + p.ring_direction * 2 * np.pi / 3
         cable = rod % c
-        chains += f'<body name="cable{c}" pos="0 {p.ring_radius * np.cos(start)} {p.ring_radius * np.sin(start)}">'
-        chains += f'<joint type="ball"/>{cable}' + f'<body pos="{size} 0 0">{bend}{cable}' * (n_segments - 1)
-        chains += f'<site name="end{c}" pos="{size} 0 0"/>' + "</body>" * n_segments
+        place = f"0 {p.ring_radius * np.cos(start)} {p.ring_radius * np.sin(start)}"
+        chains += f'<body pos="{place}">{socket}<body name="cable{c}"><joint type="hinge" axis="1 0 0"/>'
+        chains += cable + f'<body pos="{size} 0 0">{bend}{cable}' * (n_segments - 1)
+        chains += f'<site name="end{c}" pos="{size} 0 0"/>' + "</body>" * (n_segments + 1)
         place = f"{p.ring_distance} {p.ring_radius * np.cos(end)} {p.ring_radius * np.sin(end)}"
         ends += f'<site name="ring{c}" pos="{place}"/>'
         holds += f'<connect site1="end{c}" site2="ring{c}" solref="{2 * step} 1" {STIFF}/>'
@@ -150,14 +154,15 @@ def _bend(model: Any, data: Any, points: Array) -> None:
     """Turn each joint so that the chains follow the points, without twist (parallel transport)."""
     for c, cable in enumerate(points):
         address = model.jnt_qposadr[model.body_jntadr[model.body(f"cable{c}").id]]
-        before = Rotation.identity()
+        before, address = Rotation.identity(), address - 4  # the socket's, then one of the hinge's, then ball joints
         for i, span in enumerate(np.diff(cable, axis=0)):
             along, direction = before.as_matrix()[:, 0], span / np.linalg.norm(span)
             axis = np.cross(along, direction)
             sine = np.linalg.norm(axis)
             turn = Rotation.from_rotvec(axis * (np.arctan2(sine, along @ direction) / max(sine, 1e-300)))
             joint = before.inv() * turn * before
-            data.qpos[address + 4 * i : address + 4 * i + 4] = np.roll(joint.as_quat(), 1)
+            here = address + 4 * i + (i > 0)
+            data.qpos[here : here + 4] = np.roll(joint.as_quat(), 1)
             before = turn * before
 
 

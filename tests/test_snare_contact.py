@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from snarelab.models.snare.contact import find_contacts
 from snarelab.models.snare.crossing import find_crossings
 from snarelab.models.snare.cubic import combine, first_weights, weights
+from snarelab.models.snare.ends import REACTION
 from snarelab.models.snare.forces import system_forces, system_jacobian
 from snarelab.models.snare.law import force, give, hertz_overlap, law_constants, powers
 from snarelab.models.snare.parameters import SnareParameters
@@ -60,10 +61,10 @@ def touching_state(n_pin, overlap=1.0e-4, turn=(0.0, 0.3, 0.2), seed=0):
     pin, euler = np.zeros((6, 3)), np.zeros((2, 4))
     pin[0], pin[3:], euler[0] = foot, rotation.as_matrix(), quaternion
     pin[1:3] = rng.normal(size=(2, 3)) * 0.05
-    directions = rng.normal(size=(6, 3))
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    fixed = (reference, N, SIZE, n_pin, pin_cylinders(P), law_constants(P), P.cable_radius, 0.1)
-    moving = (pin, euler, np.zeros((24, 4)), np.zeros((12, 5)), directions)
+    fittings = rng.normal(size=(8, 3))
+    fittings /= np.linalg.norm(fittings, axis=1, keepdims=True)
+    fixed = (reference, N, SIZE, n_pin, pin_cylinders(P), law_constants(P), P.cable_radius, 0.1, 0.0)
+    moving = (pin, euler, np.zeros((24, 4)), np.zeros((12, 5)), fittings)
     return np.zeros_like(reference), rng.normal(size=reference.shape) * 0.05, fixed, moving
 
 
@@ -121,9 +122,9 @@ def test_jacobian_of_crossing_cables():
 
 
 def test_contact_balances_force_and_moment():
-    """On cables (as forces on r and couples through r') and pin together: nothing is left over."""
+    """On cables (as forces on r and couples through r'), pin and bearings together: nothing is left over."""
     q, v, fixed, moving = touching_state(7)
-    fixed = (*fixed[:-1], 0.0)
+    fixed = (*fixed[:-2], 0.0, 2e-3)
     forces = system_forces(q, v, fixed, moving)
     on_nodes, on_pin = forces[:198].reshape(-1, 3), forces[198:]
     coordinates = fixed[0][:198].reshape(-1, 3)
@@ -131,7 +132,7 @@ def test_contact_balances_force_and_moment():
     e = moving[1][0]
     turn = 2 * np.array([[-e[1], e[0], -e[3], e[2]], [-e[2], e[3], e[0], -e[1]], [-e[3], -e[2], e[1], e[0]]])
     moment = turn @ on_pin[3:] / 4 + np.cross(fixed[0][198:201], on_pin[:3])  # G Gᵀ = 4
-    moment += np.cross(coordinates, on_nodes).sum(axis=0)
+    moment += np.cross(coordinates, on_nodes).sum(axis=0) + moving[4][REACTION]
     assert np.abs(moment).max() < 1e-10 * np.abs(on_pin).max()
 
 

@@ -16,6 +16,7 @@ from ..floating.arm import FloatingArm
 from ..inertia import Array, to_central
 from ..snare.assembly import Assembly
 from ..snare.drive import Pose, ring_ends, ring_motion
+from ..snare.ends import REACTION
 from ..snare.engine import exudyn, items
 from ..snare.forces import MOST_CONTACTS, MOST_CROSSINGS, system_forces, system_jacobian
 from ..snare.parameters import SnareParameters
@@ -174,32 +175,41 @@ class MonolithicAssembly(Assembly):
         return self._ring_ends(self.frame, time)
 
     def place(self, time: float) -> None:
-        """Bring a pin that is fixed to the base to the present state."""
+        """Bring a pin that is fixed to the base, and the fittings of the ends, to the present state."""
+        self._follow(*self.tree_state(), time)
+
+    def _follow(self, coordinates: Array, rates: Array, time: float) -> tuple[Array, Array]:
+        """Bring pin and fittings to a state of the tree; returns the Jacobians of tip and pin, each (6, 6 + J)."""
+        (tip, of_tip), (pin, of_pin), _ = self.frames(coordinates, rates)
+        self.frame[:] = tip
         if not self.n_pin:
-            self.pin[:] = self.frames(*self.tree_state())[1][0]
+            self.pin[:] = pin
+        self.turn_fittings(time)
+        return of_tip, of_pin
 
     def _add_contact(self) -> None:
-        if self.n_pin:
-            super()._add_contact()
-            return
-        reference, n, p = self.nodes.ravel(), self.n_cable_coordinates, self.parameters
+        reference, p = np.concatenate([self.nodes.ravel(), self._target_reference()]), self.parameters
+        n, n_cables = len(reference), self.n_cable_coordinates
 
-        def forces(_system: Any, _time: float, _item: int, q: Any, rates: Any) -> np.ndarray:
+        def forces(_system: Any, time: float, _item: int, q: Any, rates: Any) -> np.ndarray:
             q, rates = np.asarray(q), np.asarray(rates)
-            frame, jacobian = self.frames(q[n:] + self.start, rates[n:])[1]
-            self.pin[:] = frame
-            on_cables = system_forces(q[:n], rates[:n], self.fixed, self.moving)
-            pairs = on_cables.reshape(-1, 3), (q[:n] + reference).reshape(-1, 3)
-            force = pairs[0][0::2].sum(axis=0)  # of the nodes' positions; slopes carry moments alone
-            moment = np.cross(pairs[1], pairs[0]).sum(axis=0) - np.cross(frame[0], force)
-            return np.concatenate([on_cables, -jacobian.T @ np.concatenate([force, moment])])
+            of_tip, of_pin = self._follow(q[n:] + self.start, rates[n:], time)
+            on_others = system_forces(q[:n], rates[:n], self.fixed, self.moving)
+            reaction = self.moving[4][REACTION]
+            on_tree = of_tip[3:].T @ reaction
+            if not self.n_pin:
+                pairs = on_others.reshape(-1, 3), (q[:n_cables] + reference).reshape(-1, 3)
+                force = pairs[0][0::2].sum(axis=0)  # of the nodes' positions; slopes carry moments alone
+                moment = np.cross(pairs[1], pairs[0]).sum(axis=0) + reaction - np.cross(self.pin[0], force)
+                on_tree = on_tree - of_pin.T @ np.concatenate([force, moment])
+            return np.concatenate([on_others, on_tree])
 
         def jacobian(
-            _system: Any, _time: float, _item: int, q: Any, rates: Any, factor: float, rate_factor: float
+            _system: Any, time: float, _item: int, q: Any, rates: Any, factor: float, rate_factor: float
         ) -> exudyn.MatrixContainer:
-            """Of the cables alone: what the base's own motion changes in a contact is lost in its mass."""
+            """Of cables and target alone: what the tree's own motion changes in a contact is lost in its mass."""
             q, rates = np.asarray(q), np.asarray(rates)
-            self.pin[:] = self.frames(q[n:] + self.start, rates[n:])[1][0]
+            self._follow(q[n:] + self.start, rates[n:], time)
             triplets = system_jacobian(q[:n], rates[:n], self.fixed, self.moving, factor, rate_factor)
             matrix = exudyn.MatrixContainer()
             matrix.SetWithSparseMatrix(triplets, n + self.n_tree, n + self.n_tree, useDenseMatrix=False)
@@ -207,16 +217,16 @@ class MonolithicAssembly(Assembly):
 
         self.reference = reference
         self.fixed = (
-            reference, self.n_elements, self.size, 0, self.cylinders, self.law, p.cable_radius, p.end_stiffness,
+            reference, self.n_elements, self.size, self.n_pin, self.cylinders, self.law, p.cable_radius,
+            p.end_stiffness, p.end_friction,
         )  # fmt: skip
         self.moving = (
-            self.pin, self.euler, np.zeros((MOST_CONTACTS, 4)), np.zeros((MOST_CROSSINGS, 5)), np.zeros((6, 3)),
+            self.pin, self.euler, np.zeros((MOST_CONTACTS, 4)), np.zeros((MOST_CROSSINGS, 5)), np.zeros((8, 3)),
         )  # fmt: skip
+        nodes = [*self.cable_nodes, *([self.target_node] if self.n_pin else []), self.tree_node]
         self.contact_object = self.system.AddObject(
             items.ObjectGenericODE2(
-                nodeNumbers=[*self.cable_nodes, self.tree_node],
-                forceUserFunction=cast(Any, forces),
-                jacobianUserFunction=cast(Any, jacobian),
+                nodeNumbers=nodes, forceUserFunction=cast(Any, forces), jacobianUserFunction=cast(Any, jacobian)
             )
         )
 

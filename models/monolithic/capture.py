@@ -104,7 +104,6 @@ class MonolithicCapture:
                 p.bending_stiffness,
                 p.axial_damping,
                 p.bending_damping,
-                p.swing_damping,
             ]
         )
         self._wrench, self._impulse, self._time = np.zeros(12), np.zeros(3), 0.0

@@ -2,7 +2,7 @@
 
 Coordinates are ordered cable by cable, node by node, (r, r') each; the target's follow. Cables are straight when free
 of stress (`strainIsRelativeToReference` = 0): Exudyn's other choice is not frame-indifferent in three dimensions.
-Nor is its damping in bending: `snare_damping` takes its place, but for a little of it (`swing_damping`).
+Nor is its damping in bending: `damping` takes its place.
 """
 
 from dataclasses import dataclass, field
@@ -13,6 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from .drive import PATH_SIZE, Pose, frame_at, ring_ends, ring_motion
+from .ends import RING_SPIN
 from .engine import exudyn, items
 from .forces import MOST_CONTACTS, MOST_CROSSINGS, system_forces, system_jacobian
 from .geometry import N_CABLES
@@ -118,17 +119,21 @@ class Assembly:
         return x, y, z
 
     def place(self, time: float) -> None:
-        """Bring what is moved from outside, and the rest directions of the ends, to a time [s]."""
+        """Bring what is moved from outside, and the fittings of the ends, to a time [s]."""
         if not self.n_pin:
             frame_at(self.target_path, time, self.pin)
-        if self.parameters.end_stiffness > 0:
-            p = self.parameters
+        frame_at(self.effector_path, time, self.frame)
+        self.turn_fittings(time)
+
+    def turn_fittings(self, time: float) -> None:
+        """Bring the fittings of the ends to the end effector's frame and to a time [s]; see `ends`."""
+        p, fittings = self.parameters, self.moving[4]
+        fittings[RING_SPIN] = self.frame[2]
+        if p.end_stiffness > 0:
             angle, _ = ring_motion(time, p.ring_rate, p.ring_travel, p.ring_ramp)
-            frame_at(self.effector_path, time, self.frame)
             turn = Rotation.from_euler("x", p.ring_direction * angle).as_matrix()
-            directions = self.moving[4]
-            directions[0::2] = self._rest[:, 0] @ self.frame[3:].T
-            directions[1::2] = self._rest[:, 1] @ turn.T @ self.frame[3:].T
+            fittings[0:6:2] = self._rest[:, 0] @ self.frame[3:].T
+            fittings[1:6:2] = self._rest[:, 1] @ turn.T @ self.frame[3:].T
 
     def _add_target(self) -> None:
         target, system = self.target, self.system
@@ -212,14 +217,14 @@ class Assembly:
         self.reference = reference
         self.fixed = (
             reference, self.n_elements, self.size, self.n_pin, self.cylinders, self.law,
-            p.cable_radius, p.end_stiffness,
+            p.cable_radius, p.end_stiffness, p.end_friction,
         )  # fmt: skip
         self.moving = (
             self.pin,
             self.euler,
             np.zeros((MOST_CONTACTS, 4)),
             np.zeros((MOST_CROSSINGS, 5)),
-            np.zeros((6, 3)),
+            np.zeros((8, 3)),
         )
         self.contact_object = self.system.AddObject(
             items.ObjectGenericODE2(
@@ -255,7 +260,6 @@ def add_cable(system: Any, nodes: np.ndarray, parameters: SnareParameters) -> li
                 bendingStiffness=p.bending_stiffness,
                 axialStiffness=p.axial_stiffness,
                 axialDamping=p.axial_damping * p.axial_stiffness,
-                bendingDamping=p.swing_damping * p.bending_stiffness,
                 strainIsRelativeToReference=0.0,
                 nodeNumbers=[first, second],
                 useReducedOrderIntegration=2,

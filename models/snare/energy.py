@@ -19,7 +19,7 @@ TENSION_POINTS = np.array([[0.0, 1 / 6], [0.5, 4 / 6], [1.0, 1 / 6]])
 BENDING_POINTS = np.array([[0.5 - np.sqrt(1 / 12), 0.5], [0.5 + np.sqrt(1 / 12), 0.5]])
 """ξ and weight where an element's tension and bending are integrated."""
 STRAIGHT = 1e-3
-"""Curvature below which a cable counts as straight [1/m]: its size has no rate there, see `snare_damping`."""
+"""Curvature below which a cable counts as straight [1/m]: its size has no rate there, see `damping`."""
 _MASS_POINTS = np.array(
     [
         [0.5 + 0.5 * x, 0.5 * w]
@@ -34,7 +34,7 @@ def cable_energies(
 ):
     """Energies and losses of all cables, shape (7,), in the order above.
 
-    `section`: ρA, EA, EI, and the stiffness-proportional damping of tension, of bending and of the swing [s].
+    `section`: ρA, EA, EI, and the stiffness-proportional damping of tension and of bending [s].
     """
     result = np.zeros(7)
     for first_row in range(0, positions.shape[0] - 2, 2):
@@ -61,7 +61,6 @@ def cable_energies(
             bent = dot(curvature, curvature)
             result[STRAIN] += 0.5 * share * bent
             result[BENDING_LOSS] += share * section[4] * dot(curvature, rate) ** 2 / (bent + STRAIGHT * STRAIGHT)
-            result[BENDING_LOSS] += share * section[5] * dot(rate, rate)
         for i in range(4):
             speed = combine(weights(_MASS_POINTS[i, 0], size), rates)
             result[KINETIC] += 0.5 * _MASS_POINTS[i, 1] * size * section[0] * dot(speed, speed)

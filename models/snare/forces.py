@@ -1,8 +1,9 @@
 """What Exudyn calls at each iteration, each in one compiled call: all forces that are not its own, and their Jacobian.
 
 `fixed` and `moving` bundle what the compiled functions see: (reference coordinates, elements per cable, their length,
-number of the pin's coordinates, its cylinders, constants of the laws, cable radius, end stiffness), and the
-arrays that they fill, (pin, Euler parameters and rates, contacts, crossings, rest directions of the ends).
+number of the pin's coordinates, its cylinders, constants of the laws, cable radius, stiffness and friction of the
+ends), and the arrays that they fill, (pin, Euler parameters and rates, contacts, crossings, fittings of the ends: see
+`ends`).
 """
 
 import numpy as np
@@ -11,12 +12,19 @@ from .contact import MOST_CONTACTS, add_pin_contact, contact_force, find_contact
 from .contact_jacobian import add_pin_jacobian, turn_column
 from .crossing import MOST_CROSSINGS, add_crossing_jacobian, add_crossings, find_crossings
 from .damping import TRIPLETS_PER_ELEMENT, add_damping, add_damping_jacobian
-from .ends import add_end_jacobian, add_end_springs, end_moment
-from .energy import STRAIN, cable_energies
+from .ends import (
+    REACTION,
+    add_bearing_friction,
+    add_bearing_jacobian,
+    add_end_jacobian,
+    add_end_springs,
+    end_moment,
+)
+from .energy import BENDING_LOSS, STRAIN, cable_energies
 from .law import DAMPING
 from .vector import compiled, cross, dot, row, subtract
 
-MOST_TRIPLETS = MOST_CONTACTS * 19 * 19 + MOST_CROSSINGS * 24 * 24 + 54
+MOST_TRIPLETS = MOST_CONTACTS * 19 * 19 + MOST_CROSSINGS * 24 * 24 + 54 + 27
 """Beside those of damping."""
 
 
@@ -46,8 +54,8 @@ def read_pin(coordinates, rates, n_pin, pin, euler):
 @compiled
 def system_forces(q, rates, fixed, moving):
     """Generalised forces on all coordinates, shape (n_coordinates,), at displacements q and rates."""
-    reference, n_elements, size, n_pin, cylinders, law, radius, stiffness = fixed
-    pin, euler, contacts, crossings, directions = moving
+    reference, n_elements, size, n_pin, cylinders, law, radius, stiffness, friction = fixed
+    pin, euler, contacts, crossings, fittings = moving
     coordinates = q + reference
     read_pin(coordinates, rates, n_pin, pin, euler)
     n_cables = q.size - n_pin
@@ -60,7 +68,8 @@ def system_forces(q, rates, fixed, moving):
     )
     add_crossings(positions, velocities, n_elements, size, law, radius, crossings, forces)
     if stiffness > 0.0:
-        add_end_springs(positions, n_elements, stiffness, directions, forces)
+        add_end_springs(positions, n_elements, stiffness, fittings, forces)
+    add_bearing_friction(positions, velocities, n_elements, friction, fittings, forces)
     add_damping(positions, velocities, n_elements, size, law[DAMPING], forces)
     for k in range(min(n_pin, 3)):
         result[n_cables + k] = push[k]
@@ -73,8 +82,8 @@ def system_forces(q, rates, fixed, moving):
 @compiled
 def system_jacobian(q, rates, fixed, moving, factor, rate_factor):
     """Triplets (row, column, value) of −(factor ∂f/∂q + rate_factor ∂f/∂q̇), shape (n_triplets, 3)."""
-    reference, n_elements, size, n_pin, cylinders, law, radius, stiffness = fixed
-    pin, euler, contacts, crossings, directions = moving
+    reference, n_elements, size, n_pin, cylinders, law, radius, stiffness, friction = fixed
+    pin, euler, contacts, crossings, fittings = moving
     coordinates = q + reference
     read_pin(coordinates, rates, n_pin, pin, euler)
     n_cables = q.size - n_pin
@@ -90,8 +99,9 @@ def system_jacobian(q, rates, fixed, moving, factor, rate_factor):
     n_crossings = find_crossings(positions, n_elements, size, radius, crossings)
     count = add_crossing_jacobian(positions, velocities, size, law, crossings, n_crossings, factors, triplets, count)
     if stiffness > 0.0:
-        count = add_end_jacobian(positions, n_elements, stiffness, directions, factor, triplets, count)
+        count = add_end_jacobian(positions, n_elements, stiffness, fittings, factor, triplets, count)
     if rate_factor != 0.0:
+        count = add_bearing_jacobian(positions, n_elements, friction, rate_factor, triplets, count)
         count = add_damping_jacobian(positions, n_elements, size, law[DAMPING], rate_factor, triplets, count)
     return triplets[:count].copy()
 
@@ -114,8 +124,8 @@ def measure(q, rates, fixed, moving, section, pull, ends, end_speeds, effector, 
     float
         Power of the rings on the cables [W].
     """
-    reference, n_elements, size, n_pin, cylinders, law, radius, stiffness = fixed
-    pin, euler, contacts, crossings, directions = moving
+    reference, n_elements, size, n_pin, cylinders, law, radius, stiffness, friction = fixed
+    pin, euler, contacts, crossings, fittings = moving
     coordinates = q + reference
     read_pin(coordinates, rates, n_pin, pin, euler)
     n_cables = q.size - n_pin
@@ -137,7 +147,7 @@ def measure(q, rates, fixed, moving, section, pull, ends, end_speeds, effector, 
     for end in range(6):
         turn = cross(subtract(row(ends, end), row(effector, 0)), row(pull, end))
         power -= dot(row(pull, end), row(end_speeds, end))
-        moment = end_moment(positions, n_elements, stiffness, directions, end)
+        moment = end_moment(positions, n_elements, stiffness, fittings, end)
         power -= dot(moment, row(effector, 2) if end % 2 == 0 else ring_spin)
         for k in range(3):
             wrench[6 + k] += pull[end, k]
@@ -145,6 +155,12 @@ def measure(q, rates, fixed, moving, section, pull, ends, end_speeds, effector, 
     energies = cable_energies(
         positions, velocities, n_elements, size, section, cylinders, pin, law, contacts, count, crossings, n_crossings
     )
+    energies[BENDING_LOSS] += add_bearing_friction(
+        positions, velocities, n_elements, friction, fittings, np.zeros_like(positions)
+    )
+    power -= dot(row(fittings, REACTION), row(effector, 2))
+    for k in range(3):
+        wrench[9 + k] += fittings[REACTION, k]
     if stiffness > 0.0:
-        energies[STRAIN] += add_end_springs(positions, n_elements, stiffness, directions, np.zeros_like(positions))
+        energies[STRAIN] += add_end_springs(positions, n_elements, stiffness, fittings, np.zeros_like(positions))
     return wrench, energies, touching, power

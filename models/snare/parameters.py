@@ -46,11 +46,9 @@ def _dimension(value: float, unit: str, kind: Kind, source: str, allowed: str = 
 class SnareParameters:
     """Dimensions of rings, cables, pin and contact; `dimensions` lists each with unit and source.
 
-    Bending is damped in two ways. `bending_damping` acts on the rate of the curvature's size and leaves a swing of the
-    cable about its chord alone. `swing_damping` acts on the rate of the curvature vector and so brakes that swing too,
-    as friction in the ends' bearings would: a little of it makes vibrations across the bend die, without which results
-    converge slowly with the step. Set it to 0 to compare with rods whose ends turn freely; first contact then comes
-    20 ms earlier.
+    `bending_damping` acts on the rate of the curvature's size and leaves a swing of a cable about its chord alone;
+    `end_friction`, in the bearings, brakes that swing. Without it first contact comes some 60 ms earlier, and what
+    follows depends so much on what was before that results converge slowly with the step.
 
     The end effector's frame has x along its axis: the fixed ring lies at x = 0, the rotating one at `ring_distance`.
     The target's frame has its origin at the foot of the pin, which points along −x and ends in a knob.
@@ -61,15 +59,17 @@ class SnareParameters:
         For a value that is not finite or not in its range.
     """
 
-    ring_radius: float = _dimension(0.1275, "m", "calibrated", _CONTACT_TIME)
+    ring_radius: float = _dimension(0.127, "m", "calibrated", _CONTACT_TIME)
     ring_distance: float = _dimension(0.10, "m", "chosen", "axial distance of the rings; not in the paper")
-    cable_length: float = _dimension(0.2851, "m", "derived", "lies against the rings' wall (Li et al.): `wall_length`")
+    cable_length: float = _dimension(0.2842, "m", "derived", "lies against the rings' wall (Li et al.): `wall_length`")
     cable_diameter: float = _dimension(0.004, "m", "chosen", "wire rope of 4 mm; not in the paper")
     young_modulus: float = _dimension(20e9, "Pa", "paper", "Li et al., ground test")
     density: float = _dimension(7800.0, "kg/m**3", "paper", "Li et al., ground test")
     bending_damping: float = _dimension(1e-3, "s", "chosen", "ratio of damping to stiffness in bending", ">= 0")
-    swing_damping: float = _dimension(6e-6, "s", "chosen", "rate of the whole curvature vector; see below", ">= 0")
     axial_damping: float = _dimension(1e-4, "s", "chosen", "ratio of damping to stiffness in tension", ">= 0")
+    end_friction: float = _dimension(
+        2e-3, "N*m*s/rad", "chosen", "of a cable's bearing on the fixed ring; not in the paper", ">= 0"
+    )
     end_stiffness: float = _dimension(0.0, "N*m/rad", "chosen", "spherical joints, as in the paper", ">= 0")
     ring_rate: float = _dimension(8 * pi / 180, "rad/s", "paper", "Li et al.: 8 deg/s")
     ring_travel: float = _dimension(80 * pi / 180, "rad", "paper", "Li et al.: 80 deg")

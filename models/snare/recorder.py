@@ -41,7 +41,6 @@ class Recorder:
                 p.bending_stiffness,
                 p.axial_damping,
                 p.bending_damping,
-                p.swing_damping,
             ]
         )
         self.pin_wrench = np.zeros(6)
