@@ -4,7 +4,9 @@ BIN := .venv/bin
 SOURCES := $(shell git ls-files '*.py' '*.toml' '*.urdf' '*.csv' '*.json' 2>/dev/null | grep -v -e '^tests/' -e '^bench/')
 STUDIES := emps free-floating ground-capture zero-g-rig orbit-inspection orbit-hover tolerance
 
-.PHONY: help demo test check bench fmus clean $(STUDIES:%=study-%)
+BENCHES := torque friction_fit diagnosis floating cosim fmu snare
+
+.PHONY: help demo test check bench accuracy fmus clean $(STUDIES:%=study-%)
 
 help:            ## what can be made
 	@sed -n -e 's/^\$$(STUDIES.*## /  make study-NAME\t/p' -e 's/^\([a-z]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
@@ -21,12 +23,12 @@ check: .venv/installed ## formatting, lint and types
 	$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/pyright --pythonpath $(BIN)/python
 
 bench: .venv/installed ## ratios against named rivals, measured in one run
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/torque.py
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/friction_fit.py
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/diagnosis.py
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/floating.py
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/cosim.py
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/fmu.py
+	@set -e; for name in $(BENCHES); do \
+	    echo; echo "bench/$$name.py"; OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/$$name.py; done
+
+accuracy: .venv/installed ## the snare on 30 random captures, and against rods in another engine on 10: half an hour
+	$(BIN)/python bench/snare_accuracy.py --result build/bench/snare_accuracy.json
+	OMP_NUM_THREADS=1 $(BIN)/python bench/snare.py --cases 10
 
 fmus: .venv/installed ## the shipped FMUs and a page on each, into build/fmus
 	$(BIN)/python -m snarelab.fmu.shipped

@@ -32,9 +32,11 @@ PAPER_POSITION_ERROR, PAPER_FORCE_ERROR = (0.00027, 0.00268, 0.00599), (0.99, 1.
 SWEEPS = {
     "friction": (0.0, 0.05, 0.1, 0.2, 0.3),
     "bending_damping": (1e-4, 3e-4, 1e-3, 3e-3, 1e-2),
+    "end_friction": (5e-4, 1e-3, 2e-3, 4e-3),
     "mass": (10.0, 25.0, 50.0, 100.0),
 }
-"""What the paper leaves open: coefficient [1], ratio of damping to stiffness [s], target's mass [kg]."""
+"""What the paper leaves open: coefficient [1], ratio of damping to stiffness [s], friction of the cables' bearings
+[N·m·s/rad], target's mass [kg]."""
 
 
 @dataclass(frozen=True)

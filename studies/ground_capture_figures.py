@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 _VARIED = {
     "friction": ("friction coefficient", "1"),
     "bending_damping": ("bending damping over stiffness", "s"),
+    "end_friction": ("friction of the cables' bearings", "N*m*s/rad"),
     "mass": ("target's mass", "kg"),
 }
 _CABLES = (AFTER, "#009E73", SHADE)
@@ -155,7 +156,7 @@ def _paper_contact(axes: Axes) -> None:
 def _sweeps(cases: Sequence[Case]) -> bytes:
     with drawing():
         figure = Figure(figsize=(9.0, 4.6))
-        grid = figure.subplots(2, 3, sharex="col", sharey="row")
+        grid = figure.subplots(2, len(_VARIED), sharex="col", sharey="row")
         for column, (name, (words, unit)) in enumerate(_VARIED.items()):
             varied = [c for c in cases if c.name == name]
             values = [c.value for c in varied]
@@ -168,7 +169,7 @@ def _sweeps(cases: Sequence[Case]) -> bytes:
             bottom.set_xlabel(words if unit == "1" else f"{words} [{unit}]")
             if name != "friction":
                 bottom.set_xscale("log")
-            bottom.set_xticks(values, [f"{value:g}" for value in values])
+            bottom.set_xticks(values, [f"{value:g}" for value in values], fontsize=7)
             bottom.minorticks_off()
         grid[1, 0].set_ylim(bottom=0)
         grid[0, 0].set_ylabel("final offset [mm]")

@@ -37,9 +37,8 @@ def test_study_writes_page_and_numbers(
     monkeypatch.chdir(tmp_path)
     whole = ground_capture.capture
     monkeypatch.setattr(ground_capture, "capture", lambda parameters, target: whole(parameters, target, SHORT))
-    monkeypatch.setattr(
-        ground_capture, "SWEEPS", {"friction": (0.1, 0.3), "bending_damping": (1e-3,), "mass": (25.0, 50.0)}
-    )
+    usual = {"bending_damping": (1e-3,), "end_friction": (2e-3,)}
+    monkeypatch.setattr(ground_capture, "SWEEPS", {"friction": (0.1, 0.3), **usual, "mass": (25.0, 50.0)})
     assert ground_capture.main() == 0
     said = capsys.readouterr().out
     assert "with friction 0.3 ..." in said
