@@ -52,16 +52,22 @@ def read_pin(coordinates, rates, n_pin, pin, euler):
 
 
 @compiled
+def read_state(q, rates, fixed, moving):
+    """The cables' nodes and their velocities, each (rows, 3), at displacements q and rates; the pin is read too."""
+    reference, n_pin = fixed[0], fixed[3]
+    coordinates = q + reference
+    read_pin(coordinates, rates, n_pin, moving[0], moving[1])
+    n_cables = q.size - n_pin
+    return coordinates[:n_cables].reshape(-1, 3), rates[:n_cables].reshape(-1, 3)
+
+
+@compiled
 def system_forces(q, rates, fixed, moving):
     """Generalised forces on all coordinates, shape (n_coordinates,), at displacements q and rates."""
-    reference, n_elements, size, n_pin, cylinders, law, radius, stiffness, friction = fixed
+    _, n_elements, size, n_pin, cylinders, law, radius, stiffness, friction = fixed
     pin, euler, contacts, crossings, fittings = moving
-    coordinates = q + reference
-    read_pin(coordinates, rates, n_pin, pin, euler)
-    n_cables = q.size - n_pin
-    positions = coordinates[:n_cables].reshape(-1, 3)
-    velocities = rates[:n_cables].reshape(-1, 3)
-    result = np.zeros(q.size)
+    positions, velocities = read_state(q, rates, fixed, moving)
+    result, n_cables = np.zeros(q.size), positions.size
     forces = result[:n_cables].reshape(-1, 3)
     push, moment = add_pin_contact(
         positions, velocities, n_elements, size, cylinders, pin, law, radius, contacts, forces
@@ -82,13 +88,9 @@ def system_forces(q, rates, fixed, moving):
 @compiled
 def system_jacobian(q, rates, fixed, moving, factor, rate_factor):
     """Triplets (row, column, value) of −(factor ∂f/∂q + rate_factor ∂f/∂q̇), shape (n_triplets, 3)."""
-    reference, n_elements, size, n_pin, cylinders, law, radius, stiffness, friction = fixed
+    _, n_elements, size, n_pin, cylinders, law, radius, stiffness, friction = fixed
     pin, euler, contacts, crossings, fittings = moving
-    coordinates = q + reference
-    read_pin(coordinates, rates, n_pin, pin, euler)
-    n_cables = q.size - n_pin
-    positions = coordinates[:n_cables].reshape(-1, 3)
-    velocities = rates[:n_cables].reshape(-1, 3)
+    positions, velocities = read_state(q, rates, fixed, moving)
     n_all = positions.shape[0] // 2 // (n_elements + 1) * n_elements
     triplets = np.empty((MOST_TRIPLETS + n_all * TRIPLETS_PER_ELEMENT, 3))
     factors = (factor, rate_factor)
@@ -124,13 +126,9 @@ def measure(q, rates, fixed, moving, section, pull, ends, end_speeds, effector, 
     float
         Power of the rings on the cables [W].
     """
-    reference, n_elements, size, n_pin, cylinders, law, radius, stiffness, friction = fixed
-    pin, euler, contacts, crossings, fittings = moving
-    coordinates = q + reference
-    read_pin(coordinates, rates, n_pin, pin, euler)
-    n_cables = q.size - n_pin
-    positions = coordinates[:n_cables].reshape(-1, 3)
-    velocities = rates[:n_cables].reshape(-1, 3)
+    _, n_elements, size, _, cylinders, law, radius, stiffness, friction = fixed
+    pin, _, contacts, crossings, fittings = moving
+    positions, velocities = read_state(q, rates, fixed, moving)
     count = find_contacts(positions, n_elements, size, cylinders, pin, radius, contacts)
     n_crossings = find_crossings(positions, n_elements, size, radius, crossings)
     touching = np.zeros((count, 6))
