@@ -11,7 +11,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from ..errors import InputError
-from ..models.c_library import _compiler
+from ..models.c_library import find_compiler
 from .c_files import source_files
 from .description import About, build_description, model_description
 from .equations import Equations, Variable
@@ -114,7 +114,7 @@ _TERMINALS = """<?xml version="1.0" encoding="UTF-8"?>
 def compile_library(source: Path, library: Path, libraries: tuple[str, ...]) -> None:
     """Build a shared library from one C file; InputError where there is no compiler or it fails."""
     try:
-        compiler, _ = _compiler(os.environ.get("SNARELAB_CC", ""), os.environ.get("PATH", ""))
+        compiler, _ = find_compiler(os.environ.get("SNARELAB_CC", ""), os.environ.get("PATH", ""))
     except OSError as problem:
         raise InputError(f"an FMU needs a C compiler: {problem}; install one, or name one in SNARELAB_CC") from None
     command = [*compiler, *FLAGS, str(source), "-o", str(library), *libraries]

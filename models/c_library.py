@@ -37,7 +37,7 @@ def load_library(source: str, optimisation: int = 1) -> ctypes.CDLL:
     OSError, subprocess.SubprocessError
         Where there is no compiler, it fails, or the cache cannot be written.
     """
-    compiler, version = _compiler(os.environ.get("SNARELAB_CC", ""), os.environ.get("PATH", ""))
+    compiler, version = find_compiler(os.environ.get("SNARELAB_CC", ""), os.environ.get("PATH", ""))
     flags = (f"-O{optimisation}", *_FLAGS)
     identity = "\0".join([source, *compiler, version, platform.machine(), *flags])
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "snarelab"
@@ -66,7 +66,7 @@ def _intact(path: Path) -> bool:
 
 
 @functools.cache
-def _compiler(named: str, search_path: str) -> tuple[tuple[str, ...], str]:
+def find_compiler(named: str, search_path: str) -> tuple[tuple[str, ...], str]:
     """Command and version of the C compiler; OSError where there is none."""
     if named == "none":
         raise OSError("SNARELAB_CC is 'none'")

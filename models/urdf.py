@@ -48,15 +48,15 @@ def load_urdf(path: str | Path, gravity: ArrayLike = (0.0, 0.0, -9.81)) -> Tree:
     down = np.asarray(gravity, float)
     if down.shape != (3,) or not np.isfinite(down).all():
         raise InputError(f"{path}: gravity is {gravity}; give three finite numbers [m/s²]")
-    robot = _robot(path)
-    root = _checked_topology(path, robot)
-    parameters = {link.get("name", ""): _parameters(path, link) for link in robot.findall("link")}
+    robot = read_robot(path)
+    root = checked_root(path, robot)
+    parameters = {link.get("name", ""): link_parameters(path, link) for link in robot.findall("link")}
     limits = {joint.get("name", ""): _limits(path, joint) for joint in robot.findall("joint")}
 
     joints: list[Joint] = []
     names: list[str] = []
     moved: list[Array] = []
-    for drake_joint, parent, rotation, translation in _walk(_parse(path, robot, root), root):
+    for drake_joint, parent, rotation, translation in walk(parse_plant(path, robot, root), root):
         child = drake_joint.child_body().name()
         if drake_joint.type_name() == "weld":
             if parent >= 0:
@@ -75,7 +75,7 @@ def load_urdf(path: str | Path, gravity: ArrayLike = (0.0, 0.0, -9.81)) -> Tree:
     return Tree(robot.get("name", path.stem), tuple(joints), tuple(links), down)
 
 
-def _robot(path: Path) -> ET.Element:
+def read_robot(path: Path) -> ET.Element:
     """The <robot> element; prefixes such as drake: stay as written, declared or not."""
     builder, parser = ET.TreeBuilder(), expat.ParserCreate()
     parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
@@ -95,7 +95,7 @@ def _robot(path: Path) -> ET.Element:
     return robot
 
 
-def _checked_topology(path: Path, robot: ET.Element) -> str:
+def checked_root(path: Path, robot: ET.Element) -> str:
     """Name of the one root link; refuses what is not a tree of one-axis joints."""
     for element in robot:
         if element.tag.startswith("drake:") and element.tag != "drake:collision_filter_group":
@@ -151,7 +151,7 @@ def _limits(path: Path, joint: ET.Element) -> tuple[float, float, float]:
     return lower, upper, speed
 
 
-def _parameters(path: Path, link: ET.Element) -> Array:
+def link_parameters(path: Path, link: ET.Element) -> Array:
     """Inertial parameters phi (10,) of one link as published, about its own frame."""
     inertial = link.find("inertial")
     if inertial is None:
@@ -190,7 +190,7 @@ def _refuse_inertia(path: Path, name: str, mass: float, matrix: Array) -> None:
     )
 
 
-def _parse(path: Path, robot: ET.Element, root: str) -> Any:
+def parse_plant(path: Path, robot: ET.Element, root: str) -> Any:
     """Drake's plant of the bare kinematics, its root welded to the world."""
     # imported here: Drake takes a second to load, and most commands refuse bad input before they need it
     from pydrake.multibody.parsing import Parser
@@ -213,7 +213,7 @@ def _parse(path: Path, robot: ET.Element, root: str) -> Any:
     return plant
 
 
-def _walk(plant: Any, root: str) -> Iterator[tuple[Any, int, Array, Array]]:
+def walk(plant: Any, root: str) -> Iterator[tuple[Any, int, Array, Array]]:
     """Drake's joints, parents first: (joint, index of the moving joint that carries it or -1, rotation, translation).
 
     The pose is the joint's frame in its carrier's link frame, at rest; for a weld that of the body welded on.

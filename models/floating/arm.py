@@ -131,12 +131,12 @@ def load_arm(path: str | Path, tip: str, floating: bool = True, gravity: ArrayLi
     """
     path = Path(path)
     tree = urdf.load_urdf(path, gravity)
-    robot = urdf._robot(path)
-    root = urdf._checked_topology(path, robot)
-    parameters = {link.get("name", ""): urdf._parameters(path, link) for link in robot.findall("link")}
+    robot = urdf.read_robot(path)
+    root = urdf.checked_root(path, robot)
+    parameters = {link.get("name", ""): urdf.link_parameters(path, link) for link in robot.findall("link")}
     base, places = parameters[root], {}
     moving = 0
-    for joint, carrier, rotation, translation in urdf._walk(urdf._parse(path, robot, root), root):
+    for joint, carrier, rotation, translation in urdf.walk(urdf.parse_plant(path, robot, root), root):
         child = joint.child_body().name()
         if joint.type_name() == "weld":
             places[child] = (carrier, rotation, translation)
