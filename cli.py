@@ -67,6 +67,9 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("--json", metavar="OUT.json", help="where to write the result; - for standard output")
     p.add_argument("--report", metavar="OUT.html", help="where to write the report, one self-contained page")
     p.add_argument("--save-model", metavar="NEW.toml", help="where to write the model with what was found")
+    p.add_argument(
+        "--next-experiment", metavar="MOTION", help="where to write the motion that best parts the rivals left"
+    )
     p.set_defaults(run=_diagnose)
 
     p = commands.add_parser("simulate", help="torque of a model along a recorded motion")
@@ -101,15 +104,22 @@ def _identify(given: argparse.Namespace) -> None:
 
 def _diagnose(given: argparse.Namespace) -> None:
     from .identification.diagnose import diagnose
+    from .identification.next_experiment import next_experiment
     from .identification.report import write_report
     from .models.model_file import load_model
     from .models.model_write import save_model
+    from .recordings import write_recording
 
-    _writable([given.json, given.report, given.save_model], [*given.recordings, given.holdout])
-    model = load_model(given.model)
+    outputs = [given.json, given.report, given.save_model, given.next_experiment]
+    _writable(outputs, [*given.recordings, given.holdout])
+    model, planned = load_model(given.model), None
     with _Progress() as progress:
         answer = diagnose(model, given.recordings, given.holdout, progress=progress)
+        if given.next_experiment:
+            planned = next_experiment(answer.model, answer.diagnosis, given.recordings, progress=progress)
     found = answer.diagnosis
+    if planned:
+        write_recording(planned.motion, given.next_experiment)
     if given.report:
         write_report(found, given.report)
     if given.save_model:
@@ -120,6 +130,8 @@ def _diagnose(given: argparse.Namespace) -> None:
         print(found.sentence)
         for step in found.steps:
             print(f"  {step.label:<60} fitted {100 * step.train:6.2f} %   held out {100 * step.holdout:6.2f} %")
+        if given.next_experiment:
+            print(planned.sentence if planned else "Next experiment: no rival is left to part; none was written.")
         if given.report:
             print(f"Report: {given.report}")
 
