@@ -1,12 +1,12 @@
 # Each target sets up .venv by itself and does nothing where nothing changed. PYTHON picks the interpreter (3.11 or newer).
 PYTHON ?= python3
 BIN := .venv/bin
-SOURCES := $(shell git ls-files '*.py' '*.toml' '*.urdf' '*.csv' '*.json' 2>/dev/null | grep -v -e '^tests/' -e '^bench/')
+SOURCES := $(shell git ls-files '*.py' '*.toml' '*.urdf' '*.csv' '*.json' 2>/dev/null | grep -v -e '^tests/' -e '^bench/' -e '^proof/')
 STUDIES := emps free-floating ground-capture zero-g-rig orbit-inspection orbit-hover tolerance
 
 BENCHES := torque friction_fit diagnosis floating cosim fmu snare
 
-.PHONY: help demo test check bench accuracy fmus clean $(STUDIES:%=study-%)
+.PHONY: help demo test check bench accuracy proof fmus clean $(STUDIES:%=study-%)
 
 help:            ## what can be made
 	@sed -n -e 's/^\$$(STUDIES.*## /  make study-NAME\t/p' -e 's/^\([a-z]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
@@ -29,6 +29,9 @@ bench: .venv/installed ## ratios against named rivals, measured in one run
 accuracy: .venv/installed ## the snare on 30 random captures, and against rods in another engine on 10: half an hour
 	$(BIN)/python bench/snare_accuracy.py --result build/bench/snare_accuracy.json
 	OMP_NUM_THREADS=1 $(BIN)/python bench/snare.py --cases 10
+
+proof: .venv/installed ## conceal effects in another engine's recordings, let the tool name them, and score it: half an hour
+	$(BIN)/python -m proof
 
 fmus: .venv/installed ## the shipped FMUs and a page on each, into build/fmus
 	$(BIN)/python -m snarelab.fmu.shipped

@@ -1,0 +1,116 @@
+"""Judge one case: what a method said of it against its answer.
+
+A name is right if the effect is named, or is among those that the method says the recordings cannot tell from the one
+it names (one class). A case is right if every effect concealed in it is named and no other. Its place is right if the
+joint is (joint2, link2 and tau.joint2 are one), for every effect named.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from snarelab.models.effects import effects
+
+from .cases import BANDS, Answer, Truth
+from .concealed import STRUCTURE
+
+Diagnosed = Mapping[str, Any]
+AUDIBLE = 1.02
+"""A holdout error below this multiple of its floor leaves nothing to close."""
+
+SILENT = "none"
+"""Verdict of a method that names nothing, by what it is: it has no false alarms, and no right names."""
+
+
+@dataclass(frozen=True)
+class Scored:
+    """One case. ``claims``: (probability, right) of each class named; ``error``: holdout error over its floor where the
+    concealed effects show, (before, after).
+    """
+
+    answer: Answer
+    verdict: str
+    named: tuple[tuple[str, str], ...]
+    first: bool
+    name: bool
+    place: bool
+    blamed: bool
+    claims: tuple[tuple[float, bool], ...]
+    sizes: tuple[int, ...]
+    error: tuple[float, float] | None
+
+    @property
+    def closure(self) -> float | None:
+        """(before − after) / (before − floor) of the holdout; where there was nothing to close, 1 if it stayed so."""
+        if self.error is None:
+            return None
+        before, after = self.error
+        if before < AUDIBLE:
+            return float(after < AUDIBLE)
+        return (before - after) / (before - 1.0)
+
+
+def judge(answer: Answer, found: Diagnosed) -> Scored:
+    """Score one case."""
+    classes = [_class(e) for e in found["effects"]]
+    right = [_fits(c, answer.truths) for c in classes]
+    placed = [_fits(c, answer.truths, at=True) for c in classes]
+    probability = [
+        min(e["probability"] + sum(r["probability"] for r in e["rivals"] if not r["separable"]), 1.0)
+        for e in found["effects"]
+    ]
+    whole = bool(answer.truths) and all(_found(t, classes) for t in answer.truths)
+    return Scored(
+        answer,
+        found["verdict"],
+        tuple((e["name"], e["at"]) for e in found["effects"]),
+        first=bool(right) and right[0],
+        name=whole and all(right),
+        place=bool(answer.truths) and all(_found(t, classes, at=True) for t in answer.truths) and all(placed),
+        blamed=any(all(is_physics(name) for name, _ in c) for c in classes),
+        claims=tuple(zip(probability, placed, strict=True)),
+        sizes=tuple(len(c) for c in classes),
+        error=_error(answer, found),
+    )
+
+
+def _class(effect: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """The name given, and those that the method cannot tell from it."""
+    return [(effect["name"], effect["at"]), *((r["name"], r["at"]) for r in effect["rivals"] if not r["separable"])]
+
+
+def _fits(some: Sequence[tuple[str, str]], truths: Sequence[Truth], at: bool = False) -> bool:
+    return any(n in (t.name, *t.also) and (not at or joint(place) == joint(t.at)) for n, place in some for t in truths)
+
+
+def _found(truth: Truth, classes: Sequence[Sequence[tuple[str, str]]], at: bool = False) -> bool:
+    """Whether a truth is named, or two of the effects that hide with it are."""
+    named = [{n for n, place in c if not at or joint(place) == joint(truth.at)} for c in classes]
+    parts = [n for n in truth.also if any(n in c for c in named)]
+    return any(truth.name in c for c in named) or (len(parts) > 1 and sum(bool(c & set(parts)) for c in named) > 1)
+
+
+def is_physics(name: str) -> bool:
+    """Whether a name is more than a wrong parameter or a faulty sensor."""
+    return effects()[name].family != "measurement" and name not in STRUCTURE
+
+
+def joint(place: str) -> int:
+    """Number of the joint that a place belongs to."""
+    return int(re.findall(r"\d+", place)[-1])
+
+
+def _error(answer: Answer, found: Diagnosed) -> tuple[float, float] | None:
+    """Holdout RMS before and after over its floor, in the channels where what is concealed shows most."""
+    if not found["fit"] or not answer.channels:
+        return None
+    pairs = []
+    for channel in answer.channels:
+        lowest = float(np.interp(found["band"]["value"], BANDS, answer.floor[channel]))
+        fit = found["fit"][channel]["holdout"]
+        pairs.append((fit["rms_before"] / lowest, fit["rms_after"] / lowest))
+    before, after = np.sqrt(np.mean(np.square(pairs), axis=0))
+    return float(before), float(after)

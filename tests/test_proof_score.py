@@ -1,0 +1,139 @@
+"""The proof's score, met by hand-made answers."""
+
+from dataclasses import replace
+
+import pytest
+
+from proof.cases import BANDS, Answer, Truth
+from proof.judge import judge
+from proof.misses import explained
+from proof.score import score
+from proof.statistics import calibration_error, clopper_pearson
+
+
+def answer(group="single", name="harness_stiffness", at="joint2", size=2.0, also=()) -> Answer:
+    truths = () if group in ("clean", "outside", "wrong") else (Truth(name, at, also),)
+    kinds = () if group == "clean" else (name,)
+    lowest = {f"tau.joint{k}": (0.5,) * len(BANDS) for k in (1, 2)}
+    return Answer(0, group, kinds, size, truths, (1.0,), 0.3, 0.1, 2, ("tau.joint2",) if kinds else (), lowest)
+
+
+def finding(name, at, probability=0.9, rivals=()):
+    listed = [{"name": n, "at": a, "probability": p, "separable": s} for n, a, p, s in rivals]
+    return {"name": name, "at": at, "probability": probability, "rivals": listed}
+
+
+def diagnosis(*effects, verdict="", before=1.0, after=0.55):
+    fit = {"tau.joint1": {"holdout": {"rms_before": 0.6, "rms_after": 0.6}}}
+    fit["tau.joint2"] = {"holdout": {"rms_before": before, "rms_after": after}}
+    verdict = verdict or ("missing_physics" if effects else "adequate")
+    return {"verdict": verdict, "effects": list(effects), "fit": fit, "band": {"value": 30.0}, "candidates": []}
+
+
+RIGHT = finding("harness_stiffness", "joint2")
+
+
+@pytest.mark.parametrize(
+    ("given", "found", "name", "place"),
+    [
+        (answer(), diagnosis(RIGHT), True, True),
+        (answer(), diagnosis(finding("harness_stiffness", "joint1")), True, False),
+        (answer(), diagnosis(finding("sensor_bias", "tau.joint2")), False, False),
+        (answer(), diagnosis(RIGHT, finding("torque_ripple", "joint1")), False, False),
+        (answer(), diagnosis(), False, False),
+        # One class with the truth, and not.
+        (
+            answer(),
+            diagnosis(finding("com_offset", "link2", 0.6, [("harness_stiffness", "joint2", 0.3, False)])),
+            True,
+            True,
+        ),
+        (
+            answer(),
+            diagnosis(finding("com_offset", "link2", 0.6, [("harness_stiffness", "joint2", 0.3, True)])),
+            False,
+            False,
+        ),
+        (answer(name="sensor_gain", at="tau.joint2"), diagnosis(finding("sensor_gain", "tau.joint2")), True, True),
+    ],
+)
+def test_name_and_place(given, found, name, place):
+    case = judge(given, found)
+    assert (case.name, case.place) == (name, place)
+    assert bool(explained(case, found)) == (not (name and place))
+
+
+def test_two_parts_stand_for_the_whole_and_one_does_not():
+    whole = answer(name="makkar_friction", also=("viscous_friction", "coulomb_friction", "stribeck_friction"))
+    parts = [finding(n, "joint2") for n in ("viscous_friction", "coulomb_friction")]
+    assert judge(whole, diagnosis(*parts)).name
+    assert not judge(whole, diagnosis(parts[0])).name
+    assert not judge(whole, diagnosis(parts[0], finding("viscous_friction", "joint1"))).name
+
+
+def test_pair_wants_both():
+    pair = replace(answer("pair"), truths=(Truth("harness_stiffness", "joint2"), Truth("sensor_bias", "tau.joint1")))
+    assert not judge(pair, diagnosis(RIGHT)).name
+    assert judge(pair, diagnosis(RIGHT, finding("sensor_bias", "tau.joint1"))).name
+
+
+def test_closure_is_over_the_floor_where_the_effect_shows():
+    assert judge(answer(), diagnosis(RIGHT)).closure == pytest.approx((1.0 - 0.55) / (1.0 - 0.5))
+    assert judge(answer(), diagnosis(RIGHT, before=2.0, after=2.5)).closure == pytest.approx(-0.5 / 1.5)
+
+
+def test_figures_by_hand():
+    given = [
+        *[answer("clean", size=0.0)] * 4,
+        *[answer("outside", "damaged tooth")] * 2,
+        *[answer("wrong", "link too light")] * 2,
+        *[answer(size=s) for s in (0.5, 1.0, 2.0, 4.0)],
+    ]
+    found = [
+        *[diagnosis()] * 3,
+        diagnosis(finding("torque_ripple", "joint1", 0.25)),
+        diagnosis(verdict="unknown_effect"),
+        diagnosis(RIGHT),
+        diagnosis(finding("inertia_error", "link1", 0.9)),
+        diagnosis(finding("viscous_friction", "joint1", 0.9)),
+        diagnosis(),
+        *[diagnosis(RIGHT)] * 3,
+    ]
+    figures = score(given, found).figures
+    expected = {
+        "false_alarms": 0.25,
+        "unknown_recall": 0.5,
+        "not_blamed": 0.5,
+        "name_at_0.5x": 0.0,
+        "name_at_1x": 1.0,
+        "name_at_2x": 1.0,
+        "place": 1.0,
+        "first_name": 0.75,
+        "closure_median": 0.9,
+        "error_returns": 1.0,
+        # Five claims of 0.9 or so, of which three are right and three are not; one of 0.25, wrong.
+        "calibration_error": (6 * abs(3 / 6 - 0.9) + 1 * 0.25) / 7,
+    }
+    assert {name: figures[name].value for name in expected} == pytest.approx(expected)
+    assert figures["false_alarms"].count == 4
+    assert figures["pairs"].value is None
+    assert figures["false_alarms"].met is False
+    assert figures["name_at_2x"].met is True
+
+
+def test_method_that_names_nothing_has_no_false_alarms_to_count():
+    figures = score([answer("clean", size=0.0), answer()], [diagnosis(verdict="none")] * 2).figures
+    assert figures["false_alarms"].value is None
+    assert figures["name_at_2x"].value == 0.0
+
+
+def test_exact_interval_of_none_in_twenty():
+    low, high = clopper_pearson(0, 20)
+    assert low == 0.0
+    assert high == pytest.approx(1.0 - 0.025 ** (1 / 20))
+    assert clopper_pearson(20, 20) == pytest.approx((0.025 ** (1 / 20), 1.0))
+
+
+def test_calibration_error_is_nothing_where_frequencies_are_the_probabilities():
+    assert calibration_error([0.75] * 4, [1, 1, 1, 0]) == pytest.approx(0.0)
+    assert calibration_error([1.0, 1.0], [1, 0]) == pytest.approx(0.5)
