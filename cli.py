@@ -72,7 +72,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     p.set_defaults(run=_diagnose)
 
-    p = commands.add_parser("simulate", help="torque of a model along a recorded motion")
+    p = commands.add_parser("simulate", help="what a model would read along a recorded motion")
     p.add_argument("model", metavar="MODEL.toml")
     p.add_argument("--motion", required=True, metavar="RECORDING", help="recording whose motion is followed")
     p.add_argument("--out", required=True, metavar="RECORDING", help="where to write it (.csv or .parquet)")

@@ -80,7 +80,7 @@ def arm_equations(
     for p in model.effects:
         if p.effect.at not in ("joint", "link", "sensor"):
             raise InputError(
-                f"{model.path}: {p.key} is of a suspension rig, which an FMU of an arm does not have; drop it"
+                f"{model.path}: {p.key} is of a suspension rig or a base, and an FMU of an arm has none; drop it"
             )
     return _Writer(model, arm).written(stiff, servo, [0.0] * len(model.joints) if start is None else start)
 
@@ -123,11 +123,13 @@ class _Writer:
         weight = self._rigid(start_q, ca.SX(n, 1), ca.SX(6, 1), ca.SX.eye(3), ca.SX(6, 1), ca.SX(6, 1))
         resting = weight.terms[weight.n_base :]
         q_link, qd_link, springs = ca.SX(q), ca.SX(qd), ca.SX(n, 1)
+        start_link = ca.SX(start_q)
         twists: dict[int, tuple[ca.SX, ca.SX]] = {}
         for j, p in springy.items():
             stretch = ca.SX.sym("stretch")
             at_rest = root(self._spring(p, j, stretch, ca.SX(0)) - resting[j], stretch)
             twists[j] = ledger.state(at_rest), ledger.state(0.0)
+            start_link[j] = start_q[j] - at_rest
             q_link[j], qd_link[j] = q[j] - twists[j][0], qd[j] - twists[j][1]
             springs[j] = self._spring(p, j, *twists[j])
 
@@ -157,8 +159,9 @@ class _Writer:
             if k in springy:
                 ledger.output(f"q_link.{joint}", unit, q_link[k], f"position of the link behind {joint}")
         self._bodies(rigid.tip, pose, twist, qd_link)
-        signals = [{"q": q[j], "qd": qd[j], "qdd": qdd[j], "load": load[j], "tau": self.tau[j]} for j in range(n)]
-        rates += read_sensors(laws, ledger, signals, start_q)
+        columns = {"q": q, "qd": qd, "qdd": qdd, "load": load, "tau": self.tau, "q_link": q_link}
+        signals = [{name: x[j] for name, x in columns.items()} for j in range(n)]
+        rates += read_sensors(laws, ledger, signals, {"q": start_q, "q_link": start_link})
         kind = "floating" if arm.floating else "fixed"
         words = ", ".join(dict.fromkeys(p.effect.name for p in self.model.effects)) or "no effects"
         description = f"Arm of {n} joints on a {kind} base: drive torques in, motion out; with {words}."

@@ -38,7 +38,7 @@ def inverse_equations(model: Model) -> Equations:
     for p in model.effects:
         if p.effect.at not in ("joint", "link", "sensor"):
             raise InputError(
-                f"{model.path}: {p.key} is of a suspension rig, which an FMU of an arm does not have; drop it"
+                f"{model.path}: {p.key} is of a suspension rig or a base, and an FMU of an arm has none; drop it"
             )
         if p.at.startswith("q."):
             raise InputError(
@@ -118,6 +118,8 @@ class _Follower:
         readings = list(loads)
         # Sensors read what all the others add up to, so they come last.
         for p in laws.at("joint") + laws.at("sensor"):
+            if p.at.startswith("q_link."):
+                continue  # no torque's business
             j = laws.joint_of(p)
             signals = [
                 self._signals(j, *end) | {"load": load[j], "value": reading[j], "inertia": by_qdd[j, j]}

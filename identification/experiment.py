@@ -17,7 +17,7 @@ from ..models.rig.rig import Rig
 from ..models.rigid_body import RigidBody
 from ..recordings import JointKind, read_recording
 from ..recordings.condition import Motion, condition
-from .floating_terms import as_carriers, twist_noise, with_twist
+from .floating_terms import as_carriers, twist_noise, wheel_impulse, with_twist
 
 Array = NDArray[np.float64]
 
@@ -27,12 +27,14 @@ class Experiment:
     """Motion of one recording and the rigid body's share of its torque.
 
     ``n`` samples, ``J`` joints, ``L`` links; ``tension`` holds what slings of a rig were measured to pull, each (n,)
-    [N]; ``store`` keeps columns that do not change while a model is fitted.
+    [N]; ``impulse`` (n, 3) is the angular impulse that reaction wheels were told to give a floating base by then, in
+    its axes [N·m·s]; ``store`` keeps columns that do not change while a model is fitted.
     """
 
     motion: Motion
     body: RigidBody
     tension: Mapping[str, Array] = field(default_factory=dict)
+    impulse: Array | None = None
     store: dict[object, Array] = field(default_factory=dict, repr=False)
 
     @cached_property
@@ -129,7 +131,11 @@ def load_experiments(
         motions = [condition(d, model.joints, narrowest) for d in datasets]
     if isinstance(tree, FloatingTree):
         return [
-            _balanced(Experiment(as_carriers(m, tree), body, store={"twist_noise": twist_noise(d, tree)}))
+            _balanced(
+                Experiment(
+                    as_carriers(m, tree), body, impulse=wheel_impulse(d, m), store={"twist_noise": twist_noise(d, tree)}
+                )
+            )
             for m, d in zip(motions, datasets, strict=True)
         ]
     return [

@@ -12,6 +12,7 @@ from ..models.rigid_body import RigidBody
 from .assembly import Assembly
 from .base_parameters import INERTIAL
 from .experiment import load_experiments, scales
+from .simulate_floating import simulate_floating
 
 
 def simulate(model: Model, motion: str | Path) -> xr.Dataset:
@@ -27,20 +28,16 @@ def simulate(model: Model, motion: str | Path) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        ``q qd qdd tau`` of every joint, over the samples whose derivatives are known.
+        ``q qd qdd tau`` of every joint, over the samples whose derivatives are known; on a floating base that and the
+        base's motion (`simulate_floating`).
 
     Raises
     ------
     InputError
         A parameter without a value, or whatever is wrong with the recording.
     """
-    if isinstance(model.tree, FloatingTree):
-        raise InputError(
-            f"{model.path}: system = 'free_floating_arm' cannot be simulated along a recorded motion; "
-            f"'snarelab identify' and 'diagnose' read such recordings"
-        )
-    experiment = load_experiments(model, [motion], RigidBody(model.tree))[0]
-    assembly = Assembly(model.tree, model.effects, None, scales([experiment]), model.values)
+    tree = model.tree
+    read = [] if isinstance(tree, FloatingTree) else load_experiments(model, [motion], RigidBody(tree))
     needed = [f"{p.key}.{x.name}" for p in model.effects for x in p.effect.parameters]
     if model.inertia == "free":
         needed = [f"inertia.{link.name}.{name}" for link in model.tree.links for name in INERTIAL] + needed
@@ -50,6 +47,10 @@ def simulate(model: Model, motion: str | Path) -> xr.Dataset:
             f"{model.path}: no value for {missing[0]!r} ({len(missing)} missing); "
             f"write it under [parameters], or let 'snarelab identify --save-model' do it"
         )
+    if isinstance(tree, FloatingTree):
+        return simulate_floating(model, tree, motion)
+    (experiment,) = read
+    assembly = Assembly(model.tree, model.effects, None, scales([experiment]), model.values)
     recorded = experiment.motion
     # As they are: bounds refer to the recordings that the values came from, not to this motion.
     tau = assembly.torque(experiment, np.array([model.values[s.key] for s in assembly.slots]))

@@ -92,13 +92,16 @@ class Effect:
         returns 10. Sensor: ``value`` (true value), ``time``, and the joint signals of its joint. Sling: ``velocity``
         (3 numbers [m/s], of the hang point), ``weight`` and ``tension`` [N] in balance, ``time``. Slide: the signals of
         its joint. Boom: ``spread``, the sum of squared levers of the slings beyond it [m²], in torsion and in bending.
-        Base: ``spin`` [rad/s], ``spin_rate`` [rad/s²] and ``acceleration`` [m/s²] (of the frame's origin), 3 numbers
-        each in the base's axes, and ``time``.
+        Base: ``spin`` [rad/s], ``spin_rate`` [rad/s²], ``acceleration`` [m/s²] (of the frame's origin), the spin gained
+        since the start ``spin_gained`` and the angular ``impulse`` that wheels were told to give by now [N·m·s], 3
+        numbers each in the base's axes, and ``time``.
         A state is read as ``s[state_name]``.
     states : tuple of str
-        Names of hidden states, all starting at rest (zero rate).
+        Names of hidden states, all starting at rest (zero rate), or from zero.
     rate : callable or None
         ``rate(s, p) -> list of ca.SX``, the states' time derivatives.
+    from_zero : bool
+        True where the states accumulate, and so start from zero.
     acts_on : "torque" or "position"
         Joint effects only: the law gives a torque at the joint, or a displacement of the link behind the joint
         (a vector: displacement, its rate, its second rate), which changes the torque of every joint.
@@ -124,6 +127,7 @@ class Effect:
     law: Callable[[Symbols, Symbols], ca.SX]
     states: tuple[str, ...] = ()
     rate: Callable[[Symbols, Symbols], list[ca.SX]] | None = None
+    from_zero: bool = False
     acts_on: Literal["torque", "position"] = "torque"
     dissipates: bool = False
     contains: tuple[str, ...] = ()

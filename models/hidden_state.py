@@ -41,7 +41,7 @@ SIGNALS = {
     "sling": {"velocity": 3, "weight": 1, "tension": 1, "time": 1},
     "slide": _JOINT,
     "boom": {"spread": 2, "time": 1},
-    "base": {"spin": 3, "spin_rate": 3, "acceleration": 3, "time": 1},
+    "base": {"spin": 3, "spin_rate": 3, "acceleration": 3, "spin_gained": 3, "impulse": 3, "time": 1},
 }
 
 #: The signal, by place, that itself depends on the model's parameters; none on a rig's slings, slides and booms.
@@ -179,7 +179,10 @@ def _carried(effect: Effect, built: _Built, signals: list[np.ndarray], p: np.nda
     """States and sensitivities, stacked as the step hands them on (n_samples, n_x + n_x * n_p)."""
     if built.step is None:
         raise ValueError(f"{effect.name} has no states")
-    start = _steady_state(effect, built, [signal[:1] for signal in signals], p)
+    if effect.from_zero:
+        start = np.zeros(len(effect.states) * (1 + len(p)))
+    else:
+        start = _steady_state(effect, built, [signal[:1] for signal in signals], p)
     here, later = [signal[:-1] for signal in signals], [signal[1:] for signal in signals]
     return built.step.scan(start, *here, *later, np.append(p, dt))
 

@@ -13,6 +13,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 from scipy.signal import lsim
+from scipy.spatial.transform import Rotation
 
 import snarelab.models.effects
 from snarelab.errors import InputError
@@ -73,6 +74,7 @@ def signals():
     }
     links |= slings | {"spread": np.stack([4 + 3 * q**2, 20 + qd**2], axis=1)}
     links |= {"spin_rate": shaken(TIME)[0], "acceleration": shaken(TIME)[1]}
+    links |= {"spin": spin(TIME), "spin_gained": spin(TIME), "impulse": told(TIME)[0]}
     return scalars | links | {"points": points, "masses": masses}
 
 
@@ -80,6 +82,19 @@ def shaken(time):
     """A base's angular and linear acceleration (2, n, 3) [rad/s², m/s²] that start from rest."""
     x, y, z = wave(time, (0.2, 0.31, 0.0), (0.1, 1.1, 0.0)), wave(time, (0.3, 0.23, 0.0)), wave(time, (0.1, 0.7, 0.0))
     return np.stack([[x[0], y[0], z[0]], [y[0], z[0], -x[0]]]).transpose(0, 2, 1)
+
+
+def spin(time):
+    """The base's angular velocity (n, 3) [rad/s], none at the start: the integral of `shaken`'s first."""
+    x = 0.2 / 0.31 * np.sin(np.pi * 0.31 * time) ** 2 + 0.1 / 1.1 * np.sin(np.pi * 1.1 * time) ** 2
+    y, z = 0.3 / 0.23 * np.sin(np.pi * 0.23 * time) ** 2, 0.1 / 0.7 * np.sin(np.pi * 0.7 * time) ** 2
+    return np.stack([x, y, z], axis=-1) / np.pi
+
+
+def told(time):
+    """Impulse that wheels were told to give a base, and the torque (2, n, 3) [N·m·s, N·m]."""
+    waves = [wave(time, (2.0, 0.31, 0.0)), wave(time, (1.5, 0.4, 0.0)), wave(time, (0.7, 0.9, 0.0))]
+    return np.stack(waves, axis=-1)[:2]
 
 
 def inertial_parameters(masses, points):
@@ -134,6 +149,47 @@ def rung(driven, frequency, damping):
 def bending_panels(s, inertia_x, inertia_y, inertia_z, frequency, damping):
     """Moment of three rotors on springs, about one axis each."""
     moment = -rung(s["spin_rate"], frequency, damping) * [inertia_x, inertia_y, inertia_z]
+    return np.hstack([np.zeros_like(moment), moment])
+
+
+def mass_in_a_tank(s, mass, _y, _z, *rest):
+    """A ball on a spring, followed in the world frame: what it does to the base beyond a ball that is fixed there."""
+    tank, frequency, damping = np.array(rest[:3]), *rest[3:]
+    w = 2 * np.pi * frequency
+
+    def pulled(time, state):
+        """Place and acceleration of the ball along the base's axes."""
+        back = Rotation.from_quat(state[:4]).inv()
+        away, fast = back.apply(state[10:13] - state[4:7]), back.apply(state[13:] - state[7:10])
+        return away, -(w**2) * (away - tank) - 2 * damping * w * (fast - np.cross(spin(time), away))
+
+    def rate(time, state):
+        turned, turning = Rotation.from_quat(state[:4]), np.array([*spin(time), 0.0])
+        x, y, z, u = state[:4]
+        product = np.array([[u, -z, y, x], [z, u, -x, y], [-y, x, u, z], [-x, -y, -z, u]]) @ turning
+        pushed, ball = turned.apply(shaken(np.array([time]))[1, 0]), turned.apply(pulled(time, state)[1])
+        return np.concatenate([product / 2, state[7:10], pushed, state[13:], ball])
+
+    start = np.concatenate([[0, 0, 0, 1], np.zeros(6), tank, np.zeros(3)])
+    run = solve_ivp(rate, TIME[[0, -1]], start, t_eval=TIME, rtol=1e-8, atol=1e-10).y.T
+    away, ball = (np.array(x) for x in zip(*map(pulled, TIME, run), strict=True))
+    fixed = s["acceleration"] + np.cross(s["spin_rate"], tank) + np.cross(s["spin"], np.cross(s["spin"], tank))
+    return mass * np.hstack([fixed - ball, np.cross(tank, fixed) - np.cross(away, ball)])
+
+
+def turning_wheels(s, loss_x, loss_y, loss_z, coulomb_x, coulomb_y, coulomb_z, inertia):
+    """Three wheels by their speeds in the base; what they keep from their motors' impulse turns with it."""
+    viscous, coulomb = inertia * np.array([loss_x, loss_y, loss_z]), np.array([coulomb_x, coulomb_y, coulomb_z])
+
+    def drag(speed):
+        return viscous * speed + coulomb * np.clip(speed / 1e-3, -1, 1)
+
+    def rate(time, speed):
+        return -shaken(np.array([time]))[0, 0] - (told(time)[1] + drag(speed)) / inertia
+
+    speed = solve_ivp(rate, TIME[[0, -1]], np.zeros(3), "Radau", TIME, rtol=1e-8, atol=1e-9).y.T
+    kept = inertia * (speed + spin(TIME)) + told(TIME)[0]
+    moment = drag(speed) - np.cross(spin(TIME), kept)
     return np.hstack([np.zeros_like(moment), moment])
 
 
@@ -285,6 +341,18 @@ REFERENCES = {
     "external_torque": Reference({"x": 0.4, "y": -0.2, "z": 0.7}, steady_moment),
     "flexible_appendage": Reference(
         {"inertia_x": 4.0, "inertia_y": 9.0, "inertia_z": 2.0, "frequency": 0.6, "damping": 0.03}, bending_panels
+    ),
+    "propellant_slosh": Reference(
+        dict.fromkeys(("mass_x", "mass_y", "mass_z"), 40.0)
+        | {"x": 0.3, "y": -0.4, "z": 0.5, "frequency": 0.4, "damping": 0.05},
+        mass_in_a_tank,
+    ),
+    "wheel_friction": Reference(
+        {"loss_x": 0.3, "loss_y": 0.1, "loss_z": 0.2, "coulomb_x": 0.1, "coulomb_y": 0.05, "coulomb_z": 0.05}
+        | {"inertia": 4.0},
+        turning_wheels,
+        tolerance=0.05,
+        likeness=2e-2,  # the law brings a wheel to rest over 0.1 s
     ),
     "sensor_bias": Reference({"offset": 0.3}, lambda s, offset: np.polyval([1.0, offset], s["value"])),
     "sensor_drift": Reference({"rate": 0.05}, lambda s, rate: np.interp(TIME, [0, 9], [0, 9 * rate]) + s["value"]),

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from bench.drake_servicer import model
 from snarelab.errors import InputError
 from snarelab.identification.diagnose import diagnose
 from snarelab.identification.identify import identify
@@ -14,17 +15,6 @@ from snarelab.models.model_write import save_model
 from snarelab.recordings import write_recording
 
 PERIOD, STEP, DURATION = 0.02, 0.002, 60.0
-URDF = """<robot name="servicer">
-<link name="hub"><inertial><origin xyz="0.1 0 0.05"/><mass value="400"/>
-<inertia ixx="90" iyy="120" izz="100" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<joint name="shoulder" type="revolute"><parent link="hub"/><child link="upper"/><origin xyz="0.6 0.2 0.1"/>
-<axis xyz="0 0 1"/><limit lower="-3" upper="3" effort="100" velocity="2"/></joint>
-<link name="upper"><inertial><origin xyz="0.6 0 0"/><mass value="20"/>
-<inertia ixx="0.3" iyy="2.5" izz="2.5" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<joint name="elbow" type="revolute"><parent link="upper"/><child link="fore"/><origin xyz="1.2 0 0"/>
-<axis xyz="0 1 0"/><limit lower="-3" upper="3" effort="100" velocity="2"/></joint>
-<link name="fore"><inertial><origin xyz="0.5 0 0"/><mass value="15"/>
-<inertia ixx="0.2" iyy="1.4" izz="1.4" ixy="0" ixz="0" iyz="0"/></inertial></link></robot>"""
 MJCF = """<mujoco><option timestep="{step}" gravity="0 0 0" integrator="RK4"/><worldbody>
 <body name="hub"><freejoint/>{hub}
 <body pos="0.6 0.2 0.1"><joint name="shoulder" axis="0 0 1"/><inertial pos="0.6 0 0" mass="20"
@@ -74,13 +64,6 @@ def recorded(path, seed, torque=(0.0, 0.0, 0.0), friction=0.0, hub=RIGID):
         columns[name] = ("time", x + NOISE.get(name.split(".")[0], 0.0) * rng.normal(size=len(x)))
     write_recording(xr.Dataset(columns, coords={"time": table[:, 0]}), path)
     return path
-
-
-def model(folder, text="", base="hub"):
-    (folder / "servicer.urdf").write_text(URDF, encoding="utf-8")
-    path = folder / "servicer.toml"
-    path.write_text(f'system = "free_floating_arm"\nurdf = "servicer.urdf"\nbase = "{base}"\n{text}', encoding="utf-8")
-    return load_model(path)
 
 
 def test_external_torque_is_named(tmp_path):

@@ -8,6 +8,7 @@ import pytest
 import xarray as xr
 
 from snarelab.identification.assembly import Assembly
+from snarelab.identification.diagnosis import Candidate
 from snarelab.identification.experiment import load_experiments, scales
 from snarelab.models.effects import get_effect
 from snarelab.models.model import Placed
@@ -26,10 +27,12 @@ from snarelab.studies.zero_g_rig.explain import (
     alike_in_words,
     explanations,
     remedy,
+    suspected_boom,
     tell_apart,
 )
 from snarelab.studies.zero_g_rig.friction import Curve
 from snarelab.studies.zero_g_rig.motion import Joints, Move
+from snarelab.studies.zero_g_rig.scene import rig_scene
 from snarelab.studies.zero_g_rig.score import coverage, score
 from snarelab.studies.zero_g_rig.study import MODEL, Friction, friction_study
 
@@ -101,18 +104,19 @@ def test_an_explanation_is_like_itself_and_like_what_contains_it(study: Friction
 
 
 def test_what_is_told_apart_is_said_with_its_share(study: Friction):
-    pairs = tell_apart(built_in_rig(), study)
+    pairs = tell_apart(built_in_rig(), study, "link3")
     by = {(p.name, p.other): p.mimicked for p in pairs}
     for alone in (TENSION, PAYLOAD, DRIFT):
         assert by[TWIST, alone] <= by[TWIST, TOGETHER] + 1e-9
     for measured in MEASUREMENTS:
         assert by[TWIST, f"{TOGETHER}, with {measured}"] <= by[TWIST, TOGETHER] + 1e-9
-    assert f"{100 * by[TWIST, TENSION]:.0f} % by {TENSION}" in remedy(pairs)
+    assert f"{100 * by[TWIST, TENSION]:.0f} % by {TENSION}" in remedy(pairs, "link3")
     assert all(" can pose as " in text for text in alike_in_words(pairs))
 
 
 def test_explanations_free_what_they_say():
-    placed = explanations(built_in_rig())
+    placed = explanations(built_in_rig(), "link4")
+    assert placed[TWIST][0].at == "link4"
     assert [p.at for p in placed[TENSION]] == [f"sling{k}" for k in range(1, 11)]
     assert placed[TWIST][0].hold == ("radius",)
 
@@ -135,12 +139,24 @@ class _Rival:
 class _Diagnosis:
     verdict: str = "missing_physics"
     effects: list = field(default_factory=list)
+    candidates: list = field(default_factory=list)
 
 
 CURVE = Curve("joint1", np.array([0.01, 0.02]), np.array([10.0, 10.0]), np.array([0.1, 1.0]), (), ())
 FRICTION = {
     "joint1": {"coulomb": 11.0, "static": 11.0, "stribeck_speed": 1.0, "viscous": 0.0, "radius": 0.25, "creep": np.inf}
 }
+
+
+def test_the_boom_is_the_one_that_the_diagnosis_suspects():
+    weak, strong = (Candidate("link_torsion", f"link{k}", share, 1.0, False) for k, share in ((3, 0.1), (4, 0.4)))
+    other = _Effect("sensor_drift", "tau.joint2")
+    for effects, candidates, boom in (
+        ([other, _Effect("link_torsion", "link3")], [weak, strong], "link3"),
+        ([other], [weak, strong], "link4"),
+        ([], [], "link1"),
+    ):
+        assert suspected_boom(built_in_rig(), _Diagnosis("", effects, candidates)) == boom  # pyright: ignore[reportArgumentType]
 
 
 def test_a_score_asks_for_name_and_place():
@@ -167,6 +183,14 @@ def test_nothing_concealed_wants_adequate():
     told = [score(answer, _Diagnosis(v), [CURVE]).named for v in ("adequate", "unknown_effect")]  # pyright: ignore[reportArgumentType]
     assert told == [True, False]
     assert coverage([CURVE], {"joint1": np.array([10.1, 12.1])}) == pytest.approx(0.5)
+
+
+def test_playback_shows_every_joint_and_sling():
+    rig, time = built_in_rig(), np.linspace(5.0, 25.0, 101)
+    scene = rig_scene(rig, time, np.outer(np.sin(0.2 * time), np.ones(7)))
+    kinds = [name.split("/")[0] for name in scene._names]
+    assert [kinds.count(kind) for kind in ("joints", "slings", "carriages")] == [7, 10, 10]
+    assert scene.html().count("</html>") == 1
 
 
 def test_the_model_of_the_study_is_shipped():

@@ -1,11 +1,12 @@
 """A free-floating arm as a tree that recordings can be fitted to: six carriers of the base, then the arm's joints."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from ..tree import Tree
+from ..inertia import Array
+from ..tree import Link, Tree
 from ..urdf import load_urdf
 from .arm import FloatingArm, load_arm
 from .ets_vii import ets_vii
@@ -30,6 +31,16 @@ def floating_tree(arm: FloatingArm, body: str = "base") -> FloatingTree:
     """Base and arm as one tree."""
     whole = arm.whole
     return FloatingTree(whole.name, whole.joints, whole.links, whole.gravity, body)
+
+
+def arm_on(tree: FloatingTree, phi: Array) -> FloatingArm:
+    """Base and arm apart again, with inertial parameters (10 L,) of all links; unchecked, tip at the last link."""
+    names = [link.name for link in tree.links]
+    links = [Link(name, own) for name, own in zip(names, phi.reshape(-1, 10), strict=True)]
+    joints = tuple(replace(joint, parent=joint.parent - CARRIERS) for joint in tree.joints[CARRIERS:])
+    # A joint on the base hangs from the last carrier: its parent is then -1, the base.
+    arm = Tree(tree.name, joints, tuple(links[CARRIERS:]), tree.gravity)
+    return FloatingArm(arm, links[CARRIERS - 1].phi, len(joints) - 1, as_published=True)
 
 
 def read_floating(urdf: Path | None, gravity: tuple[float, ...], body: str) -> FloatingTree:

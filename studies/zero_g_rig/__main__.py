@@ -22,8 +22,9 @@ from ...models.rig.rig import built_in_rig
 from ..outcome import FOLDER, Quantity, table, write_result
 from ..page import Section, write_page
 from . import figures
-from .explain import alike_in_words, remedy, tell_apart
+from .explain import alike_in_words, remedy, suspected_boom, tell_apart
 from .recordings import make_recordings, open_answer
+from .scene import FASTER, rig_scene
 from .score import Score, score, true_curves
 from .study import MODEL, Friction, friction_study
 
@@ -45,12 +46,13 @@ def main() -> int:
     say(f"{error_table(friction)}\nDiagnosing what is left, with {holdout.name} locked away ...")
     answer = diagnose(model, [train], holdout, progress=lambda text: say(f"  {text}"))
     found = answer.diagnosis
-    pairs = tell_apart(built_in_rig(), friction)
+    boom = suspected_boom(built_in_rig(), found)
+    pairs = tell_apart(built_in_rig(), friction, boom)
     words = alike_in_words(pairs)
     truth = open_answer(folder, digest)
     result = score(truth, found, friction.curves)
     quantities = numbers(friction, found, result)
-    sentence = f"{found.sentence} {remedy(pairs)}"
+    sentence = f"{found.sentence} {remedy(pairs, boom)}"
     save_model(answer.model, folder / "model.toml", sentence)
     (folder / "diagnosis.json").write_text(json.dumps(found.to_json(), indent=1) + "\n", encoding="utf-8")
     write_report(found, folder / "diagnosis.html")
@@ -60,6 +62,9 @@ def main() -> int:
         sentence,
         quantities,
         sections(friction, found, words, truth),
+        rig_scene(built_in_rig(), friction.train.time, friction.train.q).html(),
+        f"The fitted recording, {FASTER:g} times as fast: arm, joints, slings and the carriages above them. Drag to "
+        "turn, scroll to come closer, right button to shift.",
     )
     write_result(
         STUDY,

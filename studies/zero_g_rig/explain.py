@@ -5,8 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ...identification.diagnosis import Diagnosis
 from ...models.effects import get_effect
-from ...models.model import Placed
+from ...models.model import Placed, places
 from ...models.rig.rig import Rig
 from .alike import Alike, compare
 from .study import Friction
@@ -31,8 +32,19 @@ ALIKE = 0.8
 """Two explanations are told apart badly where one can take this share of the other's energy."""
 
 
-def explanations(rig: Rig) -> dict[str, list[Placed]]:
-    """Explanations of what is left on joints 2 and 6, each with the parameters that would be free."""
+def suspected_boom(rig: Rig, found: Diagnosis) -> str:
+    """The boom that a diagnosis calls twisted; where it names none, the one whose twist explains most by itself."""
+    torsion = "link_torsion"
+    named = [e.at for e in found.effects if e.name == torsion]
+    tried = sorted((c for c in found.candidates if c.name == torsion), key=lambda c: -c.explained)
+    return [*named, *(c.at for c in tried), *places(get_effect(torsion), rig)][0]
+
+
+def explanations(rig: Rig, boom: str) -> dict[str, list[Placed]]:
+    """Explanations of what is left on joints 2 and 6, each with the parameters that would be free.
+
+    ``boom`` is the link that may be twisted.
+    """
 
     def placed(name: str, at: str, *free: str) -> Placed:
         effect = get_effect(name)
@@ -40,16 +52,16 @@ def explanations(rig: Rig) -> dict[str, list[Placed]]:
 
     last = rig.links[-1].name
     return {
-        TWIST: [placed("link_torsion", "link3", "torque")],
+        TWIST: [placed("link_torsion", boom, "torque")],
         TENSION: [placed("sling_tension_error", s.name, "share") for s in rig.slings],
         PAYLOAD: [placed("payload_mass", last, "mass"), placed("com_offset", last, "x", "y", "z")],
         DRIFT: [placed("sensor_drift", f"tau.joint{k}", "rate") for k in (2, 6)],
     }
 
 
-def tell_apart(rig: Rig, friction: Friction) -> list[Alike]:
+def tell_apart(rig: Rig, friction: Friction, boom: str) -> list[Alike]:
     """Every pair of explanations, and what all but the first can do together, with and without each measurement."""
-    named = explanations(rig)
+    named = explanations(rig, boom)
     others = {name: placed for name, placed in named.items() if name != TWIST}
     named[TOGETHER] = [p for placed in others.values() for p in placed]
     for measured, known in MEASUREMENTS.items():
@@ -67,7 +79,7 @@ def alike_in_words(pairs: Sequence[Alike]) -> list[str]:
     ]
 
 
-def remedy(pairs: Sequence[Alike]) -> str:
+def remedy(pairs: Sequence[Alike], boom: str) -> str:
     """What torques and joint angles alone could not have settled, and the measurement that would help most."""
     taken = {p.other: p.mimicked for p in pairs if p.name == TWIST}
     shares = ", ".join(f"{100 * taken[other]:.0f} % by {other}" for other in (TENSION, PAYLOAD, DRIFT))
@@ -75,6 +87,7 @@ def remedy(pairs: Sequence[Alike]) -> str:
     best = min(left, key=lambda measured: left[measured])
     settles = "what would help most is" if left[best] < ALIKE else "no single measurement settles it, not even"
     return (
-        f"From torques and joint angles alone, as the paper had them, {TWIST} can be mimicked to {shares}, and to "
-        f"{100 * taken[TOGETHER]:.0f} % by all of these; {settles} {best}, with which {100 * left[best]:.0f} % remain."
+        f"From torques and joint angles alone, as the paper had them, {TWIST} ({boom}) can be mimicked to {shares}, "
+        f"and to {100 * taken[TOGETHER]:.0f} % by all of these; {settles} {best}, with which {100 * left[best]:.0f} % "
+        "remain."
     )
