@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 SOURCES := $(shell git ls-files '*.py' '*.toml' '*.urdf' '*.csv' '*.json' 2>/dev/null | grep -v -e '^tests/' -e '^bench/' -e '^proof/')
-STUDIES := emps free-floating ground-capture zero-g-rig orbit-inspection orbit-hover tolerance
+STUDIES := emps kuka bam free-floating ground-capture zero-g-rig orbit-inspection orbit-hover tolerance
 
 BENCHES := torque friction_fit diagnosis floating cosim fmu snare
 

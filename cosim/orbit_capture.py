@@ -14,22 +14,23 @@ from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from .master import Master
-from .participants.floating_arm import FloatingArmParticipant
-from .participants.snare_impulses import ImpulseSnareParticipant
-from .record import Run
-from .step_control import StepControl
-from .system import System
 from ..models.floating.arm import FloatingArm
-from ..models.floating.dynamics import tip_pose
+from ..models.floating.dynamics import momentum, tip_jacobians, tip_pose
 from ..models.floating.space_arm import CAPTURE_POSE, FRICTION, space_arm, space_arm_drive
 from ..models.inertia import Array
 from ..models.snare.drive import Pose
 from ..models.snare.model import Accuracy
 from ..models.snare.parameters import WIDE_RING, SnareParameters
 from ..models.snare.target import Target
+from .master import Master
+from .participants.floating_arm import FloatingArmParticipant
+from .participants.snare_impulses import ImpulseSnareParticipant
+from .record import Run
+from .step_control import StepControl
+from .system import System
 
 CaseName = Literal["inspection", "hover"]
 DURATION = 10.5
@@ -72,12 +73,39 @@ class Setting:
         Its tip is the end effector; its mount, in inspection, the pin's foot.
     effector : Pose
     target : Target
+    rates : array (J,)
+        Of the joints [rad/s].
+    drift : array (6,)
+        Twist of the base, in the world [m/s, rad/s].
     """
 
     case: CaseName
     arm: FloatingArm
     effector: Pose
     target: Target
+    rates: Array
+    drift: Array
+
+
+class _Arm(FloatingArmParticipant):
+    """An arm whose joints and base move at the start."""
+
+    def __init__(self, start: Setting) -> None:
+        arm, q = start.arm, np.array([CAPTURE_POSE])
+        total = momentum(arm, q, start.drift[None], start.rates[None])[0]  # the base's frame is the world's
+        super().__init__(arm, space_arm_drive(arm), CAPTURE_POSE, momentum=total, impulses=True)
+        self._start = self._motion.start(CAPTURE_POSE, start.rates, momentum=total)
+
+
+class _Snare(ImpulseSnareParticipant):
+    """A snare that tells how hard its cables pull."""
+
+    def tension(self) -> float:
+        """Largest force of a cable on its ring now [N]."""
+        assembly = self._built().assembly
+        data = assembly.system.systemData
+        ends = np.reshape(data.GetAECoordinates()[data.GetObjectLTGAE(assembly.ends_object)], (6, 3))
+        return float(np.linalg.norm(ends, axis=1).max())
 
 
 def arrival(case: CaseName, foot: ArrayLike, turn: Rotation, speed: float = 0.0) -> Setting:
@@ -115,15 +143,38 @@ def arrival(case: CaseName, foot: ArrayLike, turn: Rotation, speed: float = 0.0)
     return Setting(case, arm, Pose(place, turned.as_matrix(), np.zeros(3), np.zeros(3)), target, rates, -approach)
 
 
+def resistance(level: float, stiffness: float = 0.0) -> Passive:
+    """Joints whose whole friction is as many times the usual one as ``level`` [N·m] is the usual Coulomb level."""
+    factor = level / FRICTION["coulomb_level"]
+    scaled = ("coulomb_level", "stribeck_level", "viscous_coefficient")
+    return Passive({k: v * factor if k in scaled else v for k, v in FRICTION.items()}, stiffness)
+
+
+def step_control(start: Setting, tolerance: float = 3e-3, largest: float = 4e-3) -> StepControl:
+    """What the error-controlled master is told: sizes of what counts here, and the longest step [s].
+
+    10 mm and 10 mm/s of motion, 20 mrad and 20 mrad/s, and the impulse of 10 N over 2 ms.
+    """
+    sizes: dict[str, float] = {}
+    for on_arm, on_snare in _ports(start):
+        for kind, size in (("pos", 0.01), ("vel", 0.01), ("omega", 0.02)):
+            sizes |= {f"arm.{kind}.{on_arm}.{x}": size for x in "xyz"}
+        sizes |= {f"arm.quat.{on_arm}.{x}": 0.02 for x in "wxyz"}
+        sizes |= {f"snare.{k}.{on_snare}.{x}": 0.02 for k in ("impulse", "angular_impulse") for x in "xyz"}
+    return StepControl(tolerance, sizes, smallest=2.5e-4, largest=largest)
+
+
+def _ports(start: Setting) -> list[tuple[str, str]]:
+    """Which frame of the arm goes with which body of the snare."""
+    return [("tip", "effector"), ("mount", "pin")][: 2 if start.arm.mount else 1]
+
+
 def system(start: Setting, passive: Passive, snare: SnareParameters, accuracy: Accuracy) -> System:
     """Snare and arm, connected: the snare follows tip and mount, the arm gets the impulses."""
     arm = start.arm
-    participants = {
-        "snare": ImpulseSnareParticipant(snare, start.target, accuracy, start.effector),
-        "arm": FloatingArmParticipant(arm, space_arm_drive(arm), CAPTURE_POSE, impulses=True),
-    }
+    participants = {"snare": _Snare(snare, start.target, accuracy, start.effector), "arm": _Arm(start)}
     links = []
-    for on_arm, on_snare in (("tip", "effector"), ("mount", "pin"))[: 2 if arm.mount else 1]:
+    for on_arm, on_snare in _ports(start):
         links += [(f"arm.{k}.{on_arm}.{x}", f"snare.{k}.{on_snare}.{x}") for k, axes in _FRAME for x in axes]
         links += [
             (f"snare.{k}.{on_snare}.{x}", f"arm.{k}.{on_arm}.{x}")
@@ -149,10 +200,12 @@ def co_simulate(
     own_step: float = 1e-3,
     control: StepControl | None = None,
     frames: list[tuple[float, Array]] | None = None,
+    tensions: list[float] | None = None,
 ) -> Run:
     """One capture; ``step`` is the macro step and ``own_step`` the longest inside the snare [s].
 
-    ``frames`` takes time and the cables' nodes (3, n_nodes, 3), fifteen times a second.
+    ``frames`` takes time and the cables' nodes (3, n_nodes, 3), fifteen times a second; ``tensions`` the largest force
+    of a cable on its ring [N], at each communication point.
     """
     coupled = system(start, passive or Passive(), snare or SNARE, Accuracy(own_step, 10, 5e-4))
     snare_model: Any = coupled.participants["snare"]
@@ -160,6 +213,8 @@ def co_simulate(
     def film(time: float) -> None:
         if frames is not None and time >= len(frames) / 15:
             frames.append((time, snare_model.cables()))
+        if tensions is not None:
+            tensions.append(snare_model.tension())
 
     with Master(coupled, step, scheme="gauss_seidel", hold="quadratic", control=control) as master:
         film(0.0)

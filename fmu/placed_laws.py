@@ -70,7 +70,7 @@ class PlacedLaws:
         """Index of the joint that an effect's place belongs to."""
         if p.effect.at == "link":
             return [link.name for link in self._model.tree.links].index(p.at)
-        return self._model.joints.index(p.at.removeprefix("tau.").removeprefix("q."))
+        return self._model.joints.index(p.at.removeprefix("tau.").removeprefix("q.").removeprefix("q_link."))
 
     def unit(self, joint: int, unit: str, channel: str = "") -> str:
         """A unit with the joint's torque, position and channel units written out."""

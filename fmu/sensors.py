@@ -12,7 +12,7 @@ def read_sensors(
     laws: PlacedLaws,
     ledger: Ledger,
     joints: Sequence[Mapping[str, ca.SX]],
-    start_q: ca.SX,
+    start: Mapping[str, ca.SX],
 ) -> list[ca.SX]:
     """Add an output for each channel with sensor effects; several of one channel read one after another.
 
@@ -22,9 +22,9 @@ def read_sensors(
     ledger : Ledger
         Takes the outputs and the hidden states.
     joints : sequence of mapping
-        Signals of each joint: ``q qd qdd load``, and ``tau``, the drive's torque.
-    start_q : casadi.SX (J,)
-        Positions at the start, which a delayed reading starts from.
+        Signals of each joint: ``q qd qdd load``, ``tau``, the drive's torque, and ``q_link``, the link's position.
+    start : mapping of str to casadi.SX (J,)
+        ``q`` and ``q_link`` at the start, which a delayed reading starts from.
 
     Returns
     -------
@@ -35,8 +35,9 @@ def read_sensors(
     readings: dict[str, tuple[ca.SX, ca.SX, str]] = {}  # by channel: now, at the start, unit
     for p in laws.at("sensor"):
         j = laws.joint_of(p)
-        position, own = p.at.startswith("q."), {**joints[j], **laws.signals(j)}
-        true = (own["q"], start_q[j]) if position else (own["tau"], own["tau"])
+        channel, own = p.at.partition(".")[0], {**joints[j], **laws.signals(j)}
+        position = channel in start
+        true = (own[channel], start[channel][j] if position else own[channel])
         value, first = readings.get(p.at, true)[:2]
         states: dict[str, ca.SX] = {}
         at_start: dict[str, ca.SX] = {}

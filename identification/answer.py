@@ -62,7 +62,7 @@ def report_on(
     size = {c: float(np.sqrt(x)) * fits[c].train.relative_after for c, x in nameless.items()}
     words = {
         c: (
-            f"on {channels[c]}, smooth curves over position, speed, load and time together still explain "
+            f"on {channels[c]}, smooth curves over {found.closing.over[c]} together still explain "
             f"{percent(x)} of the residual in blocks that they were not fitted to "
             f"({percent(size[c])} of the channel's torque)"
         )

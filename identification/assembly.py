@@ -100,7 +100,9 @@ class Assembly:
         values: Mapping[str, float],
     ) -> None:
         """Lay out the parameters; raises InputError for a link effect beside identified inertia."""
-        self.tree, self.placed, self.base, self.scales = tree, tuple(placed), base, scales
+        # What a link-side encoder does is no torque's business.
+        placed = tuple(p for p in placed if not p.at.startswith("q_link."))
+        self.tree, self.placed, self.base, self.scales = tree, placed, base, scales
         self._joints = [j.name for j in tree.joints]
         self._links = [link.name for link in tree.links]
         self.speed_scales = [values.get(f"speed_scale.{j}", scales[j].speed) for j in self._joints]
@@ -200,15 +202,15 @@ class Assembly:
     def residual(self, experiment: Experiment, theta: Array) -> tuple[Array, list[Block]]:
         """Measured minus modelled torque in the analysis band (n_band, J), and the model's derivative blocks there."""
         state = self.evaluate(experiment, theta)
-        motion, banded = experiment.motion, []
+        banded = []
         for block in state.blocks:
             columns = None if block.key is None else experiment.store.get(block.key)
             if columns is None:
-                columns = motion.to_band(block.values)
+                columns = experiment.to_band(block.values, block.channel)
                 if block.key is not None:
                     experiment.store[block.key] = columns
             banded.append(Block(block.channel, block.index, columns))
-        return experiment.measured - motion.to_band(state.tau), banded
+        return experiment.measured - experiment.all_to_band(state.tau), banded
 
     def evaluate(self, experiment: Experiment, theta: Array) -> Evaluation:
         """Rigid-body torque, readings and derivative blocks at full rate."""

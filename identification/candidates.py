@@ -1,15 +1,16 @@
 """Which effects could be missing, at which places, and the columns each would add to the torque."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations, product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..models.effect import Effect, Parameter
+from ..models.effect import Parameter
 from ..models.effects import effects
 from ..models.floating.tree import n_carriers
 from ..models.model import Model, Placed, places
+from ..models.rig.rig import Rig
 from .assembly import Assembly, Evaluation
 from .effect_terms import contributions
 from .experiment import Experiment
@@ -43,7 +44,9 @@ class Variant:
         """Positions of the columns to try together: all and single ones; of a vector's few components, every set."""
         n = max(len(self.amplitudes), 1)
         parameters = [self.placed.effect.parameters[i] for i in self.amplitudes]
-        alone = {k for k, p in enumerate(parameters) if p.alone and not p.grid} or {0}
+        alone = {k for k, p in enumerate(parameters) if p.alone and not p.grid}
+        if not alone:
+            return [np.arange(n)]
         counts = range(1, n + 1) if self.placed.effect.at == "link" and n <= MOST_COMBINED else sorted({1, n})
         return [np.array(some) for k in counts for some in combinations(range(n), k) if alone & set(some)]
 
@@ -53,7 +56,8 @@ class Variant:
         if len(self.amplitudes):
             full[self.amplitudes] = amplitudes
             slopes = [i for i in self.amplitudes if self.placed.effect.parameters[i].grid]
-            full[slopes] /= amplitudes[0] or 1.0
+            masses = [i for i in self.amplitudes if not self.placed.effect.parameters[i].grid]
+            full[slopes] /= np.max(full[masses], initial=0.0) or 1.0
         return full
 
 
@@ -84,16 +88,28 @@ def variants(assembly: Assembly, placed: Placed) -> list[Variant]:
     for i, p in enumerate(placed.effect.parameters):
         scale = assembly.scale(placed, p)
         axes.append([g * scale for g in p.grid] or [p.zero * scale])
-        if _is_linear(placed.effect, p):
+        if _is_linear(p):
             amplitudes.append(i)
-    if any(placed.effect.parameters[i].grid for i in amplitudes):
-        axes[0] = [1.0]  # slopes are taken at one kilogram
+    masses = [i for i in amplitudes if not placed.effect.parameters[i].grid]
+    if len(masses) < len(amplitudes):  # slopes are taken at one kilogram
+        axes = [[1.0] if i in masses else axis for i, axis in enumerate(axes)]
     index = np.array(amplitudes, int)
     bounds = [assembly.bounds(placed, placed.effect.parameters[i]) for i in index] or [(0.0, np.inf)]
     low, high = (np.array(x, float) for x in zip(*bounds, strict=True))
     grid = list(product(*axes))
     step = -(-len(grid) // MOST_VARIANTS)
-    return [Variant(placed, np.array(g, float), index, low, high) for g in grid[::step]]
+    found = [Variant(placed, np.array(g, float), index, low, high) for g in grid[::step]]
+    if 1 < len(masses) < len(amplitudes):
+        # A mass for each axis: one that moves along a single axis has slopes of its own.
+        others = [[], *([i for i in masses if i != alone] for alone in masses)]
+        found = [replace(v, parameters=_with_zeros(v.parameters, where)) for v in found for where in others]
+    return found
+
+
+def _with_zeros(parameters: Array, where: list[int]) -> Array:
+    changed = parameters.copy()
+    changed[where] = 0.0
+    return changed
 
 
 def candidate_columns(
@@ -124,7 +140,7 @@ def candidate_columns(
         if effect.at != "sensor":
             for passed in state.passed.get(channel, ()):
                 own = passed(own)
-        found.append((channel, experiment.motion.to_band(own)))
+        found.append((channel, experiment.to_band(own, channel)))
     if key is not None and by_load is None:
         experiment.store[key] = found[0][1]
     return found
@@ -150,7 +166,7 @@ def free_parameters(assembly: Assembly, experiment: Experiment, state: Evaluatio
         parameters,
     )
     moves = np.sum([np.sum(columns**2, axis=0) for _, _, columns in terms], axis=0) > 0
-    amplitudes = {p.name for p in placed.effect.parameters if _is_linear(placed.effect, p) and len(variant.amplitudes)}
+    amplitudes = {p.name for p in placed.effect.parameters if _is_linear(p) and len(variant.amplitudes)}
     on = {placed.effect.parameters[i].name for i in variant.amplitudes}
     return tuple(
         p.name
@@ -159,9 +175,9 @@ def free_parameters(assembly: Assembly, experiment: Experiment, state: Evaluatio
     )
 
 
-def _is_linear(effect: Effect, parameter: Parameter) -> bool:
-    """Whether a column stands for the parameter: an amplitude, or a place on a link, whose grid is its origin alone."""
-    return not parameter.grid or (effect.at == "link" and len(parameter.grid) == 1)
+def _is_linear(parameter: Parameter) -> bool:
+    """Whether a column stands for the parameter: an amplitude, or a mass's place, whose grid is its origin alone."""
+    return not parameter.grid or parameter.grid == (0.0,)
 
 
 def smooth_columns(experiment: Experiment, state: Evaluation, joint: int, pieces: int = 8) -> Array:
@@ -169,6 +185,26 @@ def smooth_columns(experiment: Experiment, state: Evaluation, joint: int, pieces
     motion = experiment.motion
     coordinates = (motion.q[:, joint], motion.qd[:, joint], state.load[:, joint], experiment.elapsed)
     return motion.to_band(np.concatenate([_hats(x, pieces) for x in coordinates], axis=1))
+
+
+def nameless_columns(experiment: Experiment, state: Evaluation, joint: int) -> dict[str, Array]:
+    """Curves that no effect has a name for, on one channel, by the words for what they run over (n_band, k)."""
+    motion, found = experiment.motion, {}
+    found["position, speed, load and time"] = smooth_columns(experiment, state, joint)
+    slow, speed = _hats(experiment.elapsed, 8), motion.qd[:, joint, None]
+    found["speed, changing with time,"] = experiment.to_band(slow * speed, joint)
+    if isinstance(experiment.body.tree, Rig) or n_carriers(experiment.body.tree) or not np.ptp(motion.q[:, joint]):
+        return found  # on a suspension or a floating base every joint moves what carries the others
+    forth = 0.5 + 0.5 * np.tanh(speed / (1e-2 * np.max(np.abs(speed))))
+    found["direction, changing with time,"] = experiment.to_band(slow * (2 * forth - 1), joint)
+    local = _hats(motion.q[:, joint], 24)
+    either = np.concatenate([forth * local, (1 - forth) * local], axis=1)
+    found["position, apart for either direction,"] = experiment.to_band(either, joint)
+    for c, other in enumerate(motion.joints):
+        if abs(c - joint) == 1 and np.ptp(motion.q[:, c]):
+            curves = np.concatenate([_hats(motion.q[:, c], 8), _hats(motion.qd[:, c], 8)], axis=1)
+            found[f"position and speed of {other}"] = experiment.to_band(curves, joint)
+    return found
 
 
 def _hats(x: Array, pieces: int) -> Array:

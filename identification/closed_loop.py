@@ -19,15 +19,13 @@ from .candidates import smooth_columns
 from .experiment import Experiment
 from .fit import Fit
 from .problem import gather
+from .rest import REST
 
 Array = NDArray[np.float64]
 
 DRIVEN = 0.1
 """Largest share of a joint's snap (second derivative of acceleration: what a late sensor's column is made of) inside
 the band kept that the unexplained torque could account for."""
-
-REST = 0.02
-"""Share of a joint's peak speed below which friction may stick, and a static law says nothing."""
 
 LEAST = 4.0
 """The band kept is never narrower than this many times the frequency that holds 90 % of the speed's energy."""

@@ -19,15 +19,19 @@ from .answer import report_on
 from .assembly import Assembly
 from .base_parameters import base_parameters
 from .diagnosis import Diagnosis, Step
+from .encoder_answer import with_links
+from .encoder_diagnosis import diagnose_links
 from .experiment import Experiment, demand_apart, demand_torque, load_experiments, scales
 from .fit import Fit, channel_rms, fit
 from .identify import inertial_values, physical
+from .rest import bridged, fitted
 from .search import Found, Taken, carry, search, without
 
 Array = NDArray[np.float64]
 
 CONFIRM = 0.05
-"""An effect is confirmed if the held-out residual energy of its channels rises by this share when it is taken out."""
+"""An effect is confirmed if the held-out residual energy of its channels, in motion, rises by this share when it is
+taken out."""
 
 SECOND_CHOICES = 2
 """Searches for another explanation of what the held-out recording did not confirm."""
@@ -96,7 +100,14 @@ def diagnose(
     steps = _steps(found, confirmed, final, train, locked)
     diagnosis = report_on(model, found, confirmed, final, trials, steps, train, locked)
     values = {**model.values, **final.assembly.values(final.theta), **inertial_values(model, inertia)}
-    return Answer(diagnosis, replace(model, effects=final.assembly.placed, values=values))
+    of_links = tuple(p for p in model.effects if p.at.startswith("q_link."))
+    after = replace(model, effects=(*final.assembly.placed, *of_links), values=values)
+    links, compared = diagnose_links(
+        model, recordings, holdout, body, final.assembly, final.theta, scales(train), band, progress=progress, seed=seed
+    )
+    if links:
+        diagnosis, after = with_links(diagnosis, after, links, compared)
+    return Answer(diagnosis, after)
 
 
 @dataclass(frozen=True)
@@ -121,14 +132,21 @@ def _attempt(
     confirmed, rejected, trials, final = list(found.taken), [], {}, found.fit
     while confirmed:
         with_all, measured = channel_rms(final.assembly, locked, final.theta)
+        moving = [bridged(e) for e in locked]
+        with_all_moving, _ = channel_rms(final.assembly, moving, final.theta)
         rises, fits = [], []
         for t in confirmed:
             c = list(t.judged.channels)
             assembly = without(final, t.judged.placed)
-            fits.append(fit(assembly, train, start=carry(final, assembly), multi_start=False))
+            fits.append(fit(assembly, fitted(assembly, train), start=carry(final, assembly), multi_start=False))
             rms, _ = channel_rms(assembly, locked, fits[-1].theta)
-            energy = [float(np.sum((x[c] / final.sigma[c]) ** 2)) for x in (with_all, rms)]
-            rises.append(energy[1] / energy[0] - 1)
+            rms_moving, _ = channel_rms(assembly, moving, fits[-1].theta)
+            # A joint at rest holds what it is given: there, only laws for what happens at rest can be missed.
+            pairs = [(with_all_moving, rms_moving)]
+            if t.judged.placed.effect.at_rest or t.judged.placed.effect.exceeds_at_rest:
+                pairs.append((with_all, rms))
+            energies = [[float(np.sum((x[c] / final.sigma[c]) ** 2)) for x in pair] for pair in pairs]
+            rises.append(max(after / before - 1 for before, after in energies))
             worst = c[int(np.argmax(rms[c] / measured[c] - with_all[c] / measured[c]))]
             trials[t.judged.placed.key] = (
                 float(with_all[worst] / measured[worst]),
@@ -159,7 +177,7 @@ def _steps(
         rest = {t.judged.placed.key for t in confirmed if t.judged.placed.effect.name in names[k + 1 :]}
         if rest:
             assembly = old.keep([p for p in old.placed if p.key not in rest], final.theta)
-            theta = fit(assembly, train, start=carry(final, assembly), multi_start=False).theta
+            theta = fit(assembly, fitted(assembly, train), start=carry(final, assembly), multi_start=False).theta
         else:
             assembly, theta = old, final.theta
         at = [t.judged.placed.at for t in confirmed if t.judged.placed.effect.name == name]

@@ -21,6 +21,13 @@ ABSORBED = 1e-3
 ABSORBED_PART = 0.02
 """The same for every column of a candidate that has several: an alias must not ride along."""
 
+KNOWN = 0.05
+"""Share of a left-out block's own curvature that stays: what only that block can tell is held near zero step, where
+nothing else would hold it at all."""
+
+NOTHING = 1e-15
+"""Energy of a whitened column, for an amplitude of one, below which it is rounding."""
+
 
 @dataclass(frozen=True)
 class Channel:
@@ -116,15 +123,19 @@ class Evidence:
                 noise[:, b] += part.T @ c.noise[rows]
         return Products(own, cross, right, noise @ self.signs)
 
-    def gain(self, p: Products, low: Array, high: Array, least: float | None = None) -> Gain:
+    def gain(
+        self, p: Products, low: Array, high: Array, least: float | None = None, counted: int | None = None
+    ) -> Gain:
         """Log-likelihood gained on all blocks by the candidate, amplitudes between bounds, baseline fitted again.
 
-        ``least`` is the share of every column that the baseline must not be able to mimic.
+        ``least`` is the share of every column, or of the first ``counted``, that the baseline must not be able to
+        mimic.
         """
         cross = p.cross.sum(0)
         own = p.own.sum(0)
         schur = own - cross.T @ self._total.solve(cross)
-        left = np.diag(schur) / np.maximum(np.diag(own), 1e-300)
+        # A column that is nothing but rounding is no candidate.
+        left = np.where(np.diag(own) > NOTHING, np.diag(schur) / np.maximum(np.diag(own), NOTHING), 0.0)[:counted]
         unabsorbed = float(np.min(left)) if len(left) > 1 else float(left[0])
         if unabsorbed < (least or (ABSORBED if len(left) == 1 else ABSORBED_PART)):
             return Gain(0.0, np.zeros(len(low)), unabsorbed)
@@ -140,16 +151,24 @@ class Evidence:
         target = p.nulls - cross.T @ self._null_fitted
         return 0.5 * np.sum(target * schur.solve(target), axis=0)
 
-    def fresh_gains(self, p: Products, low: Array, high: Array) -> Array:
-        """Log-likelihood gained on each block by a fit to the other blocks (B,)."""
+    def fresh_gains(self, p: Products, low: Array, high: Array, spread: float = np.inf) -> Array:
+        """Log-likelihood gained on each block by a fit to the other blocks (B,).
+
+        ``spread`` is the standard deviation about zero of each amplitude before anything was measured: nameless curves
+        run wild without one where only the block left out has been.
+        """
+        ridge = np.eye(len(low)) / spread**2
         gains = np.zeros(self.n_blocks)
         for b in range(self.n_blocks):
-            solver = _Solver(self.matrix.sum(0) - self.matrix[b])
+            out = 1 - KNOWN
+            solver = _Solver(self.matrix.sum(0) - out * self.matrix[b])
             right = self.right.sum(0) - self.right[b]
-            cross = p.cross.sum(0) - p.cross[b]
-            own = p.own.sum(0) - p.own[b]
-            schur = own - cross.T @ solver.solve(cross)
-            amplitudes = _bounded(schur, own, p.right.sum(0) - p.right[b] - cross.T @ solver.solve(right), low, high)
+            cross = p.cross.sum(0) - out * p.cross[b]
+            own = p.own.sum(0) - out * p.own[b]
+            schur = own + ridge - cross.T @ solver.solve(cross)
+            amplitudes = _bounded(
+                schur, own + ridge, p.right.sum(0) - p.right[b] - cross.T @ solver.solve(right), low, high
+            )
             without = solver.solve(right)
             beside = solver.solve(right - cross @ amplitudes)
             gains[b] = 0.5 * (self._energy(b, without) - self._energy(b, beside, p, amplitudes))

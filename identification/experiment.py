@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -23,6 +24,26 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
+class Bridge:
+    """Straight lines across runs of samples: the samples ``at`` (k,) lie the share ``part`` of the way from the samples
+    ``before`` to the samples ``after``.
+
+    Linear, and the same for measured and modelled torque and every column, so that what they have in common stays.
+    """
+
+    at: NDArray[np.int_]
+    before: NDArray[np.int_]
+    after: NDArray[np.int_]
+    part: Array
+
+    def __call__(self, x: Array) -> Array:
+        """Samples (n, ...) with the runs bridged."""
+        y, part = np.array(x, order="F"), self.part.reshape(-1, *(1,) * (x.ndim - 1))
+        y[self.at] = (1 - part) * x[self.before] + part * x[self.after]
+        return y
+
+
+@dataclass(frozen=True, eq=False)
 class Experiment:
     """Motion of one recording and the rigid body's share of its torque.
 
@@ -35,7 +56,26 @@ class Experiment:
     body: RigidBody
     tension: Mapping[str, Array] = field(default_factory=dict)
     impulse: Array | None = None
-    store: dict[object, Array] = field(default_factory=dict, repr=False)
+    store: dict[object, Any] = field(default_factory=dict, repr=False)
+    bridged: tuple[Bridge, ...] = ()
+    """For each channel, runs of samples that are no data; none by default."""
+
+    def to_band(self, x: Array, channel: int) -> Array:
+        """Samples (n, ...) of a channel, bridged where they are no data, in the analysis band (n_band, ...)."""
+        return self.motion.to_band(self.bridged[channel](x) if self.bridged else x)
+
+    def all_to_band(self, x: Array) -> Array:
+        """Samples of all channels (n, J), bridged where they are no data, in the analysis band (n_band, J)."""
+        if not self.bridged:
+            return self.motion.to_band(x)
+        return self.motion.to_band(np.stack([b(own) for b, own in zip(self.bridged, x.T, strict=True)], 1))
+
+    def with_bridges(self, bridges: tuple[Bridge, ...]) -> "Experiment":
+        """The same recording with runs of samples that are no data; what the rigid body gave is not worked out anew."""
+        made = replace(self, store={}, bridged=bridges)
+        shared = ("regressor", "mass_matrix", "tangent", "carried", "elapsed")
+        made.__dict__.update({name: getattr(self, name) for name in shared})
+        return made
 
     @cached_property
     def regressor(self) -> Array:
@@ -80,7 +120,7 @@ class Experiment:
     @cached_property
     def measured(self) -> Array:
         """Measured torque in the analysis band (n_band, J)."""
-        return self.motion.to_band(self.motion.tau)
+        return self.all_to_band(self.motion.tau)
 
     @cached_property
     def elapsed(self) -> Array:

@@ -105,7 +105,7 @@ def fit(
 
 def channel_rms(assembly: Assembly, experiments: Sequence[Experiment], theta: Array) -> tuple[Array, Array]:
     """RMS residual and RMS measurement of every channel in the analysis band, each (J,)."""
-    residuals = np.concatenate([e.measured - e.motion.to_band(assembly.torque(e, theta)) for e in experiments])
+    residuals = np.concatenate([e.measured - e.all_to_band(assembly.torque(e, theta)) for e in experiments])
     measured = np.concatenate([e.measured for e in experiments])
     return np.sqrt(np.mean(residuals**2, axis=0)), np.sqrt(np.mean(measured**2, axis=0))
 

@@ -38,7 +38,7 @@ TRIES = 24
 DURATION = 20.0
 """Of the motion [s]."""
 HARMONICS = 5
-REST = 1.0
+RAMP = 1.0
 """In which a motion starts from rest, and ends at it [s]."""
 SHOWN = 0.995
 """Quantile of the recorded acceleration that counts as shown: peaks of it are noise."""
@@ -168,7 +168,7 @@ def random_motion(
 ) -> xr.Dataset:
     """A motion from rest to rest within the limits of every joint, at ``rate`` [Hz]; where it is free it is random."""
     time = np.arange(0.0, duration, 1 / rate)
-    rest = np.clip(np.minimum(time, time[-1] - time) / REST, 0, 1)
+    rest = np.clip(np.minimum(time, time[-1] - time) / RAMP, 0, 1)
     window = rest**3 * (10 - 15 * rest + 6 * rest**2)
     variables = {}
     for k, joint in enumerate(joints):

@@ -16,6 +16,9 @@ Array = NDArray[np.float64]
 LONGEST = 12
 """Highest order tried; the order is chosen by BIC."""
 
+MOST_MISSING = 0.5
+"""Share of missing samples beyond which the noise is learnt from all of them."""
+
 
 @dataclass(frozen=True)
 class Whitener:
@@ -35,7 +38,9 @@ class Whitener:
         return np.concatenate([(lfilter(taps, [1.0], p, axis=0) if p.size else p)[self.lead :] for p in parts])
 
 
-def whitener(residual: Array, columns: Array, segments: Sequence[slice]) -> tuple[Whitener, Array]:
+def whitener(
+    residual: Array, columns: Array, segments: Sequence[slice], missing: NDArray[np.bool_] | None = None
+) -> tuple[Whitener, Array]:
     """Fit the noise model of a channel.
 
     Parameters
@@ -46,6 +51,8 @@ def whitener(residual: Array, columns: Array, segments: Sequence[slice]) -> tupl
         Everything that could explain it.
     segments : sequence of slice
         Runs without a gap.
+    missing : array (n_band,), optional
+        Samples that are no noise; nothing is learnt from them, unless little else is there.
 
     Returns
     -------
@@ -54,16 +61,19 @@ def whitener(residual: Array, columns: Array, segments: Sequence[slice]) -> tupl
     scale = np.sqrt(np.mean(columns**2, axis=0))
     use = columns[:, scale > 0] / scale[scale > 0]
     ridge = 1e-3 * np.sqrt(len(residual)) * np.eye(use.shape[1])
-    padded = np.concatenate([residual, np.zeros(len(ridge))])
-    noise = residual - use @ np.linalg.lstsq(np.vstack([use, ridge]), padded, rcond=None)[0]
+    good = np.ones(len(residual), bool) if missing is None or np.mean(missing) > MOST_MISSING else ~missing
+    padded = np.concatenate([residual[good], np.zeros(len(ridge))])
+    noise = residual - use @ np.linalg.lstsq(np.vstack([use[good], ridge]), padded, rcond=None)[0]
     # Long runs tell the memory apart from the ends; short ones serve where there is nothing else.
     kept = [s for s in segments if s.stop - s.start > 4 * LONGEST] or [
         s for s in segments if s.stop - s.start > LONGEST
     ]
+    known = np.concatenate([np.convolve(~good[s], np.ones(LONGEST + 1), mode="valid") == 0 for s in kept])
     best: tuple[float, NDArray, float] | None = None
     for order in range(LONGEST + 1):
         past = np.concatenate([_lagged(noise[s], order)[LONGEST - order :] for s in kept])
         now = np.concatenate([noise[s][LONGEST:] for s in kept])
+        past, now = past[known], now[known]
         a = np.asarray(np.linalg.lstsq(past, now, rcond=None)[0], float) if order else np.zeros(0)
         variance = float(np.mean((now - past @ a) ** 2))
         score = len(now) * np.log(variance + 1e-300) + order * np.log(len(now))
@@ -71,8 +81,9 @@ def whitener(residual: Array, columns: Array, segments: Sequence[slice]) -> tupl
             best = (score, a, variance)
     assert best is not None
     # Columns were fitted too: the innovations' variance is per degree of freedom left.
-    freedom = max(len(residual) - use.shape[1], len(residual) // 4)
-    sigma = float(np.sqrt(best[2] * len(residual) / freedom)) + 1e-15
+    n_good = int(np.count_nonzero(good))
+    freedom = max(n_good - use.shape[1], n_good // 4)
+    sigma = float(np.sqrt(best[2] * n_good / freedom)) + 1e-15
     found = Whitener(best[1], sigma, LONGEST)
     return found, found(noise, segments)
 

@@ -72,22 +72,21 @@ class Problem:
 
     def channel_fits(self, experiment: Experiment, theta: Array) -> Iterator[tuple[Array, Index, Array]]:
         """Of each channel in band: residual (n_band,), parameters it depends on (k,), its derivative (n_band, k)."""
-        motion = experiment.motion
         state = self.assembly.evaluate(experiment, theta)
-        modelled = motion.to_band(state.tau[:, self.channels])
-        for k, channel in enumerate(self.channels):
+        for channel in self.channels:
             banded = []
             for b in state.blocks:
                 if b.channel != channel or not len(b.index):
                     continue
                 columns = None if b.key is None else experiment.store.get(b.key)
                 if columns is None:
-                    columns = motion.to_band(b.values)
+                    columns = experiment.to_band(b.values, channel)
                     if b.key is not None:
                         experiment.store[b.key] = columns
                 banded.append(Block(b.channel, b.index, columns))
             index, columns = gather(banded, channel)
-            yield experiment.measured[:, channel] - modelled[:, k], index, columns.reshape(len(modelled), len(index))
+            residual = experiment.measured[:, channel] - experiment.to_band(state.tau[:, channel], channel)
+            yield residual, index, columns.reshape(len(residual), len(index))
 
     def normal(self, theta: Array, sigma: Array) -> Normal:
         """Cost, gradient and normal matrix, channels weighted by 1 / sigma (C,); inf where torque is not finite."""
@@ -107,8 +106,7 @@ class Problem:
     def rms(self, theta: Array) -> Array:
         """RMS residual of each of its channels in the analysis band (C,)."""
         residuals = [
-            e.measured[:, self.channels] - e.motion.to_band(self.assembly.torque(e, theta)[:, self.channels])
-            for e in self.experiments
+            (e.measured - e.all_to_band(self.assembly.torque(e, theta)))[:, self.channels] for e in self.experiments
         ]
         return np.sqrt(np.mean(np.concatenate(residuals) ** 2, axis=0))
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from .experiment import Experiment
 from .noise import Whitener, whitener
+from .rest import Without, near_rest, without
 
 Array = NDArray[np.float64]
 
@@ -19,24 +20,31 @@ MOST_BLOCKS = 24
 
 @dataclass(frozen=True)
 class Noise:
-    """Whitener and innovations of every channel, learnt once from the saturated model, and the time blocks."""
+    """Whitener and innovations of every channel, learnt once from the saturated model, and the time blocks.
+
+    Samples near rest of a channel's joint are left out of all but `whiten_all` and ``times``.
+    """
 
     whiteners: tuple[Whitener, ...]
+    moving: tuple[Without, ...]
     innovations: tuple[Array, ...]
-    blocks: NDArray[np.int_]
+    times: NDArray[np.int_]
+    """Time block of every innovation."""
+    n_blocks: int
     segments: tuple[tuple[slice, ...], ...]
 
     def whiten(self, channel: int, parts: Sequence[Array]) -> Array:
-        """Columns of one channel, all experiments, as innovations (n_white, k)."""
+        """Columns of one channel, all experiments, as innovations in motion (n_white, k)."""
+        return self.moving[channel](self.whiten_all(channel, parts))
+
+    def whiten_all(self, channel: int, parts: Sequence[Array]) -> Array:
+        """The same with the samples near rest (n_all, k)."""
         own = self.whiteners[channel]
         return np.concatenate([own(x, s) for x, s in zip(parts, self.segments, strict=True)])
 
-    def whiten_mask(self, channel: int, parts: Sequence[NDArray[np.bool_]]) -> NDArray[np.bool_]:
-        """Innovations that a marked sample reaches (n_white,)."""
-        own = self.whiteners[channel]
-        reach = len(own.coefficients) + 1
-        spread = [np.convolve(x, np.ones(reach))[: len(x)] > 0 for x in parts]
-        return np.concatenate([m[s][own.lead :] for m, p in zip(spread, self.segments, strict=True) for s in p])
+    def blocks(self, channel: int) -> NDArray[np.int_]:
+        """Time block of every innovation in motion (n_white,)."""
+        return self.moving[channel].first(self.times)
 
 
 def learn(experiments: Sequence[Experiment], residuals: Sequence[Array], columns: Sequence[Array]) -> Noise:
@@ -54,7 +62,8 @@ def learn(experiments: Sequence[Experiment], residuals: Sequence[Array], columns
     offsets = np.cumsum([0] + [len(r) for r in residuals])
     joined = [slice(s.start + o, s.stop + o) for o, parts in zip(offsets, segments, strict=False) for s in parts]
     whole = np.concatenate(list(residuals))
-    learnt = [whitener(whole[:, c], own, joined) for c, own in enumerate(columns)]
+    rest = [[near_rest(e, c) for e in experiments] for c in range(len(columns))]
+    learnt = [whitener(whole[:, c], own, joined, np.concatenate(rest[c])) for c, own in enumerate(columns)]
     lead = learnt[0][0].lead
     blocks, count = [], 0
     for e, parts in zip(experiments, segments, strict=True):
@@ -63,4 +72,12 @@ def learn(experiments: Sequence[Experiment], residuals: Sequence[Array], columns
         blocks.append(count + np.minimum(np.arange(n) * pieces // max(n, 1), pieces - 1))
         count += pieces
     whiteners, innovations = zip(*learnt, strict=True)
-    return Noise(whiteners, innovations, np.concatenate(blocks), segments)
+    moving = tuple(without(m, segments, w.coefficients, lead) for m, w in zip(rest, whiteners, strict=True))
+    return Noise(
+        whiteners,
+        moving,
+        tuple(pick(x) for pick, x in zip(moving, innovations, strict=True)),
+        np.concatenate(blocks),
+        count,
+        segments,
+    )

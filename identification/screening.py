@@ -1,32 +1,35 @@
 """One screening: every effect at every place and shape judged on top of a fit, and the noise they are judged
 against."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..models.model import Model, Placed
-from .assembly import Block, Evaluation
-from .candidates import Variant, candidate_columns, free_parameters, library, smooth_columns, variants
-from .closed_loop import REST
+from ..models.model import Model
+from .assembly import Assembly, Block, Evaluation
+from .candidates import Variant, candidate_columns, free_parameters, library, nameless_columns, smooth_columns, variants
 from .diagnosis import Limit
-from .evidence import Channel, Evidence, Products
+from .evidence import Channel, Evidence
 from .experiment import Experiment
 from .fit import Fit
+from .judged import Case, Judged, Parts, Samples
 from .problem import gather
+from .rest import bridged, friction_less, in_motion
 from .saturated import Noise, learn
 
 Array = NDArray[np.float64]
-Parts = list[Array]
-"""One array an experiment."""
 
 RAW_BLOCKS = 12
 """Blocks of unwhitened samples, each predicted from the others."""
 
 WORTH = 0.05
 """Least share of its channels' residual energy that an effect must explain to be named."""
+
+MOST = 0.5
+"""Share of its channels' residual energy, near rest too, from which on an effect with a memory of where the joint
+turned is named for what it does near rest: joints that stick and rounded signs look like one, and leave most of it."""
 
 NULLS = 200
 
@@ -35,62 +38,18 @@ LEVEL = 0.995
 
 
 @dataclass(frozen=True)
-class Judged:
-    """A candidate and what the recordings say of it.
-
-    Parameters
-    ----------
-    variant : Variant
-        Best point of the effect's shape grid, and the amplitudes that the data asks for.
-    placed : Placed
-        Effect and place, with the parameters to hold.
-    amplitudes : array (k,)
-    score : float
-        Log-likelihood gained, less ½ log(samples) for each parameter.
-    price : float
-        What was taken off.
-    explained : float
-        Share of the residual energy of the channels it reaches, 0 to 1.
-    channels : tuple of int
-        Channels it reaches.
-    products : Products
-    columns : mapping of int to array (n_white, k)
-        Its whitened columns on each channel.
-    """
-
-    variant: Variant
-    placed: Placed
-    amplitudes: Array
-    score: float
-    price: float
-    explained: float
-    channels: tuple[int, ...]
-    products: Products
-    columns: Mapping[int, Array]
-
-    def signal(self) -> dict[int, Array]:
-        """What it explains of each channel, whitened (n_white,)."""
-        return {c: x @ self.amplitudes for c, x in self.columns.items()}
-
-    def start(self) -> dict[str, float]:
-        """Starting values by key for the joint refit."""
-        full = self.variant.start(self.amplitudes)
-        names = [p.name for p in self.placed.effect.parameters]
-        return {f"{self.placed.key}.{name}": float(value) for name, value in zip(names, full, strict=True)}
-
-
-@dataclass(frozen=True)
 class Screening:
     """Candidates best first, the score that noise alone reaches on each set of channels, and what nameless curves
     explain."""
 
     evidence: Evidence
-    moving: Evidence
-    """The same without the samples near rest of each channel's joint."""
-    at_rest: tuple[NDArray[np.bool_], ...]
+    near_rest: Samples
+    """Samples near rest too, on which some of the candidates were judged."""
     judged: tuple[Judged, ...]
     threshold: Mapping[tuple[int, ...], float]
     nameless: Mapping[int, float]
+    over: Mapping[int, str]
+    """What the nameless curves run over, in words."""
     limits: tuple[Limit, ...]
     noise: Noise
 
@@ -120,108 +79,174 @@ def screen(
         Of the sign-flipped nulls.
     """
     assembly = found.assembly
-    states = [assembly.evaluate(e, found.theta) for e in instruments]
-    residuals = [
-        (assembly.residual(e, found.theta)[0], assembly.residual(z, found.theta)[1])
-        for e, z in zip(experiments, instruments, strict=True)
-    ]
-    baseline = _baseline(found, residuals, len(model.joints))
-    exact = [assembly.evaluate(e, found.theta) for e in experiments]
+    moving, planned = [bridged(e) for e in experiments], [bridged(z) for z in instruments]
+    states, exact = ([assembly.evaluate(e, found.theta) for e in some] for some in (instruments, experiments))
+    residuals, baseline = _left(found, moving, planned)
     pool = []
     for p in library(model):
         # Friction that sticks shows in the smallest motion only: a low-passed one has lost it.
-        source = (experiments, exact) if p.effect.at_rest else (instruments, states)
+        source = (moving, exact) if p.effect.at_rest else (planned, states)
         pool.append([(v, _columns(found, *source, v)) for v in variants(assembly, p)])
-    smooth = [
-        [smooth_columns(e, s, c) for e, s in zip(instruments, states, strict=True)] for c in range(len(model.joints))
-    ]
+    smooth = [[smooth_columns(e, s, c) for e, s in zip(planned, states, strict=True)] for c in range(len(model.joints))]
     if noise is None:
-        noise = learn(experiments, [r for r, _ in residuals], _saturated(baseline, pool, smooth))
-    white, plain, awake, at_rest = [], [], [], []
-    for c, parts in enumerate(baseline):
-        index, own = parts[0][0], [r[:, c] for r, _ in residuals]
-        columns = [x for _, x in parts]
-        rest = noise.whiten_mask(c, [_near_rest(e, c) for e in experiments])
-        # Nulls leave the samples near rest out: what sticks there is no noise.
-        innovations = noise.innovations[c] * ~rest
-        white.append(Channel(index, noise.whiten(c, columns), noise.whiten(c, own), innovations, noise.blocks))
-        w = white[-1]
-        awake.append(Channel(index, w.columns[~rest], w.residual[~rest], w.noise[~rest], w.block[~rest]))
-        at_rest.append(rest)
-        r = np.concatenate(own) / found.sigma[c]
-        block = np.arange(len(r)) * RAW_BLOCKS // len(r)
-        plain.append(Channel(index, np.concatenate(columns) / found.sigma[c], r, 0 * r, block))
-    n_parameters = len(found.theta)
-    evidence = Evidence(white, n_parameters, int(noise.blocks[-1]) + 1, NULLS, seed)
-    moving = Evidence(awake, n_parameters, int(noise.blocks[-1]) + 1, 1, seed)
-    raw = Evidence(plain, n_parameters, RAW_BLOCKS, 1, seed)
-    energy = np.array([float(np.sum(c.residual**2)) for c in raw.channels])
-
+        noise = learn(moving, residuals, _saturated(baseline, pool, smooth))
+    samples = _samples(found, baseline, residuals, noise, in_motion(experiments), {}, seed)
+    # Columns from the motion as measured are judged beside a baseline from the same.
+    close = _samples(found, _left(found, moving, moving)[1], residuals, noise, in_motion(experiments), {}, seed)
+    # Friction above its level near rest is evidence, too: whatever sticks there stays below it.
+    held = {c: [friction_less(e, c) for e in experiments] for c in range(len(model.joints))}
+    residuals, baseline = _left(found, experiments, experiments)
+    near_rest = _samples(found, baseline, residuals, noise, None, held, seed)
+    log_size = np.log(samples.evidence.size)
     judged: list[Judged] = []
     null: dict[tuple[int, ...], Array] = {(c,): np.zeros(NULLS) for c in range(len(model.joints))}
-    limits: list[Limit] = []
-    log_size = np.log(evidence.size)
     for options in pool:
-        best: tuple[float, float, Variant, Array, Products, dict[int, Parts]] | None = None
-        for subset in options[0][0].subsets():
-            first = _with(options[0][0], subset)
-            price = 0.5 * log_size * len(free_parameters(assembly, instruments[0], states[0], first))
-            for whole, columns in options:
-                variant = _with(whole, subset)
-                own = {c: [x[:, subset] for x in parts] for c, parts in columns.items()}
-                products = evidence.products([(c, noise.whiten(c, parts)) for c, parts in own.items()])
-                gain = evidence.gain(products, variant.low, variant.high)
-                if gain.total <= 0:
-                    continue
-                if best is None or gain.total - price > best[0]:
-                    best = (gain.total - price, price, variant, gain.amplitudes, products, own)
-                if not variant.placed.effect.at_rest:
-                    reached = tuple(own)
-                    null[reached] = np.maximum(null.get(reached, 0.0), evidence.null_gains(products) - price)
-        if best is None:
-            continue
-        score, price, variant, amplitudes, products, own = best
-        plain_products = raw.products([(c, np.concatenate(x) / found.sigma[c]) for c, x in own.items()])
-        explained = 2 * raw.gain(plain_products, variant.low, variant.high).total / energy[list(own)].sum()
-        free = free_parameters(assembly, instruments[0], states[0], variant)
-        hold = tuple(p.name for p in variant.placed.effect.parameters if p.name not in free)
-        placed = replace(variant.placed, hold=hold)
-        columns = {c: noise.whiten(c, parts) for c, parts in own.items()}
-        judged.append(Judged(variant, placed, amplitudes, score, price, explained, tuple(own), products, columns))
+
+        def price(variant: Variant) -> float:
+            return 0.5 * log_size * len(free_parameters(assembly, instruments[0], states[0], variant))
+
+        def everywhere(variant: Variant) -> dict[int, Parts]:
+            return _columns(found, experiments, exact, variant)
+
+        effect = options[0][0].placed.effect
+        found_so = [_judge(close if effect.at_rest else samples, noise, options, price, null, everywhere)]
+        measured = [(v, everywhere(v)) for v, _ in options] if effect.exceeds_at_rest or effect.remembers else []
+        if effect.exceeds_at_rest:
+            found_so.append(_judge(near_rest, noise, measured, price, None, everywhere))
+        if effect.remembers:
+            j = _judge(near_rest.alone(), noise, measured, price, None, everywhere)
+            found_so += [j] if j is not None and j.explained > MOST else []
+        j = found_so[0]
+        if effect.at_rest and j is not None and j.case.share() > WORTH:
+            # What is plain in motion may be worth its name for what it does near rest.
+            whole = near_rest.alone().explained(j.variant, everywhere(j.variant))
+            found_so[0] = replace(j, explained=max(j.explained, whole))
+        better = max((j for j in found_so if j is not None), key=lambda j: j.score, default=None)
+        if better is not None:
+            free = free_parameters(assembly, instruments[0], states[0], better.variant)
+            hold = tuple(p.name for p in better.placed.effect.parameters if p.name not in free)
+            judged.append(replace(better, placed=replace(better.placed, hold=hold)))
     threshold = {channels: float(np.quantile(x, LEVEL)) for channels, x in null.items()}
-    for j in judged:
-        rest = j.variant.amplitudes[1:]
-        if len(j.variant.amplitudes) and all(j.placed.effect.parameters[i].grid for i in rest):
-            p = j.placed.effect.parameters[int(j.variant.amplitudes[0])]
-            # Both bars count: a score above noise, and a share of the residual worth a name.
-            needed = max(threshold[j.channels] + j.price, 0.5 * WORTH * sum(_energy(white[c]) for c in j.channels))
-            value = evidence.smallest(j.products, needed)
-            limits.append(Limit(j.placed.effect.name, j.placed.at, p.name, value, assembly.unit(j.placed, p)))
-    nameless = {}
-    for c, parts in enumerate(smooth):
-        products = evidence.products([(c, noise.whiten(c, parts))])
-        free = np.full(products.right.shape[1], np.inf)
-        gain = evidence.gain(products, -free, free).total - 0.5 * len(free) * log_size
-        if gain > threshold[(c,)] and reliably_positive(evidence.fresh_gains(products, -free, free)):
-            plain_products = raw.products([(c, np.concatenate(parts) / found.sigma[c])])
-            nameless[c] = float(2 * np.sum(raw.fresh_gains(plain_products, -free, free)) / energy[c])
+    limits = [
+        limit for j in judged for limit in _limits(assembly, samples.evidence, j, threshold[j.channels] + j.price)
+    ]
+    nameless: dict[int, float] = {}
+    over: dict[int, str] = {}
+    for c in range(len(model.joints)):
+        curves = [nameless_columns(e, s, c) for e, s in zip(planned, states, strict=True)]
+        for words in curves[0]:
+            parts = [x[words] for x in curves]
+            free = np.full(parts[0].shape[1], np.inf)
+            variant = replace(pool[0][0][0], low=-free, high=free)
+            case = samples.case(variant, {c: parts})
+            score = case.gain().total - 0.5 * len(free) * log_size
+            # A curve is no taller than what is left over, before it is seen. Neither the worst block counts nor the
+            # best: one may go where no other has been.
+            spread = float(found.sigma[c])
+            if score > threshold[(c,)] and reliably_positive(np.sort(case.fresh_gains(spread))[1:-1]):
+                share = min(samples.foreseen(variant, {c: parts}, spread), 1.0)
+                if share > nameless.get(c, 0.0):
+                    nameless[c], over[c] = share, words
     judged.sort(key=lambda j: -j.score)
-    return Screening(evidence, moving, tuple(at_rest), tuple(judged), threshold, nameless, tuple(limits), noise)
+    return Screening(samples.evidence, near_rest, tuple(judged), threshold, nameless, over, tuple(limits), noise)
 
 
-def _energy(channel: Channel) -> float:
-    return float(np.sum(channel.residual**2))
+def _left(
+    found: Fit, experiments: Sequence[Experiment], instruments: Sequence[Experiment]
+) -> tuple[list[Array], list[list[tuple[NDArray[np.int_], Array]]]]:
+    """Residual of every recording (n_band, J), and the baseline's columns from the motion that was asked for."""
+    assembly = found.assembly
+    pairs = [
+        (assembly.residual(e, found.theta)[0], assembly.residual(z, found.theta)[1])
+        for e, z in zip(experiments, instruments, strict=True)
+    ]
+    return [r for r, _ in pairs], _baseline(found, pairs, len(assembly.tree.joints))
+
+
+def _samples(
+    found: Fit,
+    baseline: Sequence[Sequence[tuple[NDArray[np.int_], Array]]],
+    residuals: Sequence[Array],
+    noise: Noise,
+    keep: NDArray[np.bool_] | None,
+    beside: Mapping[int, Parts],
+    seed: int,
+) -> Samples:
+    """The samples in motion (``keep``, (n_band, J)), or all of them (None)."""
+    n = sum(map(len, residuals))
+
+    def whiten(c: int, parts: Sequence[Array]) -> Array:
+        return noise.whiten_all(c, parts) if keep is None else noise.whiten(c, parts)
+
+    def plain(c: int, parts: Sequence[Array]) -> Array:
+        x = np.concatenate(list(parts)) / found.sigma[c]
+        return x if keep is None else x[keep[:, c]]
+
+    white, raw = [], []
+    block = np.arange(n) * RAW_BLOCKS // n
+    for c, parts in enumerate(baseline):
+        index, own, columns = parts[0][0], [r[:, c] for r in residuals], [x for _, x in parts]
+        r = whiten(c, own)
+        innovations = 0 * r if keep is None else noise.innovations[c]
+        white.append(
+            Channel(index, whiten(c, columns), r, innovations, noise.times if keep is None else noise.blocks(c))
+        )
+        r = plain(c, own)
+        raw.append(Channel(index, plain(c, columns), r, 0 * r, block if keep is None else block[keep[:, c]]))
+    evidence = Evidence(white, len(found.theta), noise.n_blocks, NULLS if keep is not None else 1, seed)
+    return Samples(evidence, Evidence(raw, len(found.theta), RAW_BLOCKS, 1, seed), whiten, plain, beside)
+
+
+def _judge(
+    samples: Samples,
+    noise: Noise,
+    options: Sequence[tuple[Variant, dict[int, Parts]]],
+    price_of: Callable[[Variant], float],
+    null: dict[tuple[int, ...], Array] | None,
+    everywhere: Callable[[Variant], dict[int, Parts]],
+) -> Judged | None:
+    """The best point of an effect's grid and set of amplitudes; None where no point gains anything.
+
+    What noise alone reaches is entered in ``null``.
+    """
+    best: tuple[float, float, Variant, Array, Case, dict[int, Parts]] | None = None
+    for subset in options[0][0].subsets():
+        price = price_of(_with(options[0][0], subset))
+        for whole, columns in options:
+            variant = _with(whole, subset)
+            own = {c: [x[:, subset] for x in parts] for c, parts in columns.items()}
+            case = samples.case(variant, own)
+            gain = case.gain()
+            if gain.total <= 0:
+                continue
+            if best is None or gain.total - price > best[0]:
+                best = (gain.total - price, price, variant, gain.amplitudes[: len(subset)], case, own)
+            if null is not None:
+                reached = tuple(own)
+                null[reached] = np.maximum(null.get(reached, 0.0), samples.evidence.null_gains(case.own) - price)
+    if best is None:
+        return None
+    score, price, variant, amplitudes, case, own = best
+    columns = {c: noise.whiten(c, parts) for c, parts in own.items()}
+    explained = samples.explained(variant, own)
+    return Judged(variant, variant.placed, amplitudes, score, price, explained, tuple(own), case, columns, everywhere)
+
+
+def _limits(assembly: Assembly, evidence: Evidence, j: Judged, needed: float) -> list[Limit]:
+    """The smallest amplitude of an effect that would have passed; none where it has no single amplitude."""
+    parameters, amplitudes = j.placed.effect.parameters, j.variant.amplitudes
+    if not len(amplitudes) or not all(parameters[i].grid for i in amplitudes[1:]):
+        return []
+    p = parameters[int(amplitudes[0])]
+    # Both bars count: a score above noise, and a share of the residual worth a name.
+    energy = sum(float(np.sum(evidence.channels[c].residual ** 2)) for c in j.channels)
+    value = evidence.smallest(evidence.products(list(j.columns.items())), max(needed, 0.5 * WORTH * energy))
+    return [Limit(j.placed.effect.name, j.placed.at, p.name, value, assembly.unit(j.placed, p))]
 
 
 def reliably_positive(gains: Array, errors: float = 2.0) -> bool:
     """Mean over blocks left out above zero by so many standard errors (two: one-sided 2.5 %)."""
     return bool(np.mean(gains) > errors * np.std(gains, ddof=1) / np.sqrt(len(gains)))
-
-
-def _near_rest(experiment: Experiment, joint: int) -> NDArray[np.bool_]:
-    """Samples of the analysis band within REST of the joint's peak speed from standing still."""
-    speed = np.abs(experiment.motion.to_band(experiment.motion.qd)[:, joint])
-    return speed < REST * np.max(speed)
 
 
 def _with(variant: Variant, subset: NDArray[np.int_]) -> Variant:

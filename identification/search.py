@@ -21,13 +21,17 @@ from .closed_loop import planned
 from .evidence import ABSORBED
 from .experiment import Experiment, Scales
 from .fit import Fit, fit
-from .rig_terms import PLACES
-from .screening import WORTH, Judged, Screening, reliably_positive, screen
+from .judged import Judged
+from .rest import fitted
+from .screening import WORTH, Screening, reliably_positive, screen
 
 Array = NDArray[np.float64]
 
 ALIKE = 0.98
 """Cosine from which on two effects explain the same."""
+
+TIE = 2.0
+"""Difference of two scores that says nothing."""
 
 MOST_ROUNDS = 8
 BOOTSTRAPS = 400
@@ -102,7 +106,8 @@ def search(
     taken: list[Taken] = []
     if before is None:
         progress("fitting the baseline")
-        first = found = fit(assemble(model, base, scales), experiments, progress=progress, seed=seed)
+        assembly = assemble(model, base, scales)
+        first = found = fit(assembly, fitted(assembly, experiments), progress=progress, seed=seed)
         progress("round 1: screening every effect at every place")
         instruments = planned(found, experiments)
         opening = result = screen(model, found, experiments, instruments, None, seed)
@@ -120,7 +125,9 @@ def search(
         model = model.with_effects([j.placed for j in chosen], start)
         progress("refitting with " + ", ".join(f"{j.placed.effect.name} at {j.placed.at}" for j in chosen))
         assembly = assemble(model, base, scales)
-        found = fit(assembly, experiments, start=carry(found, assembly), multi_start=False)
+        # What rings has a local optimum at many a frequency; the screening's columns leave its damping where it is.
+        rings = any(j.placed.effect.at == "base" and j.placed.effect.states for j in chosen)
+        found = fit(assembly, fitted(assembly, experiments), start=carry(found, assembly), multi_start=rings, seed=seed)
         progress(f"round {number}: screening every effect at every place")
         instruments = planned(found, experiments, instruments)
         result = screen(model, found, experiments, instruments, opening.noise, seed)
@@ -144,10 +151,46 @@ def _passing(result: Screening) -> list[Judged]:
     for j in result.judged:
         if j.score <= result.threshold[j.channels] or j.explained < WORTH:
             continue
-        fresh = result.evidence.fresh_gains(j.products, j.variant.low, j.variant.high)
-        if reliably_positive(fresh) and _holds_in_motion(result, j):
+        if reliably_positive(j.case.fresh_gains()):
             passing.append(j)
+    for j in [j for j in passing if _near_rest(result, j)]:
+        # Scores on different samples do not compare: those that beat it on its own go first.
+        others = [o for o in passing if o is not j and set(o.channels) == set(j.channels)]
+        better = [o for o in others if _same_samples(result, j, o).score > j.score]
+        passing.remove(j)
+        passing.insert(max((passing.index(o) + 1 for o in better), default=0), j)
+    return _untied(result, passing)
+
+
+def _untied(result: Screening, passing: list[Judged]) -> list[Judged]:
+    """Twins, which explain the same in motion and as well, in the order of what they explain near rest, too.
+
+    That is weak evidence, since a joint that sticks may hold anything; it only orders what nothing else does.
+    """
+    for k in range(len(passing)):
+        j = passing[k]
+        twins = [
+            o
+            for o in passing[k + 1 :]
+            if o.channels == j.channels
+            and j.score - o.score < TIE
+            and result.evidence.likeness(j.signal(), o.signal()) > ALIKE
+        ]
+        if twins and not _near_rest(result, j):
+            best = max([j, *twins], key=lambda o: o.among(result.near_rest).score)
+            passing.remove(best)
+            passing.insert(k, best)
     return passing
+
+
+def _same_samples(result: Screening, j: Judged, other: Judged) -> Judged:
+    """The other candidate on the samples that the first was judged on."""
+    return other if _near_rest(result, other) or not _near_rest(result, j) else other.among(result.near_rest)
+
+
+def _near_rest(result: Screening, j: Judged) -> bool:
+    """Was it judged on samples near rest, too?"""
+    return j.case.evidence is result.near_rest.evidence
 
 
 def _choose(result: Screening, passing: Sequence[Judged]) -> list[Judged]:
@@ -191,20 +234,6 @@ def _together(result: Screening, several: Sequence[Judged]) -> float:
     return gain.total - sum(j.price for j in several)
 
 
-def _holds_in_motion(result: Screening, j: Judged) -> bool:
-    """Does it still pass with the samples near rest left out? Stuck friction poses as delay, elasticity and
-    Stribeck."""
-    if j.placed.effect.at_rest or j.placed.effect.at in (*PLACES, "base"):
-        return True  # what a sling does shows on joints that stand still while others move
-    moving = result.moving
-    products = moving.products([(c, x[~result.at_rest[c]]) for c, x in j.columns.items()])
-    gain = moving.gain(products, j.variant.low, j.variant.high)
-    energy = sum(float(np.sum(moving.channels[c].residual ** 2)) for c in j.channels)
-    fresh = moving.fresh_gains(products, j.variant.low, j.variant.high)
-    enough = gain.total - j.price > result.threshold[j.channels] and 2 * gain.total > WORTH * energy
-    return enough and reliably_positive(fresh, 1.0)
-
-
 def _weigh(result: Screening, best: Judged, passing: Sequence[Judged], seed: int) -> Taken:
     """Bootstrap over time blocks: how often does each candidate on these channels beat all others?"""
     evidence = result.evidence
@@ -218,7 +247,9 @@ def _weigh(result: Screening, best: Judged, passing: Sequence[Judged], seed: int
         and j.score > 0.2 * best.score
     ]
     rivals = rivals[:8]
-    gains = np.array([evidence.shares(j.products, j.amplitudes) for j in rivals])
+    near_rest = any(_near_rest(result, j) for j in rivals)
+    alike = [j.among(result.near_rest) if near_rest else j for j in rivals]
+    gains = np.array([j.case.shares() for j in alike])
     price = np.array([j.price for j in rivals])
     rng = np.random.default_rng(seed)
     counts = rng.multinomial(evidence.n_blocks, np.full(evidence.n_blocks, 1 / evidence.n_blocks), BOOTSTRAPS)

@@ -111,8 +111,15 @@ class Effect:
         Simpler effects that are special cases of this one. A search names the simpler one first, and this one only for
         what is then left (the principle of marginality: Nelder 1977).
     at_rest : bool
-        True where the effect shows while the joint seems to stand still. Any other effect must also hold up with the
-        samples near rest left out, where static friction laws say nothing.
+        True where the effect shows near rest above all. It must pass in motion like any other, but the share of the
+        residual that makes it worth a name counts near rest, too, and its columns come from the motion as measured, not
+        from a low-passed one.
+    remembers : bool
+        True where friction near rest depends on where the joint turned. Samples near rest count for such an effect if
+        it explains most of what is left.
+    exceeds_at_rest : bool
+        True where the effect raises friction near rest above its level in motion. Samples near rest count for such an
+        effect: a joint that sticks stays below the level. All others are judged in motion only.
     experiment : str
         The motion or measurement that shows this effect apart from others, as an instruction: "move {at} slowly ...".
     """
@@ -132,4 +139,6 @@ class Effect:
     dissipates: bool = False
     contains: tuple[str, ...] = ()
     at_rest: bool = False
+    remembers: bool = False
+    exceeds_at_rest: bool = False
     experiment: str = ""

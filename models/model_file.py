@@ -146,6 +146,8 @@ def _placed(path: Path, entries: Any, tree: Tree) -> tuple[Placed, ...]:
         if effect.at == "sensor" and effect.states:
             # A late position shows as an early torque; what else an encoder does would be read as torque.
             allowed += tuple(f"q.{j.name}" for j in tree.joints)
+        if effect.at == "sensor":
+            allowed += tuple(f"q_link.{j.name}" for j in tree.joints)
         if at is not None and at not in allowed:
             raise InputError(f"{path}: {name} at {at!r}; this model has {', '.join(allowed)}")
         hold = entry.get("hold", []) if isinstance(entry, dict) else []

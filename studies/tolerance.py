@@ -1,54 +1,96 @@
-"""How far off can the target be and still be captured? The ground test over misalignment and friction.
+"""How far off can the arm arrive and still capture? The ground test and the inspection case over all that is not known.
 
-Chooses cases where success is in doubt until the boundary is narrow, runs the paper's own misalignment by itself, and
-goes on where it was stopped. The cases are kept in ``build/studies/tolerance/cases``.
+Chooses cases where success is in doubt until the boundary is narrow or the cases are used up, runs the paper's own
+misalignment by itself, and goes on where it was stopped. The cases are kept in
+``build/studies/tolerance/<study>-<version>``, a folder for each version of the physics.
 """
 
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 from ..errors import InputError
+from ..report.html import page
+from ..report.html import table as markup_table
 from ..tolerance.report import summarise
 from ..tolerance.results import Results
 from ..tolerance.run import run_study
-from ..tolerance.study import load_study
+from ..tolerance.study import Study, load_study
 from .outcome import FOLDER, Quantity, table, write_result
 
-STUDY = Path(__file__).parents[1] / "tolerance" / "ground.toml"
+STUDIES = ("ground", "inspection")
+_FILES = Path(__file__).parents[1] / "tolerance"
 
 
 def main() -> int:
-    """Run the study, or go on with it; leaves report and numbers in ``build/studies/tolerance``."""
+    """Run both studies, or go on with them; leaves reports and numbers in ``build/studies/tolerance``."""
     begun = time.monotonic()
     folder = FOLDER / "tolerance"
     folder.mkdir(parents=True, exist_ok=True)
-    study = load_study(STUDY)
-    results = Results(folder / "cases", study)
-    known = len(results)
-    run_study(study, results, say=lambda text: print(f"  {text}", flush=True))
-    content = summarise(study, results)
-    seconds = time.monotonic() - begun
-    quantities = [
-        _quantity("probability_at_paper", "1", content["probability_box"]),
-        _quantity("envelope_radial", "m", content["envelope_radial"]),
-        _quantity("envelope_angle", "rad", content["envelope_angle"]),
-        Quantity("undecided", "1", content["width"], "reference"),
-    ]
-    if len(results) > known:
-        quantities.append(Quantity("seconds_per_case", "s", seconds / (len(results) - known), "reference"))
-    (folder / "report.html").write_bytes((results.folder / "report.html").read_bytes())
-    write_result("tolerance", quantities, seconds, {"found": content["sentence"], "cases": len(results)})
-    print(f"{table(quantities)}\n\n{content['sentence']}\nReport: {(folder / 'report.html').resolve()}")
+    quantities, found = [], []
+    for name in STUDIES:
+        results, content, seconds = _run(folder, load_study(_FILES / f"{name}.toml"))
+        quantities += _quantities(name, content)
+        if seconds is not None:
+            quantities.append(Quantity(f"{name}_seconds_per_case", "s", seconds, "reference"))
+        found.append((content, results.folder.name))
+        print(f"  {content['sentence']}", flush=True)
+    sentences = " ".join(content["sentence"] for content, _ in found)
+    (folder / "report.html").write_text(_page(sentences, quantities, found), encoding="utf-8")
+    write_result("tolerance", quantities, time.monotonic() - begun, {"found": sentences})
+    print(f"{table(quantities)}\n\n{sentences}\nReport: {(folder / 'report.html').resolve()}")
     return 0
+
+
+def _run(folder: Path, study: Study) -> tuple[Results, dict[str, Any], float | None]:
+    """Results, their summary, and the time by the clock a case took [s], where cases were run."""
+    results = Results(folder / f"{study.name}-{study.capture.version}", study)
+    known, begun = len(results), time.monotonic()
+    run_study(study, results, say=lambda text: print(f"  {study.name}: {text}", flush=True))
+    new = len(results) - known
+    seconds = (time.monotonic() - begun) / new if new else None
+    return results, summarise(study, results), seconds
+
+
+def _quantities(name: str, content: dict[str, Any]) -> list[Quantity]:
+    return [
+        _quantity(f"{name}_probability_at_paper", "1", content["probability_box"]),
+        _quantity(f"{name}_envelope_radial", "m", content["envelope_radial"]),
+        _quantity(f"{name}_envelope_angle", "rad", content["envelope_angle"]),
+        Quantity(f"{name}_undecided", "1", content["width"], "reference"),
+        Quantity(f"{name}_cases", "1", content["cases"], "reference"),
+    ]
 
 
 def _quantity(name: str, unit: str, interval: dict[str, float | None]) -> Quantity:
     """The envelope's ends are ordered by probability, which is not always by size."""
     if interval["value"] is None:
-        raise InputError(f"tolerance: {name} is unknown: the nominal capture fails; look at {STUDY.name}'s criterion")
+        raise InputError(f"tolerance: {name} is unknown: the nominal capture fails; look at the study's criterion")
     ends = sorted(x for x in (interval["low"], interval["high"]) if x is not None)
     return Quantity(name, unit, interval["value"], "reference", None, ends[0], ends[-1])
+
+
+def _page(sentences: str, quantities: list[Quantity], found: list[tuple[dict[str, Any], str]]) -> str:
+    links = "".join(
+        f'<li><a href="{folder}/report.html">{content["study"]}</a>: maps, envelope, sensitivities'
+        f"{', typical misses to play' if content['misses'] else ''}.</li>"
+        for content, folder in found
+    )
+    rows = [
+        [q.name.replace("_", " "), f"{q.ours:.4g}", "" if q.low is None else f"{q.low:.4g} to {q.high:.4g}", q.unit]
+        for q in quantities
+    ]
+    numbers = markup_table(
+        "Intervals of probabilities are exact at 95 % (Clopper and Pearson); those of an envelope run from where "
+        "success is 95 % likely to where it is 5 %.",
+        ["quantity", "ours", "interval", "unit"],
+        rows,
+        numeric=(1, 2),
+    )
+    parts = [("numbers", "In numbers", numbers), ("studies", "The two studies", f"<ul>{links}</ul>")]
+    header = f"<h1>{sentences}</h1>"
+    return page("Capture tolerances", header, parts, "Written by snarelab: make study-tolerance.")
 
 
 if __name__ == "__main__":

@@ -7,10 +7,19 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import pytest
+from dask import config as dask_config
+
+from snarelab.tolerance import run
+from snarelab.tolerance.capture import Axis, Capture, Outcome
+from snarelab.tolerance.results import Results
+from snarelab.tolerance.study import Study, Success
 
 TOY = """
 import os, time
@@ -25,7 +34,7 @@ def run(values):
     if once and y > 0.05 and not Path(once).exists():
         Path(once).touch()
         os.kill(os.getpid(), 9)
-    if os.environ.get("DIE_ALWAYS") and y > 0.08:
+    if os.environ.get("DIE_ALWAYS") and y > 0.09:
         os.kill(os.getpid(), 9)
     if z > 0.09:
         raise ArithmeticError("the step diverged at 1.2 s")
@@ -51,6 +60,9 @@ strength = 800.0
 """
 
 
+SLOW = partial(lambda values, outcome: (time.sleep(0.2), outcome)[1], outcome=Outcome(True, 0.0, 1.0, 1.0, 1.0))
+
+
 @pytest.fixture
 def command(tmp_path: Path):
     (tmp_path / "toy_capture.py").write_text(TOY)
@@ -73,7 +85,12 @@ def command(tmp_path: Path):
 
 
 def finish(process: subprocess.Popen, status: int = 0) -> str:
-    out, error = process.communicate(timeout=120)
+    try:
+        out, error = process.communicate(timeout=240)
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.communicate()
+        raise
     assert process.returncode == status, error
     return out + error
 
@@ -117,8 +134,28 @@ def test_a_lost_worker_costs_its_case_only(command, tmp_path):
     always = pd.read_parquet(tmp_path / "always" / "cases.parquet")
     lost = always["reason"].str.contains("worker was killed").to_numpy()
     assert lost.any()
-    assert (always["radial_y"].to_numpy()[lost] > 0.08).all()
+    assert (always["radial_y"].to_numpy()[lost] > 0.09).all()
     pd.testing.assert_frame_equal(well.iloc[~lost], always.iloc[~lost], check_exact=True)
+
+
+def test_a_worker_that_is_gone_for_good_is_replaced(tmp_path, monkeypatch):
+    """Dask gives up on a worker whose restart fails; nothing would ever come back from it."""
+    monkeypatch.setattr(run, "WATCH", 0.5)
+    axes = (Axis("radial_y", "m", "", 0.0, -1.0, 1.0),)
+    success, ranges = Success(0.01, 800.0), {"radial_y": (-0.1, 0.1)}
+    slow = Capture("slow", axes, SLOW)
+    study = Study(tmp_path, "slow", slow, 1, "sobol", 4, 4, 0.1, ranges, {}, success, {}, 1)
+    results = Results(tmp_path / "out", study)
+    with dask_config.set({"distributed.deploy.lost-worker-timeout": "100ms"}), run.local_cluster(1) as cluster:
+        lost: Any = cluster.workers[0]
+
+        def lose(text: str) -> None:
+            if len(results) == 1:
+                cluster.sync(lost.close)
+
+        monkeypatch.setattr(run, "local_cluster", lambda jobs: nullcontext(cluster))
+        run.run_study(study, results, jobs=1, say=lose)
+    assert len(results) == 4
 
 
 def test_a_case_that_diverges_is_an_outcome(command, tmp_path):

@@ -1,6 +1,7 @@
 """Study files and results folders: every mistake is one line that names it."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -41,6 +42,18 @@ def write(tmp_path: Path, monkeypatch):
     return save
 
 
+def test_results_of_another_version_are_refused(write, tmp_path):
+    study = load_study(write(GOOD))
+    Results(tmp_path / "out", study)
+    newer = replace(study, capture=replace(study.capture, version="b"))
+    with pytest.raises(InputError, match=r"holds results of another study \(version was , is b\); name a new folder"):
+        Results(tmp_path / "out", newer)
+
+
+def test_one_value_for_all_cases_of_the_box(write):
+    assert load_study(write(GOOD.replace("[-0.02, 0.02]", "0.02"))).box == {"radial_y": (0.02, 0.02)}
+
+
 def test_a_good_study(write):
     study = load_study(write(GOOD))
     assert study.ranges == {"radial_y": (-0.1, 0.1)}
@@ -64,6 +77,14 @@ def test_a_good_study(write):
         ("own_capture:CAPTURE", "nowhere:CAPTURE", "cannot be loaded"),
         ("capture =", "batch = 0\ncapture =", "batch = 0; allowed is a whole number from 1"),
         ("capture =", "sampling = 'grid'\ncapture =", "sampling = 'grid'; allowed are adaptive, sobol"),
+        (
+            "capture =",
+            "cases = 2000\ncapture =",
+            "cases = 2000; adaptive sampling takes at most 1000; give that",
+        ),
+        ("cases = 10", "ends = 1", r"\[box\] ends = 1; allowed is true or false"),
+        ("radial_y = [-0.02, 0.02]", "radial_y = 0.2", r"\[box\] radial_y = \[0.2, 0.2\] is not within \[ranges\]"),
+        ("radial_y = [-0.1, 0.1]", "radial_y = 0.1", r"\[ranges\] radial_y = 0.1; allowed is \[low, high\] in m"),
         ("capture =", "seed = [\ncapture =", "not a TOML file"),
     ],
 )

@@ -8,7 +8,9 @@ al. 2005), chosen one after another with the deviation updated as if the earlier
 """
 
 import warnings
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -16,7 +18,7 @@ from scipy.stats import norm, qmc
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 UNDECIDED = (0.05, 0.95)
 _REFERENCE = 4096
@@ -41,7 +43,7 @@ class Boundary:
 
     def margin(self, unit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and standard deviation of the margin at points of the unit cube, shape (n, n_axes)."""
-        with threadpool_limits(1):
+        with _one_thread():
             mean, deviation = self.process.predict(unit, return_std=True)
         return mean, np.maximum(deviation, 1e-9)
 
@@ -62,7 +64,7 @@ class Boundary:
         """Points of the unit cube that narrow the boundary most, shape (count, n_axes)."""
         power = 1 << (max(candidates, count) - 1).bit_length()
         points = qmc.Sobol(self.axes, rng=seed).random(power)
-        with threadpool_limits(1):
+        with _one_thread():
             mean, covariance = map(np.asarray, self.process.predict(points, return_cov=True))
         noise = max(float(np.min(np.diag(covariance))), 0.0) * 1e-6 + 1e-9
         chosen: list[int] = []
@@ -84,7 +86,17 @@ def fit_boundary(unit: np.ndarray, margin: np.ndarray, seed: int = 0) -> Boundar
     lengths: Any = np.full(unit.shape[1], 0.5)
     kernel = ConstantKernel(0.5, (1e-2, 1e2)) * Matern(lengths, (5e-2, 2e1), nu=2.5) + WhiteKernel(1e-3, (1e-6, 1e-1))
     process = GaussianProcessRegressor(kernel, normalize_y=False, n_restarts_optimizer=1, random_state=seed)
-    with threadpool_limits(1), warnings.catch_warnings():
+    with _one_thread(), warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)  # a length at its bound: that axis does not matter
         process.fit(unit, margin)
     return Boundary(process, unit.shape[1], bool(np.any(margin > 0) and np.any(margin <= 0)))
+
+
+def _one_thread() -> AbstractContextManager[Any]:
+    """Sums in another order would give another boundary."""
+    return _threads().limit(limits=1)
+
+
+@cache
+def _threads() -> ThreadpoolController:
+    return ThreadpoolController()  # looks for the libraries, which takes milliseconds

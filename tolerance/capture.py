@@ -1,10 +1,14 @@
 """What a tolerance study varies and runs: one kind of capture, its variables, and what comes out of a case."""
 
+import hashlib
 import importlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 from ..errors import InputError
+
+_PACKAGE = Path(__file__).parents[1]
 
 
 @dataclass(frozen=True)
@@ -67,18 +71,39 @@ class Capture:
 
     ``run`` takes a value for every axis by name. It must give the same outcome for the same values, and may raise
     ArithmeticError or RuntimeError where the simulation breaks down.
+
+    Parameters
+    ----------
+    name : str
+    axes : tuple of Axis
+    run : callable
+    version : str
+        Of the simulation. Cases of one version are not continued with another.
+    film : callable, optional
+        Takes the same values and gives a page that plays the capture.
     """
 
     name: str
     axes: tuple[Axis, ...]
     run: Callable[[Mapping[str, float]], Outcome]
+    version: str = ""
+    film: Callable[[Mapping[str, float]], str] | None = None
 
     def axis(self, name: str) -> Axis:
         """The axis of that name; raises KeyError."""
         return {a.name: a for a in self.axes}[name]
 
 
-BUILT_IN = {"ground": "snarelab.tolerance.ground:CAPTURE"}
+BUILT_IN = {name: f"snarelab.tolerance.{name}:CAPTURE" for name in ("ground", "inspection")}
+
+
+def source_version(*patterns: str) -> str:
+    """Digest of snarelab's own files, ``models/snare/*.py`` and the like: a change of the physics gives another one."""
+    digest = hashlib.sha256()
+    for pattern in patterns:
+        for source in sorted(_PACKAGE.glob(pattern)):
+            digest.update(source.read_bytes())
+    return digest.hexdigest()[:12]
 
 
 def find_capture(name: str) -> Capture:

@@ -10,11 +10,7 @@ _ARC = 16
 
 
 def encloses(history: SnareHistory, parameters: SnareParameters, time: int = -1) -> bool:
-    """Whether the pin runs through the snare at a time: it reaches through the mouth, and the cables wind around it.
-
-    The cables and the rings between them make one closed loop. Seen along the axis it winds once around every point
-    that is inside at the start, and this number changes only where a cable passes over the pin: a pin that escapes
-    sideways is left with another one.
+    """Whether the pin runs through the snare at a time; see `runs_through`.
 
     Parameters
     ----------
@@ -24,14 +20,33 @@ def encloses(history: SnareHistory, parameters: SnareParameters, time: int = -1)
     time : int
         Index.
     """
-    foot, axis = _pin(history, time)
+    return runs_through(history.cables[0], history.cables[time], *_pin(history, time), parameters)
+
+
+def runs_through(
+    first: np.ndarray, cables: np.ndarray, foot: np.ndarray, axis: np.ndarray, parameters: SnareParameters
+) -> bool:
+    """Whether the pin runs through the snare: it reaches through the mouth, and the cables wind around it.
+
+    The cables and the rings between them make one closed loop. Seen along the axis it winds once around every point
+    that is inside at the start, and this number changes only where a cable passes over the pin: a pin that escapes
+    sideways is left with another one.
+
+    Parameters
+    ----------
+    first, cables : array (3, n_nodes, 3)
+        Nodes at the start and now, in the end effector's frame [m].
+    foot, axis : array (3,)
+        The pin's foot [m], and the direction from there to its tip, in the same frame.
+    parameters : SnareParameters
+    """
     middle = 0.5 * parameters.ring_distance
     tip = foot + parameters.pin_length * axis
     if not min(foot[0], tip[0]) <= middle <= max(foot[0], tip[0]):
         return False
     towards = round(parameters.ring_direction)
-    inside = _winding(_loop(history.cables[0], towards), np.zeros(3), np.array([1.0, 0.0, 0.0]))
-    return inside != 0 and _winding(_loop(history.cables[time], towards), foot, axis) == inside
+    inside = _winding(closed_loop(first, towards), np.zeros(3), np.array([1.0, 0.0, 0.0]))
+    return inside != 0 and _winding(closed_loop(cables, towards), foot, axis) == inside
 
 
 def radial_error(history: SnareHistory, time: int = -1) -> float:
@@ -45,8 +60,11 @@ def _pin(history: SnareHistory, time: int) -> tuple[np.ndarray, np.ndarray]:
     return history.target_position[time], -turn[:, 0]
 
 
-def _loop(cables: np.ndarray, towards: int) -> np.ndarray:
-    """Cables (3, n_nodes, 3) joined by arcs of the rings; each ends where the next begins, before the ring turns."""
+def closed_loop(cables: np.ndarray, towards: int) -> np.ndarray:
+    """Cables (3, n_nodes, 3) joined by arcs of the rings (n, 3); ``towards`` is the ring's direction, 1 or -1.
+
+    Each cable ends where the next begins, before the ring turns.
+    """
     parts = []
     for order in range(3):
         cable, following = cables[-towards * order % 3], cables[-towards * (order + 1) % 3]

@@ -13,12 +13,15 @@ from ..models.snare.history import SnareHistory
 from ..models.snare.model import SnareModel
 from ..models.snare.parameters import SnareParameters
 from ..models.snare.target import PAPER_POSITION, Target
-from .capture import Axis, Capture, Outcome
+from .capture import Axis, Capture, Outcome, source_version
 from .enclosure import encloses, radial_error
 
 DURATION = 10.5
 """The ring stops at 10.1 s [s]; what still swings then is not captured."""
 _EVERY = 0.02
+
+SOURCES = ("tolerance/enclosure.py", "models/snare/*.py")
+"""What the outcome of a case follows from."""
 
 AXES = (
     Axis("radial_y", "m", "offset of the pin's foot", 0.0, -0.3, 0.3),
@@ -60,4 +63,12 @@ def run(values: Mapping[str, float]) -> Outcome:
     )
 
 
-CAPTURE = Capture("ground", AXES, run)
+def film(values: Mapping[str, float]) -> str:
+    """A page that plays the capture."""
+    from ..report.snare_scene import snare_scene
+
+    history = simulate(values)
+    return snare_scene(history, SnareParameters()).html(start=history.first_contact or 0.0)
+
+
+CAPTURE = Capture("ground", AXES, run, source_version("tolerance/ground.py", *SOURCES), film)

@@ -2,17 +2,19 @@
 
 import re
 from collections import Counter
+from html import escape
 from typing import Any
 
 import numpy as np
 
 from .. import __version__
 from ..report.html import figure, page, paragraph, table
+from .gallery import Miss, play_misses
 from .pictures import envelope_bars, probability_maps, sensitivity_bars, width_curve
 from .results import Results
 from .run import space_boundary
-from .study import Study
-from .summary import Interval, envelopes, sensitivities, success_probability, worst_reach
+from .study import LARGEST, Study
+from .summary import Interval, envelopes, nominal_point, sensitivities, success_probability, worst_reach
 
 RADIAL = ("radial_y", "radial_z")
 ANGLES = ("roll", "pitch", "yaw")
@@ -23,7 +25,7 @@ def summarise(study: Study, results: Results) -> dict[str, Any]:
 
     Keys: ``cases``, ``failed`` (cases without a result), ``width``, ``probability`` over the ranges and
     ``probability_box``, ``envelope`` an axis, ``envelope_radial`` [m] and ``envelope_angle`` [rad] over the worst
-    direction, ``sensitivity``, ``sentence``.
+    direction, ``sensitivity``, ``misses`` (file, kind, text), ``sentence``.
     """
     space = results.table("space")
     boundary = space_boundary(study, results)
@@ -45,9 +47,11 @@ def summarise(study: Study, results: Results) -> dict[str, Any]:
     if study.box:
         content["probability_box"] = vars(success_probability(results.table("box")))
     content["sentence"] = _sentence(study, content)
+    misses = play_misses(study, results)
+    content["misses"] = [vars(m) for m in misses]
     results.write_table()
     results.write("result.json", content)
-    results.write("report.html", _page(study, results, content, ends, indices))
+    results.write("report.html", _page(study, results, content, ends, indices, misses))
     return content
 
 
@@ -57,19 +61,26 @@ def _sentence(study: Study, content: dict[str, Any]) -> str:
         p = content["probability_box"]
         low, high = 100 * p["low"], 100 * p["high"]
         words.append(f"inside the box {100 * p['value']:.0f} % succeed (95 % interval {low:.1f} to {high:.1f} %)")
-    for key, factor, unit, what in (
-        ("envelope_radial", 1e3, "mm", "radial error in the worst direction"),
-        ("envelope_angle", 180 / np.pi, "deg", "tilt in the worst direction"),
+    for key, axes, factor, unit, what in (
+        ("envelope_radial", RADIAL, 1e3, "mm", "radial error in the worst direction"),
+        ("envelope_angle", ANGLES, 180 / np.pi, "deg", "tilt in the worst direction"),
     ):
         e = content.get(key)
         if e and e["value"] is not None:
-            words.append(f"{what} up to {factor * e['value']:.1f} {unit}")
+            end = "at least" if e["value"] > 0.999 * _searched(study, axes) else "up to"
+            words.append(f"{what} {end} {factor * e['value']:.1f} {unit}")
     worst = max(content["sensitivity"], key=lambda s: s["total"])
     words.append(f"{worst['axis']} matters most")
     return "; ".join(words) + "."
 
 
-def _page(study: Study, results: Results, content: dict[str, Any], ends: dict, indices: Any) -> str:
+def _searched(study: Study, axes: tuple[str, ...]) -> float:
+    """How far the ranges reach from nominal on the shortest side of those axes that are varied."""
+    centre = dict(zip(study.ranges, nominal_point(study), strict=True))
+    return min(abs(limit - centre[name]) for name in axes if name in centre for limit in study.ranges[name])
+
+
+def _page(study: Study, results: Results, content: dict[str, Any], ends: dict, indices: Any, misses: list[Miss]) -> str:
     space = results.table("space")
     rows = [
         [
@@ -130,8 +141,17 @@ def _page(study: Study, results: Results, content: dict[str, Any], ends: dict, i
             + paragraph(f"Cases without a result: {reasons}."),
         ),
     ]
+    if misses:
+        sections.insert(3, ("misses", "Typical misses", _gallery(misses)))
     header = f"<h1>{content['sentence']}</h1>"
     return page(f"{study.name}: capture tolerance", header, sections, f"Written by snarelab {__version__}.")
+
+
+def _gallery(misses: list[Miss]) -> str:
+    items = "".join(
+        f'<li><a href="{escape(m.file)}">{escape(m.kind.capitalize())}</a>: {escape(m.text)}.</li>' for m in misses
+    )
+    return paragraph("Each opens in 3-D with a slider of time; the pages stand beside this one.") + f"<ul>{items}</ul>"
 
 
 def _failures(results: Results) -> list[str]:
@@ -140,7 +160,7 @@ def _failures(results: Results) -> list[str]:
 
 
 def _widths(study: Study, results: Results) -> tuple[np.ndarray, np.ndarray]:
-    total = len(results.table("space"))
+    total = min(len(results.table("space")), LARGEST)
     counts = np.unique(np.append(np.arange(study.batch, total, max(study.batch, total // 8)), total))
     return counts, np.array([space_boundary(study, results, int(n)).width() for n in counts])
 

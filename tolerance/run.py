@@ -1,5 +1,6 @@
 """Run the cases of a study on Dask workers, record each as it ends, and choose the next ones from what is known."""
 
+import logging
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -12,10 +13,12 @@ from ..errors import InputError
 from .boundary import Boundary, fit_boundary
 from .capture import Capture, Outcome
 from .results import Results
-from .study import Study
+from .study import LARGEST, Study
 from .summary import nominal_point, to_unit
 
 Say = Callable[[str], None]
+WATCH = 10.0
+"""How often the workers are looked after while cases run [s]."""
 
 
 def run_study(
@@ -41,7 +44,7 @@ def run_study(
     with _client(jobs, scheduler) as client:
         run = _Runner(study, results, client, say)
         if study.box:
-            run.stage("box", _box_points(study), study.box_cases)
+            run.stage("box", box_points(study), study.box_cases)
         if study.sampling == "latin_hypercube":
             cube = qmc.LatinHypercube(len(study.ranges), rng=study.seed).random(study.cases)
             run.stage("space", study.scaled(cube), study.cases)
@@ -63,11 +66,14 @@ def run_study(
 
 
 def space_boundary(study: Study, results: Results, cases: int | None = None) -> Boundary:
-    """The boundary from the (first ``cases``) recorded cases over the whole range."""
-    table = results.table("space").iloc[:cases]
-    low, high = np.array(list(study.ranges.values())).T
-    unit = (table[list(study.ranges)].to_numpy(float) - low) / (high - low)
-    return fit_boundary(unit, table["margin"].to_numpy(float), study.seed)
+    """The boundary from the (first ``cases``) recorded cases over the whole range, and those of the box.
+
+    Of either, `LARGEST` at most are taken.
+    """
+    parts = [results.table("space").iloc[:cases], results.table("box")]
+    names = [*study.ranges, "margin"]
+    points = np.vstack([part.iloc[:LARGEST][names].to_numpy(float) for part in parts])
+    return fit_boundary(to_unit(study, points[:, :-1]), points[:, -1], study.seed)
 
 
 def run_case(capture: Capture, values: Mapping[str, float]) -> Outcome:
@@ -112,11 +118,23 @@ class _Runner:
         from dask.distributed import KilledWorker, as_completed
 
         futures = {self._client.submit(run_case, self._study.capture, v, pure=False): n for n, v in wanted.items()}
-        for future in as_completed(list(futures)):
-            error = future.exception()
-            if error is not None and not isinstance(error, KilledWorker):
-                raise InputError(f"a worker cannot run a case: {error}; has it the same snarelab installed?")
-            yield futures[future], future.result() if error is None else None
+        while futures:
+            try:
+                for future in as_completed(list(futures), timeout=WATCH):
+                    error = future.exception()
+                    if error is not None and not isinstance(error, KilledWorker):
+                        raise InputError(f"a worker cannot run a case: {error}; has it the same snarelab installed?")
+                    yield futures.pop(future), future.result() if error is None else None
+            except TimeoutError:
+                self._mend()
+
+    def _mend(self) -> None:
+        """Replace workers of this machine that are gone for good; say where there is none to wait for."""
+        cluster = self._client.cluster
+        if cluster is not None:
+            cluster.scale(len(cluster.worker_spec))  # Dask restarts a worker that was killed, but not when that fails
+        if not self._client.scheduler_info()["workers"]:
+            self._say("no worker at the scheduler; waiting for one")
 
 
 def _sobol(study: Study, count: int) -> np.ndarray:
@@ -127,20 +145,30 @@ def _sobol(study: Study, count: int) -> np.ndarray:
     return cube
 
 
-def _box_points(study: Study) -> np.ndarray:
-    """Cases drawn evenly from the box; ranges outside the box are drawn whole."""
+def box_points(study: Study) -> np.ndarray:
+    """Cases drawn evenly from the box, or at its ends; ranges outside the box are drawn whole."""
     unit = np.random.default_rng([study.seed, 1]).random((study.box_cases, len(study.ranges)))
+    if study.box_ends:
+        boxed = [name in study.box for name in study.ranges]
+        unit[:, boxed] = np.round(unit[:, boxed])
     low, high = np.array([study.box.get(name, limits) for name, limits in study.ranges.items()]).T
     return low + unit * (high - low)
 
 
+def local_cluster(jobs: int) -> Any:
+    """Worker processes of this machine, one thread each; its ports are free ones, so that studies run side by side."""
+    from dask.distributed import LocalCluster
+
+    options: dict[str, Any] = {"dashboard_address": None, "scheduler_kwargs": {"dashboard_address": "127.0.0.1:0"}}
+    return LocalCluster(n_workers=jobs, threads_per_worker=1, silence_logs=logging.ERROR, **options)
+
+
 @contextmanager
 def _client(jobs: int, scheduler: str | None) -> Iterator[Any]:
-    from dask.distributed import Client, LocalCluster
+    from dask.distributed import Client
 
     if scheduler is None:
-        options: dict[str, Any] = {"threads_per_worker": 1, "dashboard_address": None}
-        with LocalCluster(n_workers=jobs, **options) as cluster, Client(cluster) as client:
+        with local_cluster(jobs) as cluster, Client(cluster) as client:
             yield client
         return
     try:

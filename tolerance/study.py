@@ -13,6 +13,8 @@ from ..errors import InputError
 from .capture import Capture, Outcome, find_capture
 
 SAMPLINGS = ("adaptive", "sobol", "latin_hypercube")
+LARGEST = 1000
+"""Cases that a boundary is fitted to at most: the time of a fit grows with their cube, to half a minute here."""
 _KEYS = ("name", "capture", "seed", "sampling", "batch", "cases", "width", "ranges", "fixed", "success", "box")
 _SUCCESS = ("radial_error", "strength")
 
@@ -69,7 +71,9 @@ class Study:
     box : mapping of str to (low, high)
         A part of the ranges whose probability of success is wanted by itself.
     box_cases : int
-        Cases that are run for it, drawn evenly.
+        Cases that are run for it.
+    box_ends : bool
+        Each axis of the box stands at one of its two ends, by chance; else they are drawn evenly between.
     """
 
     path: Path
@@ -85,6 +89,7 @@ class Study:
     success: Success
     box: Mapping[str, tuple[float, float]]
     box_cases: int
+    box_ends: bool = False
 
     def scaled(self, unit: np.ndarray) -> np.ndarray:
         """Points of the unit cube, shape (n, n_ranges), as values of the varied axes."""
@@ -100,6 +105,7 @@ class Study:
         """All that decides the cases and their outcomes: results of another identity cannot be continued."""
         return {
             "capture": self.capture.name,
+            "version": self.capture.version,
             "seed": self.seed,
             "sampling": self.sampling,
             "batch": self.batch,
@@ -107,6 +113,7 @@ class Study:
             "fixed": dict(self.fixed),
             "success": vars(self.success),
             "box": {k: list(v) for k, v in self.box.items()},
+            "box_ends": self.box_ends,
         }
 
 
@@ -129,6 +136,11 @@ def load_study(path: str | Path) -> Study:
     sampling = _text(path, raw, "sampling", "adaptive")
     if sampling not in SAMPLINGS:
         raise InputError(f"{path}: sampling = {sampling!r}; allowed are {', '.join(SAMPLINGS)}")
+    cases = _count(path, raw.get("cases", 512), "cases", 1)
+    if sampling == "adaptive" and cases > LARGEST:
+        raise InputError(
+            f"{path}: cases = {cases}; adaptive sampling takes at most {LARGEST}; give that, or sampling = 'sobol'"
+        )
     ranges = _ranges(path, raw, "ranges", capture)
     if not ranges:
         raise InputError(f"{path}: [ranges] is empty; name at least one of {_names(capture)}")
@@ -142,6 +154,9 @@ def load_study(path: str | Path) -> Study:
             raise InputError(f"{path}: [fixed] {name} = {value}; allowed is {axis.low:g} to {axis.high:g} {axis.unit}")
     box_table = dict(_table(path, raw, "box"))
     box_cases = _count(path, box_table.pop("cases", 60), "[box] cases", 1)
+    box_ends = box_table.pop("ends", False)
+    if not isinstance(box_ends, bool):
+        raise InputError(f"{path}: [box] ends = {box_ends!r}; allowed is true or false")
     box = _ranges(path, {"box": box_table}, "box", capture)
     for name, (low, high) in box.items():
         if name not in ranges or low < ranges[name][0] or high > ranges[name][1]:
@@ -153,13 +168,14 @@ def load_study(path: str | Path) -> Study:
         _count(path, raw.get("seed", 1), "seed", 0),
         sampling,
         _count(path, raw.get("batch", 32), "batch", 1),
-        _count(path, raw.get("cases", 512), "cases", 1),
+        cases,
         _positive(path, "width", raw.get("width", 0.05)),
         ranges,
         {k: float(v) for k, v in fixed.items()},
         _success(path, raw),
         box,
         box_cases,
+        box_ends,
     )
 
 
@@ -178,10 +194,12 @@ def _ranges(path: Path, raw: Mapping[str, Any], key: str, capture: Capture) -> d
     _known(path, key, table, [a.name for a in capture.axes])
     for name, value in table.items():
         axis = capture.axis(name)
-        if not (isinstance(value, list) and len(value) == 2):
+        point = key == "box" and not isinstance(value, list)  # one value for all its cases
+        pair = [value, value] if point else value
+        if not (isinstance(pair, list) and len(pair) == 2):
             raise InputError(f"{path}: [{key}] {name} = {value!r}; allowed is [low, high] in {axis.unit}")
-        low, high = (_number(path, f"[{key}] {name}", v) for v in value)
-        if not low < high:
+        low, high = (_number(path, f"[{key}] {name}", v) for v in pair)
+        if not low < high and not point:
             raise InputError(f"{path}: [{key}] {name} = [{low:g}, {high:g}] is empty; low must be below high")
         if low < axis.low or high > axis.high:
             allowed = f"{axis.low:g} to {axis.high:g} {axis.unit}"

@@ -64,6 +64,7 @@ EFFECT = Effect(
     ),
     law=_law,
     dissipates=True,
+    at_rest=True,
     contains=("viscous_friction", "coulomb_friction", "stribeck_friction"),
     experiment="run {at} to and fro at ten or more steady speeds, from a crawl to its peak speed",
 )

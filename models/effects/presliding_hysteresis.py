@@ -43,5 +43,6 @@ EFFECT = Effect(
     states=("bent",),
     rate=_rate,
     at_rest=True,
+    remembers=True,
     experiment="move {at} to and fro by ever smaller strokes around rest and draw its torque over its position",
 )

@@ -32,5 +32,7 @@ EFFECT = Effect(
     ),
     law=_law,
     dissipates=True,
+    contains=("coulomb_friction",),
+    exceeds_at_rest=True,
     experiment="run {at} to and fro at five or more steady speeds below a tenth of its peak speed",
 )

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...cosim.record import Run
-from ...cosim.step_control import StepControl
 from ...models.inertia import Array
 from ...models.snare.parameters import SnareParameters
 from ..outcome import Quantity, table, write_result
@@ -18,7 +17,19 @@ from .ledger import Momentum, energy_ledger, force_error, momentum_ledger, peak_
 from .map import Cell, resistance_map
 from .reference import reference
 from .scene import orbit_scene
-from .setting import DURATION, MACRO_STEP, SNARE, Capture, CaseName, Passive, Setting, capture_of, co_simulate, setting
+from .setting import (
+    DURATION,
+    MACRO_STEP,
+    SNARE,
+    Capture,
+    CaseName,
+    Passive,
+    Setting,
+    capture_of,
+    co_simulate,
+    setting,
+    step_control,
+)
 
 _TITLES = {
     "inspection": "Capture of a pin on the arm's own base (Li et al., case 1)",
@@ -66,20 +77,6 @@ def study(case: CaseName) -> int:
     write_result(name, quantities, time.monotonic() - begun, extra)
     _say(f"\n{found}\nReport: {path.resolve()}")
     return 0
-
-
-def step_control(start: Setting) -> StepControl:
-    """What the error-controlled master is told: sizes of what counts here, and the longest step.
-
-    10 mm and 10 mm/s of motion, 20 mrad and 20 mrad/s, and the impulse of 10 N over 2 ms.
-    """
-    sizes: dict[str, float] = {}
-    for on_arm, on_snare in (("tip", "effector"), ("mount", "pin"))[: 2 if start.arm.mount else 1]:
-        for kind, size in (("pos", 0.01), ("vel", 0.01), ("omega", 0.02)):
-            sizes |= {f"arm.{kind}.{on_arm}.{x}": size for x in "xyz"}
-        sizes |= {f"arm.quat.{on_arm}.{x}": 0.02 for x in "wxyz"}
-        sizes |= {f"snare.{k}.{on_snare}.{x}": 0.02 for k in ("impulse", "angular_impulse") for x in "xyz"}
-    return StepControl(3e-3, sizes, smallest=2.5e-4, largest=4e-3)
 
 
 def _run(case: CaseName, name: str, frames: list[tuple[float, Array]]) -> Result:

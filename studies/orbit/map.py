@@ -13,11 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ...models.floating.space_arm import FRICTION
 from ...models.snare.parameters import SnareParameters
 from ..outcome import FOLDER
 from .ledger import peak_force
-from .setting import Passive, Setting, capture_of, co_simulate
+from .setting import Setting, capture_of, co_simulate, resistance
 
 LEVELS = (1.0, 3.0, 10.0, 30.0, 100.0)
 """Coulomb level of each joint [N·m]; Stribeck level and viscous coefficient go with it."""
@@ -38,13 +37,6 @@ class Cell:
     final_y: float
     final_z: float
     peak_force: float
-
-
-def resistance(level: float, stiffness: float = 0.0) -> Passive:
-    """Joints whose whole friction is as many times the usual one as ``level`` [N·m] is the usual Coulomb level."""
-    factor = level / FRICTION["coulomb_level"]
-    scaled = ("coulomb_level", "stribeck_level", "viscous_coefficient")
-    return Passive({k: v * factor if k in scaled else v for k, v in FRICTION.items()}, stiffness)
 
 
 def resistance_map(start: Setting, snare: SnareParameters, study: str, say: Callable[[str], None]) -> list[Cell]:

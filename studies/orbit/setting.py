@@ -1,232 +1,42 @@
 """Two captures in orbit: a snare on a passive arm of a 40 t base, co-simulated step by step.
 
 Li et al. (soft capture by the end effector of a space manipulator, 3-D ANCF cables), last section: case 1, inspection,
-catches a pin on the arm's own base; case 2, hover, a target of 10 t that floats by itself. From the moment of arrival
-the arm's motors are off. Both start 20 mm off in each radial direction, 0.12 m ahead, and turned by 2° about each axis.
-
-The snare (Exudyn) steps first and the arm (`FloatingMotion`) follows on what it found, so that the arm gets the impulse
-that cables and target have really given (see `ImpulseSnareParticipant`).
+catches a pin on the arm's own base; case 2, hover, a target of 10 t that floats by itself. Both start 20 mm off in each
+radial direction, 0.12 m ahead, and turned by 2° about each axis. How they are simulated stands in
+`snarelab.cosim.orbit_capture`, whose names are here again for those who write a study.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import Any, Literal
-
 import numpy as np
-import xarray as xr
 from scipy.spatial.transform import Rotation
 
-from ...cosim.master import Master
-from ...cosim.participants.floating_arm import FloatingArmParticipant
-from ...cosim.participants.snare_impulses import ImpulseSnareParticipant
-from ...cosim.record import Run
-from ...cosim.step_control import StepControl
-from ...cosim.system import System
-from ...models.floating.arm import FloatingArm
-from ...models.floating.dynamics import tip_pose
-from ...models.floating.space_arm import CAPTURE_POSE, FRICTION, space_arm, space_arm_drive
-from ...models.inertia import Array
-from ...models.snare.drive import Pose
-from ...models.snare.model import Accuracy
-from ...models.snare.parameters import WIDE_RING, SnareParameters
-from ...models.snare.target import Target
+from ...cosim.orbit_capture import (
+    DURATION,
+    MACRO_STEP,
+    SNARE,
+    TARGET_SIDE,
+    Capture,
+    CaseName,
+    Passive,
+    Setting,
+    arrival,
+    capture_of,
+    co_simulate,
+    column,
+    columns,
+    resistance,
+    step_control,
+    system,
+)
 
-CaseName = Literal["inspection", "hover"]
-DURATION = 10.5
-"""Length of a capture [s]: the ring's 10 s, and what follows."""
-MACRO_STEP = 1e-3
+__all__ = [
+    "AHEAD", "DURATION", "MACRO_STEP", "OFFSET", "SNARE", "TARGET_SIDE", "TILT", "Capture", "CaseName", "Passive",
+    "Setting", "capture_of", "co_simulate", "column", "columns", "resistance", "setting", "step_control", "system",
+]  # fmt: skip
+
 OFFSET, AHEAD, TILT = 0.02, 0.12, np.deg2rad(2.0)
 """Start of the pin's foot in the end effector's frame: radial, each way, and axial [m]; turn about each axis [rad]."""
-SNARE = WIDE_RING
-"""Of the two sets of sizes that meet the ground test's first contact, the one that also meets the paper's orbits:
-chosen by the result, so that agreement proves nothing. The other one is a case of each study."""
-TARGET_MASS, TARGET_SIDE = 1e4, 2.0
-"""Of the floating target: mass [kg] (Li et al.); side of a uniform cube, pin in a face's middle [m], chosen."""
-ALONG_TIP = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
-"""The end effector's axes on the arm's tip: its x is the last link's z."""
-_FRAME = [(kind, axes) for kind, axes in (("pos", "xyz"), ("quat", "wxyz"), ("vel", "xyz"), ("omega", "xyz"))]
-
-
-@dataclass(frozen=True)
-class Passive:
-    """What resists in each joint while the motors are off.
-
-    Parameters
-    ----------
-    friction : mapping of str to float
-        Makkar's parameters, as `FRICTION`.
-    stiffness : float
-        Of a spring that holds the joint where it was on arrival: harness, detent of the gear [N·m/rad].
-    """
-
-    friction: Mapping[str, float] = field(default_factory=lambda: dict(FRICTION))
-    stiffness: float = 0.0
-
-
-@dataclass(frozen=True)
-class Setting:
-    """Where everything stands on arrival.
-
-    Parameters
-    ----------
-    case : "inspection" or "hover"
-    arm : FloatingArm
-        Its tip is the end effector; its mount, in inspection, the pin's foot.
-    effector : Pose
-    target : Target
-    """
-
-    case: CaseName
-    arm: FloatingArm
-    effector: Pose
-    target: Target
 
 
 def setting(case: CaseName, offset: float = OFFSET, ahead: float = AHEAD, tilt: float = TILT) -> Setting:
     """Base at the world's origin, everything at rest; lengths in m, tilt in rad."""
-    arm = replace(space_arm(), tip_rotation=ALONG_TIP)
-    pose = tip_pose(arm, np.array([CAPTURE_POSE]))
-    place, turned = pose.translation[0], Rotation.from_matrix(pose.rotation[0])
-    foot = place + turned.apply([ahead, offset, offset])
-    pin = turned * Rotation.from_euler("xyz", [tilt, tilt, tilt])
-    orientation = np.roll(pin.as_quat(), 1).tolist()
-    if case == "inspection":
-        arm = replace(arm, mount=(pin.as_matrix(), foot))
-        target = Target("moved", foot.tolist(), orientation)
-    else:
-        inertia = np.eye(3) * TARGET_MASS * TARGET_SIDE**2 / 6
-        target = Target(
-            "free", foot.tolist(), orientation, mass=TARGET_MASS, inertia=inertia.tolist(),
-            centre_of_mass=(TARGET_SIDE / 2, 0.0, 0.0),
-        )  # fmt: skip
-    return Setting(case, arm, Pose(place, turned.as_matrix(), np.zeros(3), np.zeros(3)), target)
-
-
-def system(start: Setting, passive: Passive, snare: SnareParameters, accuracy: Accuracy) -> System:
-    """Snare and arm, connected: the snare follows tip and mount, the arm gets the impulses."""
-    arm = start.arm
-    participants = {
-        "snare": ImpulseSnareParticipant(snare, start.target, accuracy, start.effector),
-        "arm": FloatingArmParticipant(arm, space_arm_drive(arm), CAPTURE_POSE, impulses=True),
-    }
-    links = []
-    for on_arm, on_snare in (("tip", "effector"), ("mount", "pin"))[: 2 if arm.mount else 1]:
-        links += [(f"arm.{k}.{on_arm}.{x}", f"snare.{k}.{on_snare}.{x}") for k, axes in _FRAME for x in axes]
-        links += [
-            (f"snare.{k}.{on_snare}.{x}", f"arm.{k}.{on_arm}.{x}")
-            for k in ("impulse", "angular_impulse")
-            for x in "xyz"
-        ]
-    given = {"arm.servo": 1.0 if passive.stiffness else 0.0}
-    for joint, angle in zip(arm.tree.joints, CAPTURE_POSE, strict=True):
-        given[f"arm.target.{joint.name}"] = angle
-        given[f"arm.servo.{joint.name}.stiffness"] = passive.stiffness
-        given[f"arm.servo.{joint.name}.damping"] = 0.0
-        given |= {f"arm.makkar_friction.{joint.name}.{key}": value for key, value in passive.friction.items()}
-    return System(participants, links, parameters=given, name=start.case)
-
-
-def co_simulate(
-    start: Setting,
-    passive: Passive | None = None,
-    snare: SnareParameters | None = None,
-    *,
-    duration: float = DURATION,
-    step: float = MACRO_STEP,
-    own_step: float = 1e-3,
-    control: StepControl | None = None,
-    frames: list[tuple[float, Array]] | None = None,
-) -> Run:
-    """One capture; ``step`` is the macro step and ``own_step`` the longest inside the snare [s].
-
-    ``frames`` takes time and the cables' nodes (3, n_nodes, 3), fifteen times a second.
-    """
-    coupled = system(start, passive or Passive(), snare or SNARE, Accuracy(own_step, 10, 5e-4))
-    snare_model: Any = coupled.participants["snare"]
-
-    def film(time: float) -> None:
-        if frames is not None and time >= len(frames) / 15:
-            frames.append((time, snare_model.cables()))
-
-    with Master(coupled, step, scheme="gauss_seidel", hold="quadratic", control=control) as master:
-        film(0.0)
-        return master.run(duration, film)
-
-
-@dataclass(frozen=True)
-class Capture:
-    """What a capture shows, at n times, in the world frame unless said otherwise.
-
-    Parameters
-    ----------
-    times : array (n,)
-        [s]
-    tip, pin, base : array (n, 6, 3)
-        Frames: position, velocity, angular velocity [m, m/s, rad/s], then the rotation matrix.
-    q, qd : array (n, J)
-        [rad, rad/s]
-    impulse, angular_impulse : array (n, 3)
-        Of the snare on the end effector since the start [N·s, N·m·s].
-    first_contact : float or None
-        [s]
-    """
-
-    times: Array
-    tip: Array
-    pin: Array
-    base: Array
-    q: Array
-    qd: Array
-    impulse: Array
-    angular_impulse: Array
-    first_contact: float | None
-
-    @property
-    def relative(self) -> Array:
-        """Pin's foot in the end effector's frame (n, 3) [m]: axial, then radial as in the paper's figure 10."""
-        return np.einsum("nji,nj->ni", self.tip[:, 3:], self.pin[:, 0] - self.tip[:, 0])
-
-    def mean_force(self, window: float, every: float | None = None) -> tuple[Array, Array]:
-        """Middles of windows [s], and the mean force on the end effector in each (k, 3) [N]."""
-        every = every or window
-        ends = np.arange(self.times[0], self.times[-1] - window + 1e-9, every)
-        summed = np.column_stack([np.interp(np.add.outer([0, window], ends), self.times, x).T for x in self.impulse.T])
-        summed = summed.reshape(len(ends), 3, 2)
-        return ends + window / 2, (summed[:, :, 1] - summed[:, :, 0]) / window
-
-
-def column(recording: xr.Dataset, name: str) -> Array:
-    """A column by its name without the unit."""
-    return recording[next(key for key in recording.variables if str(key).partition(" ")[0] == name)].to_numpy()
-
-
-def columns(recording: xr.Dataset, stem: str, axes: str = "xyz") -> Array:
-    """Columns ``stem.x`` and so on, shape (n, len(axes))."""
-    return np.column_stack([column(recording, f"{stem}.{axis}") for axis in axes])
-
-
-def capture_of(run: Run, case: CaseName) -> Capture:
-    """Read a run's recording."""
-    table = run.recording
-
-    def frames(body: str) -> Array:
-        result = np.empty((table.sizes["time"], 6, 3))
-        for row, kind in enumerate(("pos", "vel", "omega")):
-            result[:, row] = columns(table, f"{kind}.{body}")
-        result[:, 3:] = Rotation.from_quat(columns(table, f"quat.{body}", "xyzw")).as_matrix()
-        return result
-
-    times = table["time"].to_numpy()
-    touching = np.flatnonzero(np.abs(columns(table, "force.pin")).max(axis=1) > 0)
-    joints = range(1, 8)
-    return Capture(
-        times,
-        frames("tip"),
-        frames("mount" if case == "inspection" else "pin"),
-        frames("base"),
-        np.column_stack([column(table, f"q.joint{i}") for i in joints]),
-        np.column_stack([column(table, f"qd.joint{i}") for i in joints]),
-        columns(table, "snare.impulse.effector"),
-        columns(table, "snare.angular_impulse.effector"),
-        float(times[touching[0]]) if len(touching) else None,
-    )
+    return arrival(case, [ahead, offset, offset], Rotation.from_euler("xyz", [tilt, tilt, tilt]))

@@ -1,0 +1,129 @@
+"""Samples near rest: what drops out of whitened data, and joints that stick under a textbook's friction.
+
+The pendulum here is a dozen lines of its own: sharp or rounded Coulomb friction, a servo, a disturbance and noise.
+"""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.signal import butter, lfilter, sosfilt
+
+from snarelab.identification.diagnose import diagnose
+from snarelab.identification.experiment import Bridge
+from snarelab.identification.noise import Whitener
+from snarelab.identification.rest import without
+from snarelab.models.model_file import load_model
+
+MASS, LENGTH, GRAVITY = 4.0, 0.4, 9.81
+INERTIA = MASS * LENGTH**2 + 0.02
+RATE = 200
+
+
+def test_missing_samples_have_no_part_in_what_is_left():
+    rng = np.random.default_rng(0)
+    coefficients, lead = np.array([0.6, -0.2, 0.1]), 12
+    missing = np.zeros(400, bool)
+    missing[[40, 41, 42, 45, 200, 201, 399]] = True
+    whiten = Whitener(coefficients, 1.0, lead)
+    drop = without([missing], [[slice(0, 400)]], coefficients, lead)
+    x = np.asarray(lfilter([1.0], np.concatenate([[1.0], -coefficients]), rng.normal(size=400)))
+    left = drop(whiten(x, [slice(0, 400)]))
+    spoilt = np.where(missing, 1e3 * rng.normal(size=400), x)
+    np.testing.assert_allclose(drop(whiten(spoilt, [slice(0, 400)])), left, atol=1e-9)
+    assert len(left) == 400 - lead - 7  # one row for each missing sample, no more
+
+
+def test_what_is_left_of_white_innovations_is_white():
+    """Combinations are orthonormal: the energy left of any innovations is that of a projection."""
+    rng = np.random.default_rng(1)
+    missing = np.zeros(300, bool)
+    missing[100:104] = missing[110:112] = True
+    drop = without([missing], [[slice(0, 300)]], np.array([0.5, 0.2]), 12)
+    matrix = drop(np.eye(288))
+    np.testing.assert_allclose(matrix @ matrix.T, np.eye(len(matrix)), atol=1e-12)
+    x = rng.normal(size=288)
+    np.testing.assert_allclose(drop(x), matrix @ x)
+
+
+def test_a_long_rest_is_forgotten():
+    missing = np.zeros(300, bool)
+    missing[100:200] = True
+    drop = without([missing], [[slice(0, 300)]], np.array([0.5, 0.2]), 12)
+    assert len(drop(np.zeros(288))) == 288 - 102  # the rest, and the two innovations that remember it
+
+
+def test_a_bridge_leaves_straight_lines_alone():
+    bridge = Bridge(np.array([3, 4]), np.array([2, 2]), np.array([5, 5]), np.array([1 / 3, 2 / 3]))
+    line = np.stack([np.arange(8.0), 2 - np.arange(8.0)], 1)
+    np.testing.assert_allclose(bridge(line), line)
+    spoilt = line.copy()
+    spoilt[3:5] = 99.0
+    np.testing.assert_allclose(bridge(spoilt), line)
+
+
+def record(path, seed, seconds, *, rounding=0.0, stribeck=0.0, speed=0.08, drag=0.0):
+    """A pendulum under a PD servo; friction of 3 N·m, rounded over ``rounding`` [rad/s] or sharp."""
+    rng = np.random.default_rng(seed)
+    steps, fine = int(1000 * seconds), 4
+    t = np.arange(steps) / 1000
+    phase, f = rng.uniform(0, 2 * np.pi, 4), np.array([0.11, 0.23, 0.37, 0.52])
+    fade = np.clip(t / 2, 0, 1) ** 2 * (3 - 2 * np.clip(t / 2, 0, 1))
+    target = fade * np.sum(np.sin(2 * np.pi * f * t[:, None] + phase) * 0.16 / f, axis=1)
+    wanted = np.gradient(target, 1e-3)
+    ahead = INERTIA * np.gradient(wanted, 1e-3) + MASS * GRAVITY * LENGTH * np.cos(target)
+    push = np.asarray(sosfilt(butter(2, (0.3, 12.0), "bandpass", fs=1000, output="sos"), rng.normal(size=steps)))
+    push *= 0.3 / np.sqrt(np.mean(push**2))
+    kp, kd, h = INERTIA * 30.0**2, INERTIA * 45.0, 1e-3 / fine
+    q, qd, held = float(target[0]), 0.0, float(ahead[0])
+    positions, torques = np.empty(steps), np.empty(steps)
+    for k in range(steps):
+        command = float(ahead[k] + kp * (target[k] - q) + kd * (wanted[k] - qd))
+        positions[k], torques[k] = q, 0.5 * (held + command)
+        held = command
+        for _ in range(fine):
+            free = qd + h / INERTIA * (held + push[k] - MASS * GRAVITY * LENGTH * math.cos(q) - drag * qd * abs(qd))
+            level = 3.0 + stribeck * math.exp(-((qd / speed) ** 2))
+            if rounding:
+                stiff = level / rounding / math.cosh(min(abs(qd) / rounding, 300)) ** 2
+                slip = (free - qd) - h / INERTIA * (level * math.tanh(qd / rounding) + 2.0 * qd)
+                qd += slip / (1 + h / INERTIA * (stiff + 2.0))
+            else:
+                qd = math.copysign(max(abs(free) - h / INERTIA * level, 0.0), free) / (1 + 2.0 * h / INERTIA)
+            q += h * qd
+    step = 2 * np.pi / 2**19
+    table = np.column_stack([t, np.round(positions / step) * step, torques + 0.15 * rng.normal(size=steps)])
+    np.savetxt(path, table[:: 1000 // RATE], delimiter=",", header="time,q.joint1,tau.joint1", comments="", fmt="%.8g")
+
+
+def diagnosed(folder, seed, **concealed):
+    own = f'<inertial><origin xyz="{LENGTH} 0 0"/><mass value="{MASS}"/>'
+    own += '<inertia ixx="0.02" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.02"/></inertial>'
+    (folder / "arm.urdf").write_text(
+        f'<robot name="pendulum"><link name="base"/><link name="link1">{own}</link><joint name="joint1" '
+        'type="revolute"><parent link="base"/><child link="link1"/><axis xyz="0 -1 0"/>'
+        '<limit lower="-3" upper="3" velocity="5" effort="200"/></joint></robot>'
+    )
+    (folder / "arm.toml").write_text(
+        'name = "arm"\nsystem = "arm"\nurdf = "arm.urdf"\neffects = ["viscous_friction", "coulomb_friction"]\n'
+    )
+    record(folder / "train.csv", seed, 25.0, **concealed)
+    record(folder / "hold.csv", seed + 1000, 12.0, **concealed)
+    return diagnose(load_model(folder / "arm.toml"), [folder / "train.csv"], folder / "hold.csv").diagnosis
+
+
+@pytest.mark.parametrize("rounding", [0.0, 0.003, 0.01])
+def test_a_joint_that_sticks_or_a_rounded_sign_is_no_missing_physics(tmp_path, rounding):
+    found = diagnosed(tmp_path, 1, rounding=rounding)
+    assert found.verdict == "adequate", [(e.name, e.at) for e in found.effects]
+
+
+def test_friction_that_rises_near_rest_is_named(tmp_path):
+    found = diagnosed(tmp_path, 2, stribeck=3.0)
+    assert [(e.name, e.at) for e in found.effects] == [("stribeck_friction", "joint1")]
+
+
+def test_sticking_does_not_spoil_what_is_identified_in_motion(tmp_path):
+    found = diagnosed(tmp_path, 3, drag=1.2)
+    assert [(e.name, e.at) for e in found.effects] == [("quadratic_friction", "joint1")]
+    assert found.effects[0].parameters["coefficient"].value == pytest.approx(1.2, rel=0.1)

@@ -1,0 +1,79 @@
+"""Typical misses: which are shown, that they are linked, and that a real capture plays."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+from snarelab.tolerance import ground, report
+from snarelab.tolerance.capture import Axis, Capture, Outcome
+from snarelab.tolerance.gallery import play_misses, typical_misses
+from snarelab.tolerance.results import Results
+from snarelab.tolerance.study import Study, Success
+from snarelab.tolerance.summary import sensitivities
+
+FILMED = []
+
+
+def outcome(y: float, z: float) -> Outcome:
+    """Off the axis beyond 30 mm, escaped beyond 70 mm, never touched beyond 90 mm; it diverges beyond z = 80 mm."""
+    if z > 0.08:
+        return Outcome.failed("the step diverged")
+    return Outcome(y < 0.07, y / 3, np.nan if y > 0.09 else 2.6, 5.0, 100.0)
+
+
+def film(values) -> str:
+    FILMED.append(values["radial_y"])
+    return f"<p>{values['radial_y']}</p>"
+
+
+@pytest.fixture
+def study(tmp_path):
+    axes = tuple(Axis(n, "m", n, 0.0, -1.0, 1.0) for n in ("radial_y", "radial_z"))
+    capture = Capture("toy", axes, lambda values: outcome(**values), film=film)
+    ranges = {"radial_y": (0.0, 0.1), "radial_z": (-0.1, 0.1)}
+    return Study(tmp_path, "toy", capture, 1, "sobol", 8, 64, 0.05, ranges, {}, Success(0.010, 8e3), {}, 1)
+
+
+@pytest.fixture
+def results(study, tmp_path):
+    results = Results(tmp_path / "out", study)
+    for number, point in enumerate(np.random.default_rng(3).random((40, 2))):
+        values = study.values(study.scaled(point[None])[0])
+        results.add("space", number, values, outcome(values["radial_y"], values["radial_z"]))
+    return results
+
+
+def test_one_of_each_kind_from_its_middle(study, results):
+    found = {kind: case["radial_y"] for kind, case in typical_misses(study, results.table("space"))}
+    assert set(found) == {"off the axis", "escaped", "never touched"}
+    assert 0.04 < found["off the axis"] < 0.06
+    assert 0.07 < found["escaped"] < 0.09 < found["never touched"]
+
+
+def test_more_of_one_kind_where_there_is_only_one(study, results):
+    table = results.table("space")
+    kinds = typical_misses(study, table[table["radial_y"].to_numpy() < 0.065])
+    assert [kind for kind, _ in kinds] == ["off the axis"] * 3
+    assert len({case["case"] for _, case in kinds}) == 3
+    assert typical_misses(study, table[table["margin"].to_numpy() > 0]) == []
+
+
+def test_misses_are_linked_and_played_once(study, results, monkeypatch):
+    monkeypatch.setattr(report, "sensitivities", partial(sensitivities, samples=64))  # not what this is about
+    FILMED.clear()
+    content = report.summarise(study, results)
+    assert len(FILMED) == 3
+    page = (results.folder / "report.html").read_text(encoding="utf-8")
+    for miss in content["misses"]:
+        assert f'<a href="{miss["file"]}">' in page
+        assert (results.folder / miss["file"]).read_text(encoding="utf-8").startswith("<p>")
+    play_misses(study, results)
+    assert len(FILMED) == 3
+
+
+def test_a_ground_capture_plays(monkeypatch):
+    monkeypatch.setattr(ground, "DURATION", 0.1)
+    page = ground.film({axis.name: axis.nominal for axis in ground.AXES})
+    assert "<script" in page
+    assert 'type="range"' in page
