@@ -140,10 +140,10 @@ def screen(
             variant = replace(pool[0][0][0], low=-free, high=free)
             case = samples.case(variant, {c: parts})
             score = case.gain().total - 0.5 * len(free) * log_size
-            # A curve is no taller than what is left over, before it is seen. Neither the worst block counts nor the
-            # best: one may go where no other has been.
-            spread = float(found.sigma[c])
-            if score > threshold[(c,)] and reliably_positive(np.sort(case.fresh_gains(spread))[1:-1]):
+            spread = float(found.sigma[c])  # a curve is no taller than what is left over, before it is seen
+            fresh = np.sort(case.fresh_gains(spread))
+            # Neither the worst of many blocks counts nor the best: one may go where no other has been.
+            if score > threshold[(c,)] and reliably_positive(fresh[1:-1] if len(fresh) > 4 else fresh):
                 share = min(samples.foreseen(variant, {c: parts}, spread), 1.0)
                 if share > nameless.get(c, 0.0):
                     nameless[c], over[c] = share, words
