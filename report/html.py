@@ -46,6 +46,7 @@ tbody th{font-weight:500}
 th,.n{overflow-wrap:normal}
 .n{text-align:right}
 td.n,.share{white-space:nowrap}
+.said{display:inline-block;max-width:18rem;white-space:normal}
 .wide td:not(.n),tbody th{min-width:6.5rem}
 .bar{display:inline-block;width:7rem;height:.65rem;background:var(--line);border-radius:.2rem;overflow:hidden;
 margin-right:.6rem}

@@ -103,7 +103,7 @@ def _numbers(quantities: Sequence[Quantity]) -> str:
             escape(q.name.replace("_", " ")),
             escape("" if q.unit == "1" else q.unit),
             "–" if q.paper is None else f"{q.paper:g}",
-            escape(_text(q.ours)),
+            _text(q.ours) if isinstance(q.ours, float) else _said(_text(q.ours)),
             "" if q.low is None or q.high is None else f"{q.low:.4g} to {q.high:.4g}",
             q.kind,
         ]
@@ -113,6 +113,10 @@ def _numbers(quantities: Sequence[Quantity]) -> str:
     kinds = "".join(f"<dt>{kind}</dt><dd>{text}</dd>" for kind, text in _KINDS.items() if kind in used)
     heads = ["quantity", "unit", "paper", "ours", "interval", "kind"]
     return table("", heads, rows, numeric=(2, 3, 4)) + f'<dl class="facts">{kinds}</dl>\n'
+
+
+def _said(words: str) -> str:
+    return f'<span class="said">{escape(words)}</span>'
 
 
 def _text(ours: float | str | list[str]) -> str:
