@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 _VARIED = {
     "friction": ("friction coefficient", "1"),
-    "bending_damping": ("bending damping over stiffness", "s"),
-    "end_friction": ("friction of the cables' bearings", "N*m*s/rad"),
+    "bending_damping": ("bending damping", "s"),
+    "end_friction": ("friction of the bearings", "N*m*s/rad"),
     "mass": ("target's mass", "kg"),
 }
 _CABLES = (AFTER, "#009E73", SHADE)
@@ -166,7 +166,7 @@ def _sweeps(cases: Sequence[Case]) -> bytes:
             top.plot(values, offsets[:, 1], "o-", color=BEFORE, markersize=4, label="z")
             top.axhspan(-10, 10, color=GREY, alpha=0.18, linewidth=0)
             bottom.plot(values, [c.peak_force for c in varied], "o-", color=MEASURED, markersize=4)
-            bottom.set_xlabel(words if unit == "1" else f"{words} [{unit}]")
+            bottom.set_xlabel(words if unit == "1" else f"{words}\n[{unit}]")
             if name != "friction":
                 bottom.set_xscale("log")
             bottom.set_xticks(values, [f"{value:g}" for value in values], fontsize=7)
@@ -175,5 +175,5 @@ def _sweeps(cases: Sequence[Case]) -> bytes:
         grid[0, 0].set_ylabel("final offset [mm]")
         grid[1, 0].set_ylabel("peak force [N]")
         grid[0, 0].legend(loc="lower left", ncols=2)
-        figure.subplots_adjust(**margins(figure, 0.6, 0.1, 0.5, 0.15), hspace=0.12, wspace=0.08)
+        figure.subplots_adjust(**margins(figure, 0.6, 0.1, 0.7, 0.15), hspace=0.12, wspace=0.2)
         return svg(figure)
