@@ -97,7 +97,7 @@ class Instance:
                 instanceName=name,
             )
             self._instantiate()
-        except Exception as error:  # FMPy raises bare exceptions
+        except Exception as error:  # FMPy raises bare exceptions; whatever it is, the FMU is named with it
             raise StepError(f"{name}: cannot be started: {error}{self._said()}") from None
         self.component = ctypes.c_void_p(self._fmu.component)
         self._time, self._size = ctypes.c_double(), ctypes.c_double()

@@ -94,18 +94,10 @@ class MonolithicCapture:
         nodes = settled(parameters, n_elements) @ rotation.T
         start = np.concatenate([-self.origin, np.zeros(3), joints])
         self.assembly = MonolithicAssembly(parameters, near, nodes, effector, arm, start, friction, rotor)
-        a, p = self.assembly, parameters
+        a = self.assembly
         self._data = a.system.systemData
         self._ends = self._data.GetObjectLTGAE(a.ends_object)
-        self._section = np.array(
-            [
-                p.mass_per_length,
-                p.axial_stiffness,
-                p.bending_stiffness,
-                p.axial_damping,
-                p.bending_damping,
-            ]
-        )
+        self._section = np.array(parameters.section)
         self._wrench, self._impulse, self._time = np.zeros(12), np.zeros(3), 0.0
         self.first_contact: float | None = None
         self._solver = SnareSolver(a.system, 0.0, self._after_step)

@@ -118,6 +118,12 @@ class SnareParameters:
         """EI of the cable [N·m²]."""
         return self.young_modulus * pi * self.cable_diameter**4 / 64
 
+    @property
+    def section(self) -> tuple[float, ...]:
+        """What `cable_energies` takes: ρA [kg/m], EA [N], EI [N·m²], damping of tension and of bending [s]."""
+        stiffness = self.axial_stiffness, self.bending_stiffness
+        return (self.mass_per_length, *stiffness, self.axial_damping, self.bending_damping)
+
     def dimensions(self) -> tuple[Dimension, ...]:
         """Every number with unit and source, in the order of the fields."""
         return tuple(_described(item, getattr(self, item.name)) for item in fields(self))

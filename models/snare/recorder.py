@@ -33,16 +33,7 @@ class Recorder:
         data = assembly.system.systemData
         self._data = data
         self._ends = data.GetObjectLTGAE(assembly.ends_object)
-        p = assembly.parameters
-        self._section = np.array(
-            [
-                p.mass_per_length,
-                p.axial_stiffness,
-                p.bending_stiffness,
-                p.axial_damping,
-                p.bending_damping,
-            ]
-        )
+        self._section = np.array(assembly.parameters.section)
         self.pin_wrench = np.zeros(6)
         self.effector_wrench = np.zeros(6)
         self._energies = np.zeros(7)
