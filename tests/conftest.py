@@ -8,6 +8,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.append(str(ROOT))  # bench/ holds the independent plant; it is not part of the package
+sys.path.append(str(ROOT / "tests"))  # what several files of tests share
 
 
 @pytest.fixture(scope="session")
