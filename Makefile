@@ -6,7 +6,7 @@ STUDIES := emps kuka bam free-floating ground-capture zero-g-rig orbit-inspectio
 
 BENCHES := torque friction_fit diagnosis floating cosim fmu snare
 
-.PHONY: help demo test check bench accuracy proof fmus clean $(STUDIES:%=study-%)
+.PHONY: help demo test check studies bench accuracy proof fmus clean $(STUDIES:%=study-%)
 
 help:            ## what can be made
 	@sed -n -e 's/^\$$(STUDIES.*## /  make study-NAME\t/p' -e 's/^\([a-z]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
@@ -15,6 +15,8 @@ demo: study-emps ## set up, then the main job: name the physics that a viscous m
 
 $(STUDIES:%=study-%): study-%: .venv/installed ## run one study: report and numbers in build/studies/NAME
 	$(BIN)/python -m snarelab.studies.$(subst -,_,$*)
+
+studies: $(filter-out study-tolerance,$(STUDIES:%=study-%)) ## every study but the tolerances, one after the other: a quarter of an hour
 
 test: .venv/installed ## set up, then the tests
 	$(BIN)/python -m pytest -n 2

@@ -87,27 +87,6 @@ class Setting:
     drift: Array
 
 
-class _Arm(FloatingArmParticipant):
-    """An arm whose joints and base move at the start."""
-
-    def __init__(self, start: Setting) -> None:
-        arm, q = start.arm, np.array([CAPTURE_POSE])
-        total = momentum(arm, q, start.drift[None], start.rates[None])[0]  # the base's frame is the world's
-        super().__init__(arm, space_arm_drive(arm), CAPTURE_POSE, momentum=total, impulses=True)
-        self._start = self._motion.start(CAPTURE_POSE, start.rates, momentum=total)
-
-
-class _Snare(ImpulseSnareParticipant):
-    """A snare that tells how hard its cables pull."""
-
-    def tension(self) -> float:
-        """Largest force of a cable on its ring now [N]."""
-        assembly = self._built().assembly
-        data = assembly.system.systemData
-        ends = np.reshape(data.GetAECoordinates()[data.GetObjectLTGAE(assembly.ends_object)], (6, 3))
-        return float(np.linalg.norm(ends, axis=1).max())
-
-
 def arrival(case: CaseName, foot: ArrayLike, turn: Rotation, speed: float = 0.0) -> Setting:
     """Arm and target at the moment of arrival, the tip at rest in the world and the base's frame at its origin.
 
@@ -172,7 +151,13 @@ def _ports(start: Setting) -> list[tuple[str, str]]:
 def system(start: Setting, passive: Passive, snare: SnareParameters, accuracy: Accuracy) -> System:
     """Snare and arm, connected: the snare follows tip and mount, the arm gets the impulses."""
     arm = start.arm
-    participants = {"snare": _Snare(snare, start.target, accuracy, start.effector), "arm": _Arm(start)}
+    total = momentum(arm, np.array([CAPTURE_POSE]), start.drift[None], start.rates[None])[0]  # base at the origin
+    participants = {
+        "snare": ImpulseSnareParticipant(snare, start.target, accuracy, start.effector),
+        "arm": FloatingArmParticipant(
+            arm, space_arm_drive(arm), CAPTURE_POSE, start.rates, momentum=total, impulses=True
+        ),
+    }
     links = []
     for on_arm, on_snare in _ports(start):
         links += [(f"arm.{k}.{on_arm}.{x}", f"snare.{k}.{on_snare}.{x}") for k, axes in _FRAME for x in axes]

@@ -34,7 +34,9 @@ class FloatingArmParticipant(Participant):
     drive : Drive, optional
         Servo and effects; none: joints without any torque.
     q : array (J,), optional
-        Joint positions at the start [rad or m], at rest; the servo's target until another comes in.
+        Joint positions at the start [rad or m]; the servo's target until another comes in.
+    qd : array (J,), optional
+        Joint rates at the start [rad/s or m/s]; none: at rest.
     position, quaternion, momentum : arrays (3,), (4,), (6,)
         The base's pose and the momentum of base and arm at the start, as in `FloatingMotion.start`.
     servo : bool
@@ -54,6 +56,7 @@ class FloatingArmParticipant(Participant):
         arm: FloatingArm,
         drive: Drive | None = None,
         q: ArrayLike | None = None,
+        qd: ArrayLike | None = None,
         position: ArrayLike = (0.0, 0.0, 0.0),
         quaternion: ArrayLike = (1.0, 0.0, 0.0, 0.0),
         momentum: ArrayLike = (0.0,) * 6,
@@ -64,7 +67,7 @@ class FloatingArmParticipant(Participant):
         """Write and compile the equations; raises InputError as `FloatingMotion` does."""
         self.name = name
         self._motion = FloatingMotion(arm, drive)
-        self._start = self._motion.start(q, None, position, quaternion, momentum)
+        self._start = self._motion.start(q, qd, position, quaternion, momentum)
         self._n_wrenches, self._impulses = self._motion.n_wrenches, impulses
         at_first = self._motion.joints(self._start[None])[0][0]
         self._first = np.concatenate([np.zeros(self._n_wrenches), at_first, [float(servo)]])

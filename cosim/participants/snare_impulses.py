@@ -87,6 +87,13 @@ class ImpulseSnareParticipant(SnareParticipant):
         moved = a.system.systemData.GetODE2Coordinates()[: a.n_cable_coordinates].reshape(a.nodes.shape)
         return (moved + a.nodes)[:, :, 0] + model.origin
 
+    def tension(self) -> float:
+        """Largest force of a cable on its ring now [N]."""
+        assembly = self._built().assembly
+        data = assembly.system.systemData
+        ends = np.reshape(data.GetAECoordinates()[data.GetObjectLTGAE(assembly.ends_object)], (6, 3))
+        return float(np.linalg.norm(ends, axis=1).max())
+
     def save(self) -> Any:
         """The model's state, the inputs, and the sums."""
         return super().save(), self._passed, self._momentum

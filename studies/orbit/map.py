@@ -16,7 +16,7 @@ import numpy as np
 from ...models.snare.parameters import SnareParameters
 from ..outcome import FOLDER
 from .ledger import peak_force
-from .setting import Setting, capture_of, co_simulate, resistance
+from .setting import END, Setting, capture_of, co_simulate, radial_end, resistance
 
 LEVELS = (1.0, 3.0, 10.0, 30.0, 100.0)
 """Coulomb level of each joint [N·m]; Stribeck level and viscous coefficient go with it."""
@@ -59,13 +59,13 @@ def _cell(start: Setting, snare: SnareParameters, level: float, stiffness: float
     run = co_simulate(start, resistance(level, stiffness), snare, step=_STEP, own_step=_STEP)
     capture = capture_of(run, start.case)
     contact = np.inf if capture.first_contact is None else capture.first_contact
-    y, z = capture.relative[-1, 1:].tolist()
+    y, z = radial_end(capture).tolist()
     return Cell(level, stiffness, contact, y, z, peak_force(capture))
 
 
 def _key(start: Setting, snare: SnareParameters, level: float, stiffness: float) -> str:
     """Of everything that a cell follows from, the models' own text included."""
-    digest = hashlib.sha256(repr((start.case, start.target, snare, level, stiffness, _STEP)).encode())
+    digest = hashlib.sha256(repr((start.case, start.target, snare, level, stiffness, _STEP, END)).encode())
     for pattern in _SOURCES:
         for source in sorted(_MODELS.glob(pattern)):
             digest.update(source.read_bytes())

@@ -27,16 +27,27 @@ from ...cosim.orbit_capture import (
     step_control,
     system,
 )
+from ...models.inertia import Array
 
 __all__ = [
-    "AHEAD", "DURATION", "MACRO_STEP", "OFFSET", "SNARE", "TARGET_SIDE", "TILT", "Capture", "CaseName", "Passive",
-    "Setting", "capture_of", "co_simulate", "column", "columns", "resistance", "setting", "step_control", "system",
+    "AHEAD", "DURATION", "END", "MACRO_STEP", "OFFSET", "SNARE", "TARGET_SIDE", "TILT", "Capture", "CaseName",
+    "Passive", "Setting", "capture_of", "co_simulate", "column", "columns", "radial_end", "resistance", "setting",
+    "step_control", "system",
 ]  # fmt: skip
 
 OFFSET, AHEAD, TILT = 0.02, 0.12, np.deg2rad(2.0)
 """Start of the pin's foot in the end effector's frame: radial, each way, and axial [m]; turn about each axis [rad]."""
 
+END = 10.0
+"""Of a soft capture, by the paper: 80° at 8°/s [s]."""
+
 
 def setting(case: CaseName, offset: float = OFFSET, ahead: float = AHEAD, tilt: float = TILT) -> Setting:
     """Base at the world's origin, everything at rest; lengths in m, tilt in rad."""
     return arrival(case, [ahead, offset, offset], Rotation.from_euler("xyz", [tilt, tilt, tilt]))
+
+
+def radial_end(capture: Capture) -> Array:
+    """Radial displacement of the pin's foot at the paper's end, `END` (2,) [m]; of a shorter capture, at its own."""
+    row = min(int(np.searchsorted(capture.times, END - 1e-9)), len(capture.times) - 1)
+    return capture.relative[row, 1:]
