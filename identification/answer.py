@@ -129,17 +129,25 @@ def _finding(t: Taken, final: Fit, trials: Mapping[str, tuple[float, float]], ev
     }
     with_it, without_it = trials[placed.key]
     channels = [every[c] for c in t.judged.channels]
-    # How often a name with this margin was right on the bank, shared out as the bootstrap was.
+    # How often a name with this margin was right, counting those that cannot be told from it: they share it as the
+    # bootstrap was shared.
     right = reliability(t.probability)
+    whole = t.probability + sum(r.probability for r in t.rivals if not r.separable)
     rivals = tuple(
         Rival(
-            r.placed.effect.name, r.placed.at, r.probability * right, r.separable, experiment_sentence(placed, r.placed)
+            r.placed.effect.name,
+            r.placed.at,
+            r.probability * (right if r.separable else right / whole),
+            r.separable,
+            experiment_sentence(placed, r.placed),
         )
         for r in t.rivals
         if r.probability >= 0.005 or not r.separable
     )
     sentence = evidence_sentence(placed, t.judged.explained, channels, with_it, without_it)
-    return Finding(placed.effect.name, placed.at, t.probability, t.probability * right, parameters, sentence, rivals)
+    return Finding(
+        placed.effect.name, placed.at, t.probability, t.probability * right / whole, parameters, sentence, rivals
+    )
 
 
 def _fits(

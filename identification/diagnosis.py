@@ -36,7 +36,7 @@ class Finding:
     """An effect that the model left out, in the field's words.
 
     ``margin`` is how often it beat its rivals in a bootstrap over time blocks, ``probability`` how often a name with
-    that margin was right on a bank of simulated arms, times the margin.
+    that margin was right on simulated arms, shared with the rivals that the recordings cannot tell from it.
     """
 
     name: str

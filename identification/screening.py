@@ -31,6 +31,13 @@ MOST = 0.5
 """Share of its channels' residual energy, near rest too, from which on an effect with a memory of where the joint
 turned is named for what it does near rest: joints that stick and rounded signs look like one, and leave most of it."""
 
+DRIVEN_MOST = 0.25
+"""Share of its own channel's residual energy from which on a drive's spring or play is named for what it explains along
+the motion as measured, which knows how the link rings: what disturbances drive looks like one too, and leaves most."""
+
+TUNINGS = 3
+"""Rounds in which the shape of such a candidate is tuned; what rings falls between the points of a grid."""
+
 NULLS = 200
 
 LEVEL = 0.995
@@ -45,6 +52,8 @@ class Screening:
     evidence: Evidence
     near_rest: Samples
     """Samples near rest too, on which some of the candidates were judged."""
+    measured: Samples
+    """Samples in motion beside a baseline from the motion as measured, on which some of the candidates were judged."""
     judged: tuple[Judged, ...]
     threshold: Mapping[tuple[int, ...], float]
     nameless: Mapping[int, float]
@@ -111,6 +120,17 @@ def screen(
         effect = options[0][0].placed.effect
         found_so = [_judge(close if effect.at_rest else samples, noise, options, price, null, everywhere)]
         measured = [(v, everywhere(v)) for v, _ in options] if effect.exceeds_at_rest or effect.remembers else []
+        if effect.acts_on == "position":
+
+            def driven(some: Sequence[Variant]) -> Judged | None:
+                measured = [(v, _columns(found, moving, exact, v)) for v in some]
+                return _judge(close, noise, measured, price, None, everywhere)
+
+            j = _tuned(driven([v for v, _ in options]), driven)
+            if j is not None:
+                own = assembly.joint_of(j.placed)
+                share = close.explained(j.variant, {own: _columns(found, moving, exact, j.variant)[own]})
+                found_so += [j] if share > DRIVEN_MOST else []
         if effect.exceeds_at_rest:
             found_so.append(_judge(near_rest, noise, measured, price, None, everywhere))
         if effect.remembers:
@@ -148,7 +168,7 @@ def screen(
                 if share > nameless.get(c, 0.0):
                     nameless[c], over[c] = share, words
     judged.sort(key=lambda j: -j.score)
-    return Screening(samples.evidence, near_rest, tuple(judged), threshold, nameless, over, tuple(limits), noise)
+    return Screening(samples.evidence, near_rest, close, tuple(judged), threshold, nameless, over, tuple(limits), noise)
 
 
 def _left(
@@ -230,6 +250,23 @@ def _judge(
     columns = {c: noise.whiten(c, parts) for c, parts in own.items()}
     explained = samples.explained(variant, own)
     return Judged(variant, variant.placed, amplitudes, score, price, explained, tuple(own), case, columns, everywhere)
+
+
+def _tuned(best: Judged | None, judge: Callable[[Sequence[Variant]], Judged | None]) -> Judged | None:
+    """The best candidate near a point of its grid: every shape up or down, by ever smaller factors."""
+    if best is None:
+        return None
+    for factor in 1.8 ** (0.5 ** np.arange(TUNINGS)):
+        shape = best.variant.parameters
+        near = [
+            shape * np.where(np.arange(len(shape)) == i, f, 1.0)
+            for i in range(len(shape))
+            for f in (factor, 1 / factor)
+        ]
+        other = judge([replace(best.variant, parameters=x) for x in near])
+        if other is not None and other.score > best.score:
+            best = other
+    return best
 
 
 def _limits(assembly: Assembly, evidence: Evidence, j: Judged, needed: float) -> list[Limit]:

@@ -116,7 +116,7 @@ def search(
         opening = result = before.opening
         instruments = before.instruments
     for number in range(2, MOST_ROUNDS + 2):
-        passing = [j for j in _passing(result) if j.placed.key not in barred]
+        passing = [j for j in _passing(result, model.joints) if j.placed.key not in barred]
         chosen = _choose(result, passing)
         if not chosen:
             break
@@ -145,8 +145,8 @@ def without(found: Fit, placed: Placed) -> Assembly:
     return found.assembly.keep([p for p in found.assembly.placed if p.key != placed.key], found.theta)
 
 
-def _passing(result: Screening) -> list[Judged]:
-    """Candidates that pass every test, best first."""
+def _passing(result: Screening, joints: Sequence[str]) -> list[Judged]:
+    """Candidates that pass every test, best first; what acts at a joint finds its channel among ``joints``."""
     passing = []
     for j in result.judged:
         if j.score <= result.threshold[j.channels] or j.explained < WORTH:
@@ -159,7 +159,16 @@ def _passing(result: Screening) -> list[Judged]:
         better = [o for o in others if _same_samples(result, j, o).score > j.score]
         passing.remove(j)
         passing.insert(max((passing.index(o) + 1 for o in better), default=0), j)
-    return _untied(result, passing)
+    # What disturbances could have driven, if nothing else, is named where nothing else is.
+    driven = [j for j in passing if _as_measured(result, j)]
+    first = [j for j in passing if j not in driven]
+    alone = [j for j in driven if not any(joints.index(j.placed.at) in o.channels for o in first)]
+    return _untied(result, [*first, *alone])
+
+
+def _as_measured(result: Screening, j: Judged) -> bool:
+    """Was a drive's spring or play judged along the motion as measured?"""
+    return j.case.evidence is result.measured.evidence and j.placed.effect.acts_on == "position"
 
 
 def _untied(result: Screening, passing: list[Judged]) -> list[Judged]:

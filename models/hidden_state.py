@@ -30,6 +30,7 @@ from .compiled import SampleFunction
 from .effect import Effect
 
 _MOST_NEWTON, _MOST_HALVINGS = 200, 40
+_SMALL = 1e-8  # of a state: a step of Newton's that is the last, since the next one would be its square
 _GAMMA = 1 - np.sqrt(0.5)
 _JOINT = dict.fromkeys(("q", "qd", "qdd", "load", "inertia", "time", "temperature", "speed_scale"), 1)
 
@@ -42,6 +43,9 @@ SIGNALS = {
     "slide": _JOINT,
     "boom": {"spread": 2, "time": 1},
     "base": {"spin": 3, "spin_rate": 3, "acceleration": 3, "spin_gained": 3, "impulse": 3, "time": 1},
+    "pin": {"overlap": 1, "approach": 1, "elastic_force": 1, "normal_force": 1, "slip": 3, "slip_velocity": 1},
+    "cables": {"bending_stiffness": 1, "curvature_rate": 1},
+    "target": {"displacement": 3},
 }
 
 #: The signal, by place, that itself depends on the model's parameters; none on a rig's slings, slides and booms.
@@ -271,6 +275,9 @@ def _steady_state(effect: Effect, built: _Built, first: list[np.ndarray], p: np.
             change = np.linalg.solve(by_state, -rate[:, 0])
         except np.linalg.LinAlgError:
             break
+        if np.abs(change).max() <= _SMALL * np.abs(x).max():
+            _, by_state, by_parameter = at(x + change)
+            return np.concatenate([x + change, np.linalg.solve(by_state, -by_parameter).ravel()])
         before = np.linalg.norm(rate)
         for _ in range(_MOST_HALVINGS):
             rate, by_state, by_parameter = at(x + change)
@@ -278,7 +285,5 @@ def _steady_state(effect: Effect, built: _Built, first: list[np.ndarray], p: np.
                 break
             change = 0.5 * change
         x = x + change
-        if np.all(np.abs(change) <= 1e-12 * (1e-300 + np.abs(x))) or not np.any(change):
-            return np.concatenate([x, np.linalg.solve(by_state, -by_parameter).ravel()])
     values = ", ".join(f"{a.name} = {b:g} {a.unit}" for a, b in zip(effect.parameters, p, strict=True))
     raise InputError(f"{effect.name} has no steady state to start from at the first sample ({values})")

@@ -57,7 +57,7 @@ def judge(answer: Answer, found: Diagnosed) -> Scored:
     """Score one case."""
     classes = [_class(e) for e in found["effects"]]
     right = [_fits(c, answer.truths) for c in classes]
-    placed = [_fits(c, answer.truths, at=True) for c in classes]
+    placed = rightly_placed(answer, found)
     probability = [
         min(e["probability"] + sum(r["probability"] for r in e["rivals"] if not r["separable"]), 1.0)
         for e in found["effects"]
@@ -75,6 +75,11 @@ def judge(answer: Answer, found: Diagnosed) -> Scored:
         sizes=tuple(len(c) for c in classes),
         error=_error(answer, found),
     )
+
+
+def rightly_placed(answer: Answer, found: Diagnosed) -> list[bool]:
+    """Of every effect named, whether its class holds one that is concealed, at its place."""
+    return [_fits(_class(e), answer.truths, at=True) for e in found["effects"]]
 
 
 def _class(effect: Mapping[str, Any]) -> list[tuple[str, str]]:

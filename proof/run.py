@@ -28,7 +28,7 @@ from .seal import INPUTS, BrokenSeal, Seal, digest, sha256, text, tool, write_js
 from .seal import rivals as rivals_digest
 
 SEED = 700001
-"""The proof's own; below 1000 is the tuning of `bench/reliability.py`, 90000 to 99999 is for work on the tool."""
+"""The proof's own; 90000 to 99999 is for work on the tool, `proof.calibrate` among it."""
 
 FOLDER = Path("build/proof")
 LONGEST = 1800.0  # s, then a diagnosis counts as none

@@ -1,12 +1,9 @@
-"""The reliability curve: fitted without falling, read without certainty, and its bank done once only."""
-
-import json
-from functools import partial
+"""The reliability curve: fitted without falling, and read without certainty."""
 
 import numpy as np
 import pytest
 
-from bench.reliability import curve, fill, run_case
+from proof.calibrate import curve
 from snarelab.identification.reliability import probability
 
 
@@ -50,16 +47,3 @@ def test_stored_curve_never_falls_and_is_never_certain():
     assert found[0] > 0
     assert found[-1] < 1
     assert found[-1] > 0.5  # the package's names are worth more than a coin
-
-
-def test_bank_goes_on_where_it_stopped(tmp_path):
-    path, told = tmp_path / "bank.jsonl", []
-    run = partial(run_case, seconds=6.0, holdout=6.0)
-    (first,) = fill(path, range(1), 7, 1, run, told.append)
-    path.write_text(path.read_text() + '{"case": 1, "ki')  # stopped while it wrote
-    both = fill(path, range(2), 7, 1, run, told.append)
-    assert both[0] == first
-    assert [r["kind"] for r in both] == ["coulomb_friction", "stribeck_friction"]
-    assert [json.loads(line) for line in path.read_text().splitlines()] == both
-    assert fill(path, range(2), 7, 1, run, told.append) == both
-    assert len(told) == 2

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bench.arm import random_arm
-from bench.reliability import run_case
+from bench.concealed_arm import run_case
 from snarelab.identification.assembly import Assembly
 from snarelab.identification.candidates import variants
 from snarelab.identification.evidence import Channel, Evidence

@@ -26,6 +26,7 @@ EFFECT = Effect(
     parameters=(
         Parameter("cosine", "T", "variation in phase with the cosine of position"),
         Parameter("sine", "T", "variation in phase with the sine of position"),
+        # Half a period in the travel apart: a fit from further off locks on to a side lobe.
         Parameter(
             "period",
             "S",
@@ -33,7 +34,7 @@ EFFECT = Effect(
             zero=1.0,
             low=0.05,
             high=4.0,
-            grid=(0.1, 0.14, 0.2, 0.3, 0.5, 1.0, 2.0),
+            grid=tuple(2 / halves for halves in range(1, 21)),
             relative_to="travel",
         ),
     ),

@@ -34,7 +34,7 @@ EFFECT = Effect(
             "travel over which it builds up",
             zero=1e-3,
             low=1e-6,
-            high=0.3,
+            high=0.1,
             grid=(1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 0.01, 0.03),
             relative_to="travel",
         ),
