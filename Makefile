@@ -1,12 +1,12 @@
 # Each target sets up .venv by itself and does nothing where nothing changed. PYTHON picks the interpreter (3.11 or newer).
 PYTHON ?= python3
 BIN := .venv/bin
-SOURCES := $(shell git ls-files '*.py' '*.toml' '*.urdf' '*.csv' '*.json' 2>/dev/null | grep -v -e '^tests/' -e '^bench/' -e '^proof/')
+SOURCES := $(shell git ls-files --cached --others --exclude-standard '*.py' '*.toml' '*.urdf' '*.csv' '*.json' 2>/dev/null | grep -v -e '^tests/' -e '^bench/' -e '^proof/')
 STUDIES := emps kuka bam free-floating ground-capture zero-g-rig orbit-inspection orbit-hover tolerance
 
-BENCHES := torque friction_fit diagnosis floating cosim fmu snare
+BENCHES := torque friction_fit diagnosis floating cosim fmu snare ecos_inspection
 
-.PHONY: help demo test check studies bench accuracy proof fmus clean $(STUDIES:%=study-%)
+.PHONY: help demo test check studies bench accuracy proof fmus docs clean $(STUDIES:%=study-%)
 
 help:            ## what can be made
 	@sed -n -e 's/^\$$(STUDIES.*## /  make study-NAME\t/p' -e 's/^\([a-z]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
@@ -37,6 +37,9 @@ proof: .venv/installed ## conceal effects in another engine's recordings, let th
 
 fmus: .venv/installed ## the shipped FMUs and a page on each, into build/fmus
 	$(BIN)/python -m snarelab.fmu.shipped
+
+docs: .venv/installed ## the pages with their generated parts, into build/docs; a broken link is an error
+	$(BIN)/python docs/make_pages.py && $(BIN)/python -m sphinx -q -W --keep-going -E -d build/docs-tree docs build/docs
 
 clean:           ## remove what was built; the environment too
 	rm -rf .venv build *.egg-info

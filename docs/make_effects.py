@@ -1,15 +1,11 @@
-"""Write ``docs/effects.md`` from the effects themselves: ``python docs/make_effects.py``.
+"""The page of effects, written from the effects themselves; `make_pages.py` puts it in its place."""
 
-A test compares the committed page with `page`, so that the page cannot go stale.
-"""
-
+import json
 import re
 from pathlib import Path
 
 from snarelab.models.effect import Effect, Parameter
 from snarelab.models.effects import FAMILIES, effects
-
-PAGE = Path(__file__).with_name("effects.md")
 
 PLANNED = {
     "free-floating base": ("external_torque", "flexible_appendage", "propellant_slosh", "wheel_friction"),
@@ -28,7 +24,7 @@ HEAD = """\
 # Effects
 
 An effect is a piece of physics with a name, a place and a law. The same name is used in model files, in the code, in
-results and in reports. This page is written from the code by `python docs/make_effects.py`.
+results and in reports. This page is written from the code by `python docs/make_pages.py`.
 
 - **Where** is the kind of place that an effect acts at. A *joint* or a *link* is named as in the URDF. A *sensor* is a
   channel, such as `tau.joint1`.
@@ -47,6 +43,18 @@ results and in reports. This page is written from the code by `python docs/make_
 - An effect *contains* those that are special cases of it. They are named first, and it only for what is then left.
 
 How to add one: [adding-an-effect.md](adding-an-effect.md).
+"""
+
+CONFUSIONS = """\
+## What each is confused with
+
+Share of an effect's torque that another one makes as well, at the same joint, once viscous and Coulomb friction have
+taken what they can; from 80 %. Measured along the bundled recording by `python docs/make_confusions.py`: another motion
+parts, or joins, other pairs, and a diagnosis judges its own recordings and names the rivals that it cannot part.
+Effects of suspension rigs, floating bases and snares are not measured here.
+
+| effect | looks like |
+| --- | --- |
 """
 
 EXPERIMENTS = """\
@@ -72,8 +80,21 @@ def page() -> str:
             parts.append("\n".join([heads, *map(_row, members)]) + "\n")
         if planned:
             parts.append(f"Not yet: {', '.join(planned)}.\n")
+    parts.append(CONFUSIONS + "\n".join(_confusions()) + "\n")
     parts.append(EXPERIMENTS + "\n".join(map(_experiment, effects().values())) + "\n")
     return "\n".join(parts)
+
+
+def families() -> str:
+    """The README's table: what can be named, and which names are kept for later."""
+    rows = []
+    for family in FAMILIES:
+        now = [f"`{e.name}`" for e in effects().values() if e.family == family]
+        later = [f"`{name}`" for name in PLANNED.get(family, ()) if name not in effects()]
+        rows.append([family, " ".join(now), " ".join(later)])
+    heads = ["family", "can be named", "not yet"][: 3 if any(row[2] for row in rows) else 2]
+    lines = [_cells(*heads), _cells(*["---"] * len(heads)), *(_cells(*row[: len(heads)]) for row in rows)]
+    return "\n".join(lines) + "\n"
 
 
 def _row(effect: Effect) -> str:
@@ -90,13 +111,21 @@ def _parameter(p: Parameter) -> str:
     return f"`{p.name}` [{'–' if unit == '1' else unit}]{shape}: {p.meaning}"
 
 
+def _confusions() -> list[str]:
+    """A row for each effect of an arm, in the page's order."""
+    measured = json.loads(Path(__file__).with_name("confusions.json").read_text(encoding="utf-8"))
+    rows = []
+    for name, effect in effects().items():
+        if effect.at in ("joint", "link", "sensor"):
+            others = measured.get(name)
+            alike = [f"`{other}` {100 * share:.0f} %" for other, share in (others or {}).items()]
+            rows.append(_cells(f"`{name}`", ", ".join(alike) or ("none" if others == {} else "not measured yet")))
+    return rows
+
+
 def _experiment(effect: Effect) -> str:
     return _cells(f"`{effect.name}`", effect.experiment.format(at="*X*"))
 
 
 def _cells(*cells: str) -> str:
     return f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |"
-
-
-if __name__ == "__main__":
-    PAGE.write_text(page(), encoding="utf-8")

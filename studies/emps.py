@@ -20,6 +20,7 @@ from ..identification.report import write_report
 from ..models.model_file import load_model
 from ..models.model_write import save_model
 from ..recordings import find_recording
+from .command import status_of
 
 HERE = Path(__file__).parent
 OUT = Path("build/studies/emps")
@@ -117,4 +118,4 @@ def _table(found: Diagnosis) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(status_of(main))

@@ -54,9 +54,22 @@ def rows(markdown, head):
     return [[cell.strip() for cell in line.strip("| ").split("|")] for line in lines]
 
 
-def test_page_of_effects_is_what_the_code_gives():
-    given = runpy.run_path(str(DOCS / "make_effects.py"))["page"]()
-    assert text("effects.md") == given, "docs/effects.md is stale: run python docs/make_effects.py"
+def test_pages_from_the_code_are_what_the_code_gives(monkeypatch):
+    monkeypatch.syspath_prepend(DOCS)  # the scripts import each other by name, as they do when they are run
+    for path, given in runpy.run_path(str(DOCS / "make_pages.py"))["pages"]().items():
+        assert path.read_text(encoding="utf-8") == given, f"{path.name} is stale: run python docs/make_pages.py"
+
+
+def test_what_looks_alike_is_what_the_columns_give():
+    """Shares move a little with the rounding of a fit; pairs near the bar of 80 % may come and go."""
+    script = runpy.run_path(str(DOCS / "make_confusions.py"))
+    written = json.loads((DOCS / "confusions.json").read_text(encoding="utf-8"))
+    measured = script["alike"]()
+    for one, others in written.items():
+        for other in {*others, *measured[one]} & set(written):
+            shares = others.get(other, script["ALIKE"]), measured[one].get(other, script["ALIKE"])
+            assert abs(shares[0] - shares[1]) <= 0.03, f"{one}, {other}: run python docs/make_confusions.py"
+    assert measured["sensor_bias"]["asymmetric_friction"] > 0.99  # a level in either direction: the same column
 
 
 def test_page_of_effects_shows_every_parameter():
@@ -94,6 +107,8 @@ def test_every_make_target_mentioned_exists():
 @pytest.mark.parametrize(("page", "block"), blocks("toml"))
 def test_every_model_shown_loads(page, block, tmp_path):
     given = tomllib.loads(block)
+    if "participants" in given:  # a system for `snarelab cosim`: test_adding.py and test_cosim_files.py run such
+        return
     if "capture" in given:
         study = tmp_path / "study.toml"
         study.write_text(block, encoding="utf-8")
@@ -144,11 +159,11 @@ def test_every_field_of_a_diagnosis_is_described():
         ("a note",),
         40.0,
     )
-    page = text("commands.md")
+    page = text("results.md")
     found = keys(diagnosis.to_json())
     assert len(found) > 35
     missing = found - described(page[page.index("## Diagnosis (JSON)") :])
-    assert not missing, f"docs/commands.md does not describe {missing}"
+    assert not missing, f"docs/results.md does not describe {missing}"
 
 
 def test_every_field_of_an_identification_is_described(tmp_path):
@@ -161,16 +176,16 @@ def test_every_field_of_an_identification_is_described(tmp_path):
     links = found["inertia"]["links"]
     # Lists in place of what is keyed by names of channels and links.
     found |= {"fit": [*found["fit"].values()], "inertia": found["inertia"] | {"links": [*links.values()]}}
-    page = text("commands.md")
+    page = text("results.md")
     section = page[page.index("## Identification (JSON)") : page.index("## Diagnosis (JSON)")]
     inertial = set(next(iter(links.values())))
     assert all(f"`{name}`" in section for name in inertial)
     missing = keys(found) - described(section) - inertial
-    assert not missing, f"docs/commands.md does not describe {missing}"
+    assert not missing, f"docs/results.md does not describe {missing}"
 
 
 def test_readme_says_what_can_be_named():
-    table = rows(README.read_text(encoding="utf-8"), "| family | can be named |")
+    table = rows(README.read_text(encoding="utf-8").replace("<!-- end of effects -->", ""), "| family | can be named |")
     assert [row[0] for row in table] == list(FAMILIES)
     assert {name for row in table for name in re.findall(r"`(\w+)`", row[1])} == set(effects())
     for family, now, *planned in table:
@@ -182,21 +197,12 @@ def test_thresholds_are_those_of_the_code():
     table = rows(text("method.md"), "| constant | value |")
     assert len(table) > 10
     sources = [path for folder in ("recordings", "identification") for path in (ROOT / folder).glob("*.py")]
+    # The search over captures has thresholds of its own, under names that mean the same.
+    sources = [path for path in sources if not path.name.startswith("snare_")]
     code = "\n".join(path.read_text(encoding="utf-8") for path in sources)
     for name, value, _ in table:
         defined = re.findall(rf"^{name.strip('`')} = (.*)$", code, re.MULTILINE)
         assert list(map(float, defined)) == [float(value)], f"{name} in docs/method.md, {defined} in the code"
-
-
-def test_commands_and_options_are_those_of_the_program(capsys):
-    page = text("commands.md")
-    usage = page[page.index("```\n") : page.index("**identify**")]
-    for command in ("identify", "diagnose", "simulate"):
-        with pytest.raises(SystemExit):
-            main([command, "--help"])
-        options = set(re.findall(r"--[a-z-]+", capsys.readouterr().out)) - {"--help"}
-        (line,) = [line for line in usage.splitlines() if line.startswith(f"snarelab {command}")]
-        assert set(re.findall(r"--[a-z-]+", line)) == options
 
 
 def test_results_shown_on_two_pages_are_the_same():

@@ -1,0 +1,214 @@
+"""The commands as Python calls: `diagnose`, `identify` and `simulate` on files or on what is already loaded.
+
+The package gives them as ``snarelab.diagnose``, ``snarelab.identify`` and ``snarelab.simulate``.
+"""
+
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TypeAlias
+
+import pandas as pd
+import xarray as xr
+
+from ..errors import InputError
+from ..models.model import Model
+from ..models.model_file import load_model
+from ..recordings import write_recording
+from . import diagnose as diagnosing
+from . import identify as identifying
+from . import simulate as simulating
+from .results import DiagnosisResult, IdentificationResult, ParameterEstimate
+
+ModelLike: TypeAlias = str | Path | Model
+"""A model file's path, or a `Model` that was loaded."""
+
+RecordingLike: TypeAlias = str | Path | xr.Dataset | pd.DataFrame
+"""A recording's path, or a table in memory with the columns that a file would have."""
+
+
+def diagnose(
+    model: ModelLike,
+    recordings: RecordingLike | Sequence[RecordingLike],
+    *,
+    holdout: RecordingLike,
+    progress: Callable[[str], None] = lambda _: None,
+    seed: int = 0,
+) -> DiagnosisResult:
+    """Find, name and add the physics that a model leaves out; confirm it on a recording that the fit never sees.
+
+    Parameters
+    ----------
+    model : path or Model
+        What is believed.
+    recordings : path, xarray.Dataset or pandas.DataFrame, or a sequence of them
+        Fitted and searched. A table in memory has the columns of a file: ``time``, ``q.<joint>``, ``tau.<joint>``.
+    holdout : path, xarray.Dataset or pandas.DataFrame
+        Locked away for the proof; may not be one of the others.
+    progress : callable
+        Told in a few words what is under way, for example ``print``.
+    seed : int
+        Of bootstraps and nulls.
+
+    Returns
+    -------
+    DiagnosisResult
+        Frozen; prints as the verdict and a table, and shows itself in a notebook.
+
+    Raises
+    ------
+    InputError
+        Whatever is wrong with the model or a recording, in one line.
+
+    Examples
+    --------
+    An arm that another simulator moved, with more physics than its model knows:
+
+    >>> import snarelab
+    >>> from importlib.resources import files
+    >>> arm = files("snarelab.studies") / "bundled"
+    >>> found = snarelab.diagnose(arm / "arm3.toml", arm / "train.csv", holdout=arm / "holdout.csv")
+    >>> found.verdict
+    'missing_physics'
+    >>> [effect.at for effect in found.effects if effect.name == "coulomb_friction"]
+    ['joint2', 'joint1', 'joint3']
+    >>> level = found.effects[0].parameters["level"]
+    >>> level.unit, level.std < 0.1 * level.value
+    ('N*m', True)
+    >>> found.steps[-1].holdout < 0.1 * found.steps[0].holdout
+    True
+    >>> found.save_model("arm3-new.toml")
+    """
+    given = _model(model)
+    with _as_files([*_several(recordings), holdout]) as paths:
+        answer = diagnosing.diagnose(given, paths[:-1], paths[-1], progress=progress, seed=seed)
+    return DiagnosisResult(answer.diagnosis, answer.model)
+
+
+def identify(
+    model: ModelLike,
+    recordings: RecordingLike | Sequence[RecordingLike],
+    *,
+    holdout: RecordingLike | Sequence[RecordingLike] = (),
+    progress: Callable[[str], None] = lambda _: None,
+    seed: int = 0,
+) -> IdentificationResult:
+    """Fit every parameter of a model to all recordings jointly.
+
+    Parameters
+    ----------
+    model : path or Model
+        What is believed.
+    recordings : path, xarray.Dataset or pandas.DataFrame, or a sequence of them
+        Fitted.
+    holdout : the same
+        Recordings on which the fit is only evaluated; none by default.
+    progress : callable
+        Told in a few words what is under way.
+    seed : int
+        Of the random starts.
+
+    Returns
+    -------
+    IdentificationResult
+        Frozen; prints as a table of parameters, and shows itself in a notebook.
+
+    Raises
+    ------
+    InputError
+        Whatever is wrong with the model or a recording, in one line.
+
+    Examples
+    --------
+    >>> import snarelab
+    >>> from importlib.resources import files
+    >>> arm = files("snarelab.studies") / "bundled"
+    >>> fitted = snarelab.identify(arm / "arm3.toml", arm / "train.csv", holdout=arm / "holdout.csv")
+    >>> [f"{p.effect} at {p.at}" for p in fitted.parameters]
+    ['viscous_friction at joint1', 'viscous_friction at joint2', 'viscous_friction at joint3']
+    >>> fitted.fit["tau.joint1"]["holdout"]["relative"] < 0.2
+    True
+    """
+    given = _model(model)
+    train, locked = _several(recordings), _several(holdout)
+    with _as_files([*train, *locked]) as paths:
+        found = identifying.identify(given, paths[: len(train)], paths[len(train) :], progress=progress, seed=seed)
+        published = found.to_json()
+    names = ParameterEstimate.__dataclass_fields__
+    parameters = tuple(ParameterEstimate(**{name: p[name] for name in names}) for p in published["parameters"])
+    return IdentificationResult(parameters, published["fit"], published["condition"], found.model, published)
+
+
+def simulate(model: ModelLike, motion: RecordingLike | None = None) -> xr.Dataset:
+    """Torque that a model gives along a recorded motion; what the sensors of a capture read.
+
+    Parameters
+    ----------
+    model : path or Model
+        With values of all its parameters: a file that ``save_model`` wrote, or the ``model`` of a result.
+    motion : path, xarray.Dataset, pandas.DataFrame or None
+        The motion to follow. A capture needs none.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``q qd qdd tau`` of every joint over ``time`` [s], SI units; of a capture, its own channels.
+
+    Raises
+    ------
+    InputError
+        A parameter without a value, or whatever is wrong with the recording.
+
+    Examples
+    --------
+    >>> import snarelab
+    >>> from importlib.resources import files
+    >>> arm = files("snarelab.studies") / "bundled"
+    >>> fitted = snarelab.identify(arm / "arm3.toml", arm / "train.csv")
+    >>> run = snarelab.simulate(fitted.model, arm / "holdout.csv")
+    >>> sorted(name for name in run if name.startswith("tau"))
+    ['tau.joint1', 'tau.joint2', 'tau.joint3']
+    """
+    with _as_files([] if motion is None else [motion]) as paths:
+        return simulating.simulate(_model(model), *paths or [None])
+
+
+def _model(model: ModelLike) -> Model:
+    return model if isinstance(model, Model) else load_model(model)
+
+
+def _several(recordings: RecordingLike | Sequence[RecordingLike]) -> list[RecordingLike]:
+    single = isinstance(recordings, str | Path | xr.Dataset | pd.DataFrame)
+    return [recordings] if single else list(recordings)
+
+
+@contextmanager
+def _as_files(recordings: Sequence[RecordingLike]) -> Iterator[list[str | Path]]:
+    """Every recording as a path; tables in memory stand in a folder of their own for as long as they are read.
+
+    The same object is the same file, so that a holdout which is also fitted is refused as ever.
+    """
+    with tempfile.TemporaryDirectory(prefix="snarelab-") as folder:
+        written: dict[int, str | Path] = {}
+        for k, recording in enumerate(recordings, 1):
+            if id(recording) in written:
+                continue
+            if isinstance(recording, str | Path):
+                written[id(recording)] = recording
+                continue
+            path = Path(folder) / f"recording{k}.parquet"
+            if isinstance(recording, pd.DataFrame):
+                recording.to_parquet(path)
+            elif isinstance(recording, xr.Dataset):
+                write_recording(recording, path)
+            else:
+                raise InputError(
+                    f"recording {k}: is a {type(recording).__name__}; give a path, an xarray.Dataset or a "
+                    "pandas.DataFrame"
+                )
+            written[id(recording)] = path
+        try:
+            yield [written[id(recording)] for recording in recordings]
+        except InputError as error:
+            raise InputError(str(error).replace(f"{folder}/", "")) from None

@@ -1,0 +1,200 @@
+"""What the Python calls give back: frozen results that show themselves as text and, in a notebook, as tables."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from .. import __version__
+from ..models.model import Model
+from ..models.model_write import save_model
+from ..report.html import folded, paragraph, table
+from .diagnosis import ChannelFit, Diagnosis, Finding, Step
+from .report import write_report
+from .report_findings import STATUS, missing
+from .report_words import number, percent, unit_words, with_std, words
+
+# Colours come from the notebook, so that a result reads on its light page and on its dark one.
+_STYLE = """<style>
+.snarelab-result{max-width:60rem;line-height:1.45}
+.snarelab-result .status{border:1px solid currentColor;border-radius:1rem;padding:.1rem .6rem;font-weight:600}
+.snarelab-result table{border-collapse:collapse;font-variant-numeric:tabular-nums}
+.snarelab-result caption{text-align:left;opacity:.75}
+.snarelab-result th,.snarelab-result td{text-align:left;vertical-align:top;padding:.2rem .9rem .2rem 0}
+.snarelab-result .n{text-align:right;white-space:nowrap}
+.snarelab-result .scroll{overflow-x:auto;margin:.6rem 0}
+.snarelab-result h3{font-size:1.05em;margin:.9rem 0 .2rem}
+.snarelab-result summary{cursor:pointer}
+</style>"""
+
+
+@dataclass(frozen=True, repr=False)
+class DiagnosisResult:
+    """The verdict of `diagnose`, and the model with what was found.
+
+    ``print`` gives the sentence and the table of steps; a notebook shows them with a card for each effect.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        Everything that was found, as one frozen value.
+    model : Model
+        The model given, with the effects named and all values identified.
+    """
+
+    diagnosis: Diagnosis
+    model: Model
+
+    @property
+    def verdict(self) -> str:
+        """``missing_physics``, ``adequate`` or ``unknown_effect``."""
+        return self.diagnosis.verdict
+
+    @property
+    def sentence(self) -> str:
+        """The verdict in one or two sentences."""
+        return self.diagnosis.sentence
+
+    @property
+    def effects(self) -> tuple[Finding, ...]:
+        """What the model left out, each with place, probability, parameters, evidence and rivals."""
+        return self.diagnosis.effects
+
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """The model as given and after each effect added: relative misfit on both sets (0 to 1)."""
+        return self.diagnosis.steps
+
+    @property
+    def fit(self) -> tuple[ChannelFit, ...]:
+        """Misfit of every channel before and after, in the channel's unit, and its noise floor."""
+        return self.diagnosis.fit
+
+    def to_json(self) -> dict[str, Any]:
+        """What ``snarelab diagnose --json`` writes: plain dicts, lists, numbers and text."""
+        return self.diagnosis.to_json()
+
+    def write_report(self, path: str | Path) -> None:
+        """Write the report, one HTML file that needs no network; raises InputError where it cannot be written."""
+        write_report(self.diagnosis, path)
+
+    def save_model(self, path: str | Path) -> None:
+        """Write the model file with what was found; raises InputError where it cannot be written."""
+        save_model(self.model, path, f"{self.sentence}\nsnarelab diagnose {__version__}")
+
+    def __str__(self) -> str:
+        """What the command prints."""
+        lines = [
+            f"  {step.label:<60} fitted {100 * step.train:6.2f} %   held out {100 * step.holdout:6.2f} %"
+            for step in self.steps
+        ]
+        return "\n".join([self.sentence, *lines])
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        rows = [[escape(step.label), percent(step.train), percent(step.holdout)] for step in self.steps]
+        _, heading, cards = missing(self.diagnosis)
+        return _shown(
+            f'<span class="status">{STATUS[self.diagnosis.verdict]}</span>\n'
+            + paragraph(self.sentence)
+            + table("Relative misfit over all channels", ["Model", "Fitted", "Held out"], rows, (1, 2), wide=False)
+            + folded(heading, cards)
+            + folded("Notes", "".join(map(paragraph, self.diagnosis.notes)))
+        )
+
+
+@dataclass(frozen=True)
+class ParameterEstimate:
+    """One identified number.
+
+    ``std`` is None where the recordings say nothing of it, ``identifiable`` False where they do not carry it: its value
+    is then not to be quoted. ``at_bound`` says that it ended at a physical bound. Units are SI.
+    """
+
+    effect: str
+    at: str
+    name: str
+    value: float
+    std: float | None
+    unit: str
+    at_bound: bool
+    identifiable: bool
+
+
+@dataclass(frozen=True, repr=False)
+class IdentificationResult:
+    """What `identify` found: parameters, misfits, and the model with its values.
+
+    Parameters
+    ----------
+    parameters : tuple of ParameterEstimate
+    fit : mapping
+        Channel to ``{"train": {"rms", "relative"}, "holdout": ..., "unit"}``, as in the JSON.
+    condition : float
+        Condition number of the fit; above about 100 the parameters are hard to tell apart.
+    model : Model
+        The model given, with all values.
+    published : mapping
+        The whole result as JSON has it.
+    """
+
+    parameters: tuple[ParameterEstimate, ...]
+    fit: Mapping[str, Any]
+    condition: float
+    model: Model
+    published: Mapping[str, Any]
+
+    def to_json(self) -> dict[str, Any]:
+        """What ``snarelab identify --json`` writes: plain dicts, lists, numbers and text."""
+        return dict(self.published)
+
+    def save_model(self, path: str | Path) -> None:
+        """Write the model file with the values found; raises InputError where it cannot be written."""
+        save_model(self.model, path, f"{self.model.name}: values from snarelab identify {__version__}")
+
+    def __str__(self) -> str:
+        """What the command prints."""
+        lines = [f"{'effect':<26}{'at':<16}{'parameter':<24}{'value':>12}{'std':>11}  unit"]
+        for p in self.parameters:
+            flag = "  (at its bound)" if p.at_bound else ""
+            std = "unknown" if p.std is None else f"{p.std:.2g}"
+            lines.append(f"{p.effect:<26}{p.at:<16}{p.name:<24}{p.value:>12.5g}{std:>11}  {p.unit}{flag}")
+        lines += [
+            f"{channel} {role}: RMS residual {rms:.4g} {unit}, {100 * relative:.2f} % of the measured"
+            for channel, role, rms, relative, unit in self._misfits()
+        ]
+        return "\n".join([*lines, f"condition number {self.condition:.3g}"])
+
+    __repr__ = __str__
+
+    def _misfits(self) -> list[tuple[str, str, float, float, str]]:
+        return [
+            (channel, role, entry[role]["rms"], entry[role]["relative"], entry["unit"])
+            for channel, entry in self.fit.items()
+            for role in ("train", "holdout")
+            if role in entry
+        ]
+
+    def _repr_html_(self) -> str:
+        parameters = []
+        for p in self.parameters:
+            value, std = with_std(p.value, float("inf") if p.std is None else p.std)
+            remark = "at its bound" if p.at_bound else "" if p.identifiable else "not carried by the recordings"
+            cells = (words(p.effect), p.at, words(p.name), value, f"± {std}", unit_words(p.unit), remark)
+            parameters.append([escape(cell) for cell in cells])
+        misfits = [
+            [escape(channel), role, f"{number(rms)} {escape(unit_words(unit))}", percent(relative)]
+            for channel, role, rms, relative, unit in self._misfits()
+        ]
+        heads = ["Effect", "At", "Parameter", "Value", "Std", "Unit", ""]
+        return _shown(
+            table(f"Parameters of {self.model.name}", heads, parameters, (3, 4), wide=False)
+            + table("Misfit", ["Channel", "Set", "RMS residual", "Of the measured"], misfits, (2, 3), wide=False)
+            + paragraph(f"Condition number {number(self.condition)}.")
+        )
+
+
+def _shown(content: str) -> str:
+    return f'<div class="snarelab-result">{_STYLE}\n{content}</div>'
