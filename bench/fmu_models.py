@@ -10,6 +10,7 @@ import numpy as np
 
 from bench.arm import random_arm
 from snarelab.fmu.archive import open_fmu
+from snarelab.fmu.build import write_fmu
 
 
 def write_model(folder, name, n_joints, effects, values, seed=3, prismatic=0.0, gravity=(0.0, 0.0, -9.81)):
@@ -73,6 +74,8 @@ class Slave:
             self.callbacks = fmi2CallbackFunctions()
             self.callbacks.logger = fmi2CallbackLoggerTYPE(log)
             self.fmu.instantiate(callbacks=self.callbacks)
+        else:
+            self.fmu.instantiate(logMessage=lambda environment, status, category, text: logged.append(text.decode()))
         if self.two:
             self.fmu.setupExperiment(startTime=start_time)
             self.fmu.enterInitializationMode()
@@ -115,6 +118,14 @@ class Slave:
         """Terminate and free."""
         self.fmu.terminate()
         self.fmu.freeInstance()
+
+
+def made_slave(folder, equations, version: Any = 3, **start):
+    """An instance of equations' FMU, written into a folder where it is not yet; start values by name."""
+    path = folder / f"{equations.name}{version}.fmu"
+    if not path.is_file():
+        write_fmu(equations, path, version)
+    return Slave(path, folder / f"{equations.name}{version}", start)
 
 
 def rewritten(source, target, change):

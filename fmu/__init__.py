@@ -1,1 +1,1 @@
-"""Export of participants as FMUs. Empty until the exporter lands; nothing imports it."""
+"""Models and participants as FMUs: written for other tools, and foreign ones opened safely."""

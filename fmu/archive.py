@@ -10,6 +10,7 @@ from typing import Any
 from xml.parsers import expat
 
 from ..errors import InputError
+from ..files import ZIP_FAULTS
 from .build import binary_folder, library_suffix
 from .elf import ElfFault, exported_symbols
 
@@ -80,7 +81,9 @@ def open_fmu(path: str | Path, folder: str | Path) -> FmuArchive:
             _demand(path, list(_entry_problems(archive)))
             _demand(path, list(_xml_problems(archive)))
             _unpack(archive, folder)
-    except (zipfile.BadZipFile, OSError, EOFError, NotImplementedError, RuntimeError) as error:
+    except InputError:
+        raise
+    except ZIP_FAULTS as error:
         raise InputError(
             f"{path}: is no sound ZIP archive ({' '.join(str(error).split())}); get the FMU again"
         ) from None
@@ -148,7 +151,7 @@ def _xml_problems(archive: zipfile.ZipFile) -> Iterator[str]:
             parser.Parse(archive.read(entry), True)
         except _Doctype:
             yield f"{entry.filename} has a document type, which FMI has no use for and entity bombs need"
-        except expat.ExpatError as error:
+        except (expat.ExpatError, ValueError, LookupError) as error:  # the last two: an encoding that expat lacks
             if entry.filename == "modelDescription.xml":
                 yield f"{entry.filename} is not XML: {error}"
 

@@ -1,45 +1,40 @@
 """An arm that moves as its drives push it: forward dynamics with every effect of a model file.
 
 Accelerations a (of a floating base, then of the J links) solve, with M the inertia, c the velocity and gravity terms
-less what acts from outside, and ``load = M a + c`` the rigid-body torque::
+less what acts from outside, ``load = M a + c`` the rigid-body torque, w the wrench that effects give the base, and
+``rig`` the torque that a rig's slings, slides and booms take beyond their balance::
 
-    base:          (M a + c)_base = 0
-    rigid joint:   load_j + friction_j(q, qd, qdd_j, load_j) = tau_j
-    springy joint: load_j = spring_j,   friction_j(q, qd, qdd_motor, spring_j) + spring_j = tau_j
+    base:          load_base = w(a_base)
+    rigid joint:   load_j + rig_j + friction_j(q, qd, qdd_j, load_j) = tau_j
+    springy joint: load_j + rig_j = spring_j,   friction_j(q, qd, qdd_motor, spring_j) + spring_j = tau_j
 
-by Newton's method with the symmetric matrix ``M + diag((d friction / d qdd) / (1 + d friction / d load))``; one step is
-exact where friction is linear in acceleration and load (Featherstone 2008, chapters 6 and 8, for M, c and M's factors).
+by Newton's method with the symmetric matrix ``M + diag((d friction / d qdd) / (1 + d friction / d load))``, less
+``d w / d a_base``; one step is exact where friction is linear in acceleration and load, as w is (Featherstone 2008,
+chapters 6 and 8, for M, c and M's factors).
 At a springy joint ``q`` is the motor, as an encoder reads it, and ``q_link`` the link.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import inf
 from typing import Any
 
 import casadi as ca
 
 from ..errors import InputError
 from ..models.floating.arm import FloatingArm
-from ..models.floating.symbols import Tip, quaternion_rate, rotation_of, tip
+from ..models.floating.tree import FloatingTree, floating_tree, n_carriers
 from ..models.model import Model, Placed
 from ..models.rig.rig import Rig
-from ..models.rigid_body import symbolic_torque
+from .base import Base
 from .equations import Equations, Ledger
 from .placed_laws import PlacedLaws, identifier
+from .rigid_arm import Rigid, body_outputs, rigid
 from .sensors import read_sensors
-from .symbolic import quaternion_of, root, solved_symmetric
+from .suspension import PLACES, rig_reach, rig_signals
+from .symbolic import root, solved_symmetric
 
 _NEWTON = 6  # friction in proportion to |load| is piecewise linear: it is met after two or three
-
-
-@dataclass(frozen=True, eq=False)
-class _Rigid:
-    """Inertia M, terms c, and the tip at a state; the first ``n_base`` rows are the base's."""
-
-    inertia: ca.SX
-    terms: ca.SX
-    tip: Tip
-    n_base: int
 
 
 @dataclass(frozen=True)
@@ -64,7 +59,7 @@ def arm_equations(
     model : Model
         Effects and their parameters.
     arm : FloatingArm
-        The model's tree on its base, and the tip.
+        The model's tree on its base, and the tip; inputs and outputs ``mount`` where a floating one has a mount.
     stiff : bool or None
         Linearly implicit integrator; None: where friction or hidden states are faster than 1 ms.
     servo : Servo or None
@@ -75,14 +70,11 @@ def arm_equations(
     Raises
     ------
     InputError
-        A parameter without a value, a springy joint whose motor has no inertia, or an effect of a suspension rig.
+        A parameter without a value, or a springy joint whose motor has no inertia.
     """
-    for p in model.effects:
-        if p.effect.at not in ("joint", "link", "sensor"):
-            raise InputError(
-                f"{model.path}: {p.key} is of a suspension rig or a base, and an FMU of an arm has none; drop it"
-            )
-    return _Writer(model, arm).written(stiff, servo, [0.0] * len(model.joints) if start is None else start)
+    if arm.floating and not isinstance(model.tree, FloatingTree):
+        model = replace(model, tree=floating_tree(arm))
+    return _Writer(model, arm).written(stiff, servo, [0.0] * arm.n_joints if start is None else start)
 
 
 class _Writer:
@@ -90,38 +82,29 @@ class _Writer:
 
     def __init__(self, model: Model, arm: FloatingArm) -> None:
         self.model, self.arm, self.ledger = model, arm, Ledger()
-        self.joints, self.n = model.joints, len(model.joints)
-        self.units = ["m" if j.kind == "prismatic" else "rad" for j in model.tree.joints]
+        self.joints, self.n = model.joints[n_carriers(model.tree) :], arm.n_joints
+        self.units = ["m" if j.kind == "prismatic" else "rad" for j in arm.tree.joints]
         self.torque_units = ["N" if unit == "m" else "N*m" for unit in self.units]
 
     def written(self, stiff: bool | None, servo: Servo | None, start: Sequence[float]) -> Equations:
-        ledger, n, arm = self.ledger, self.n, self.arm
+        ledger, n, arm, tree = self.ledger, self.n, self.arm, self.model.tree
         self.tau = ca.vertcat(*self._each(ledger.input, "tau", self.torque_units, "drive torque delivered at"))
-        words = f"on the tip ({self.model.tree.links[arm.tip_link].name}), in the world frame"
-        self.at_tip = ca.vertcat(
+        words = f"on the tip ({arm.tree.links[arm.tip_link].name}), in the world frame"
+        at_tip = ca.vertcat(
             ledger.vector_input("force.tip", "N", f"force from outside {words}"),
             ledger.vector_input("torque.tip", "N*m", f"moment from outside {words}"),
         )
-        self.at_base = ca.SX(6, 1)
-        if arm.floating:
-            words = "on the base at its frame, in the world frame"
-            self.at_base = ca.vertcat(
-                ledger.vector_input("force.base", "N", f"force from outside {words}"),
-                ledger.vector_input("torque.base", "N*m", f"moment from outside {words}"),
-            )
         self.laws = laws = PlacedLaws(self.model, ledger)
-        self.phi = ca.vertcat(*laws.link_parameters())
+        phi = ca.vertcat(*laws.link_parameters())
         springy = {laws.joint_of(p): p for p in laws.at("joint") if p.effect.acts_on == "position"}
         start_q, start_qd = self._starts(start)
         q, qd = (ca.vertcat(*(ledger.state(s) for s in ca.vertsplit(x))) for x in (start_q, start_qd))
-        pose, twist = self._base_states()
-        self.turn = rotation_of(pose[3:]) if arm.floating else ca.SX.eye(3)
+        self.base = base = Base(arm, ledger, laws)
         if servo is not None:
             self.tau += self._servo(servo, q, qd, start)
 
         # A spring's twist starts where it carries what the arm weighs at the start.
-        weight = self._rigid(start_q, ca.SX(n, 1), ca.SX(6, 1), ca.SX.eye(3), ca.SX(6, 1), ca.SX(6, 1))
-        resting = weight.terms[weight.n_base :]
+        resting = rigid(tree, arm, phi, start_q, ca.SX(n, 1)).terms[base.size :]
         q_link, qd_link, springs = ca.SX(q), ca.SX(qd), ca.SX(n, 1)
         start_link = ca.SX(start_q)
         twists: dict[int, tuple[ca.SX, ca.SX]] = {}
@@ -133,23 +116,21 @@ class _Writer:
             q_link[j], qd_link[j] = q[j] - twists[j][0], qd[j] - twists[j][1]
             springs[j] = self._spring(p, j, *twists[j])
 
-        rigid = self._rigid(q_link, qd_link, twist, self.turn, self.at_tip, self.at_base)
+        now = rigid(tree, arm, phi, q_link, qd_link, base, at_tip)
         motion, hidden = (q, qd), self._hidden(start_q, start_qd)
-        friction = self._friction(motion, rigid, hidden)
-        accelerations, load = self._solved(rigid, friction, springy, springs)
-        link_qdd = accelerations[rigid.n_base :]
+        on_rig, rig_rates = self._rig(q_link, qd_link, start_link, start_qd)
+        friction = self._friction(motion, now, hidden)
+        accelerations, load = self._solved(now, friction, springy, springs, on_rig)
+        link_qdd = accelerations[base.size :]
         qdd = ca.SX(link_qdd)
         for j, p in springy.items():
             qdd[j] = self._motor(friction, j, p, springs[j])
-        rates = [*ca.vertsplit(qd), *ca.vertsplit(qdd)]
-        if arm.floating:
-            rates += ca.vertsplit(self.turn @ twist[:3]) + ca.vertsplit(quaternion_rate(pose[3:], twist[3:]))
-            # The equations give the origin's acceleration; seen from the turning base its velocity changes by less.
-            rates += ca.vertsplit(accelerations[:3] - ca.cross(twist[3:], twist[:3])) + ca.vertsplit(accelerations[3:6])
+        rates = [*ca.vertsplit(qd), *ca.vertsplit(qdd), *base.rates(accelerations[: base.size])]
         for j in springy:
             rates += [twists[j][1], qdd[j] - link_qdd[j]]
         for p, _ in hidden:
-            rates += ca.vertsplit(self._hidden_rate(p, motion, qdd, load, rigid, hidden))
+            rates += ca.vertsplit(self._hidden_rate(p, motion, qdd, load, now, hidden))
+        rates += rig_rates
 
         for k, joint in enumerate(self.joints):
             unit, what = self.units[k], "motor position" if k in springy else "position"
@@ -158,7 +139,7 @@ class _Writer:
             ledger.output(f"qdd.{joint}", f"{unit}/s^2", qdd[k], f"rate of qd.{joint}")
             if k in springy:
                 ledger.output(f"q_link.{joint}", unit, q_link[k], f"position of the link behind {joint}")
-        self._bodies(rigid.tip, pose, twist, qd_link)
+        body_outputs(ledger, arm, base, now.tip, qd_link)
         columns = {"q": q, "qd": qd, "qdd": qdd, "load": load, "tau": self.tau, "q_link": q_link}
         signals = [{name: x[j] for name, x in columns.items()} for j in range(n)]
         rates += read_sensors(laws, ledger, signals, {"q": start_q, "q_link": start_link})
@@ -180,8 +161,10 @@ class _Writer:
         for k, (quantity, rate) in enumerate((("q", ""), ("qd", "/s"))):
             for j, joint in enumerate(self.joints):
                 words, unit = f"{quantity}.{joint} at the start", self.units[j] + rate
-                value = 0.0 if k else float(start[j])
-                found[k].append(self.ledger.parameter(f"start.{quantity}.{joint}", unit, value, words, fixed=True))
+                value, own = 0.0 if k else float(start[j]), self.arm.tree.joints[j]
+                bounds = (-inf, inf) if k else (own.lower, own.upper)
+                name = f"start.{quantity}.{joint}"
+                found[k].append(self.ledger.parameter(name, unit, value, words, bounds, fixed=True))
         return ca.vertcat(*found[0]), ca.vertcat(*found[1])
 
     def _servo(self, servo: Servo, q: ca.SX, qd: ca.SX, start: Sequence[float]) -> ca.SX:
@@ -193,53 +176,9 @@ class _Writer:
             gains = []
             for word, unit, value in (("stiffness", "T/S", servo.stiffness[j]), ("damping", "T*s/S", servo.damping[j])):
                 name, full = f"servo.{joint}.{word}", self.laws.unit(j, unit)
-                gains.append(ledger.parameter(name, full, float(value), f"{word} of the servo", (0.0, float("inf"))))
+                gains.append(ledger.parameter(name, full, float(value), f"{word} of the servo", (0.0, inf)))
             total.append(on * (gains[0] * (target - q[j]) - gains[1] * qd[j]))
         return ca.vertcat(*total)
-
-    def _base_states(self) -> tuple[ca.SX, ca.SX]:
-        """Pose (7,) (position, quaternion w x y z) and twist (6,) of the base in its frame; zeros where it is fixed."""
-        if not self.arm.floating:
-            return ca.SX([0, 0, 0, 1, 0, 0, 0]), ca.SX(6, 1)
-        first = []
-        for stem, axes, unit in (
-            ("pos", "xyz", "m"),
-            ("quat", "wxyz", "1"),
-            ("vel", "xyz", "m/s"),
-            ("omega", "xyz", "rad/s"),
-        ):
-            for axis in axes:
-                name, words = f"{stem}.base.{axis}", f"{stem}.base.{axis} at the start, in the world frame"
-                first.append(self.ledger.parameter(f"start.{name}", unit, float(axis == "w"), words, fixed=True))
-        back = rotation_of(ca.vertcat(*first[3:7])).T
-        first[7:10], first[10:13] = (ca.vertsplit(back @ ca.vertcat(*first[k : k + 3])) for k in (7, 10))
-        states = [self.ledger.state(x) for x in first]
-        return ca.vertcat(*states[:7]), ca.vertcat(*states[7:])
-
-    def _rigid(self, q: ca.SX, qd: ca.SX, twist: ca.SX, turn: ca.SX, at_tip: ca.SX, at_base: ca.SX) -> _Rigid:
-        """M and c; wrenches (6,) are given in the world frame."""
-        arm, n_base = self.arm, 6 if self.arm.floating else 0
-        tree = arm.whole if arm.floating else arm.tree
-        phi = ca.vertcat(ca.SX(50, 1), ca.SX(arm.base), self.phi) if arm.floating else self.phi
-        size = n_base + self.n
-        x, y, z = ca.vertsplit(twist[3:])
-        # Rates of the carrying joints are the angular velocity, but each axis is turned by the joints before it.
-        still = ca.vertcat(ca.SX(3, 1), -y * z, x * z, -x * y)[:n_base]
-        position = ca.vertcat(ca.SX(n_base, 1), q)
-        velocity, rates = ca.vertcat(twist[:n_base], qd), ca.vertcat(still, ca.SX(self.n, 1))
-        gravity = turn.T @ ca.SX(ca.DM(arm.tree.gravity))
-        terms = symbolic_torque(tree, position, velocity, rates, gravity, phi)
-        acceleration, none = ca.SX.sym("a", size), ca.SX(size, 1)
-        inertia = ca.jacobian(symbolic_torque(tree, position, none, acceleration, ca.SX(3, 1), phi), acceleration)
-        end = tip(arm, q)
-        wrench = ca.vertcat(turn.T @ at_tip[:3], turn.T @ at_tip[3:])
-        terms = terms - ca.vertcat(end.by_base.T @ wrench if n_base else ca.SX(0, 1), end.by_joints.T @ wrench)
-        if isinstance(self.model.tree, Rig):  # slings in balance take the weight that the model's nominal masses have
-            weight = symbolic_torque(tree, position, ca.SX(size, 1), ca.SX(size, 1), gravity, ca.SX(tree.phi))
-            terms = terms - weight
-        if n_base:
-            terms = terms - ca.vertcat(turn.T @ at_base[:3], turn.T @ at_base[3:], ca.SX(self.n, 1))
-        return _Rigid(inertia, terms, end, n_base)
 
     def _spring(self, p: Placed, joint: int, stretch: ca.SX, rate: ca.SX) -> ca.SX:
         """Torque of a springy joint: what its law balances the load with, ``inertia * stretch'' = load - spring``."""
@@ -264,41 +203,66 @@ class _Writer:
                 )
         return found
 
-    def _signals(self, j: int, motion: tuple[ca.SX, ca.SX], qdd: ca.SX, load: ca.SX, rigid: _Rigid) -> dict[str, ca.SX]:
-        own = rigid.inertia[rigid.n_base + j, rigid.n_base + j]
+    def _rig(self, q: ca.SX, qd: ca.SX, start_q: ca.SX, start_qd: ca.SX) -> tuple[ca.SX, list[ca.SX]]:
+        """Torque (J,) that slings, slides and booms of a rig take of the drives, and the rates of their states."""
+        rig, laws, taken, rates = self.model.tree, self.laws, ca.SX(self.n, 1), []
+        for p in laws.at(*PLACES):
+            assert isinstance(rig, Rig)
+            j = laws.joint_of(p)
+            own = laws.signals(j) | {"q": q[j], "qd": qd[j]}
+            signals, states = own | rig_signals(rig, p, q, qd), {}
+            if p.effect.states:
+                rest = laws.steady(p, own | rig_signals(rig, p, start_q, start_qd))
+                states = {s: self.ledger.state(x) for s, x in zip(p.effect.states, ca.vertsplit(rest), strict=True)}
+                rates += ca.vertsplit(laws.rate(p, signals | states))
+            taken += rig_reach(rig, p, q) @ laws.law(p, signals | states)
+        return taken, rates
+
+    def _signals(self, j: int, motion: tuple[ca.SX, ca.SX], qdd: ca.SX, load: ca.SX, now: Rigid) -> dict[str, ca.SX]:
+        own = now.inertia[self.base.size + j, self.base.size + j]
         signals = {"q": motion[0][j], "qd": motion[1][j], "qdd": qdd, "load": load, "inertia": own}
         return self.laws.signals(j) | signals
 
-    def _friction(self, motion: tuple[ca.SX, ca.SX], rigid: _Rigid, hidden: list) -> ca.Function:
+    def _friction(self, motion: tuple[ca.SX, ca.SX], now: Rigid, hidden: list) -> ca.Function:
         """All that joint effects take of the drive (J,), and its slopes, by acceleration and load (J,) each."""
         qdd, load, taken = ca.SX.sym("qdd", self.n), ca.SX.sym("load", self.n), ca.SX(self.n, 1)
         states = {p.key: s for p, s in hidden}
         for p in self.laws.at("joint"):
             if p.effect.acts_on == "torque":
                 j = self.laws.joint_of(p)
-                taken[j] += self.laws.law(p, self._signals(j, motion, qdd[j], load[j], rigid) | states.get(p.key, {}))
+                taken[j] += self.laws.law(p, self._signals(j, motion, qdd[j], load[j], now) | states.get(p.key, {}))
         self.linear = not any(ca.which_depends(taken, ca.vertcat(qdd, load), 2, False))
         slopes = [ca.diag(ca.jacobian(taken, x)) for x in (qdd, load)]
         self.free = [s for s in ca.symvar(ca.vertcat(taken, *slopes)) if s.name() not in _names(qdd, load)]
         return ca.Function("friction", [qdd, load, *self.free], [taken, *slopes])
 
-    def _solved(self, rigid: _Rigid, friction: ca.Function, springy: dict, springs: ca.SX) -> tuple[ca.SX, ca.SX]:
-        """Accelerations (n_base + J,) and rigid-body torque (J,)."""
-        size, base = rigid.inertia.shape[0], rigid.n_base
+    def _solved(
+        self, now: Rigid, friction: ca.Function, springy: dict, springs: ca.SX, on_rig: ca.SX
+    ) -> tuple[ca.SX, ca.SX]:
+        """Accelerations (base and J,) and rigid-body torque (J,)."""
+        size, base = now.inertia.shape[0], self.base.size
+        at_base = ca.SX.sym("acceleration", base)
+        given = self.base.wrench(at_base)
+        by_base = ca.jacobian(given, at_base)
+        steps = 1 if self.linear and not any(ca.which_depends(given, at_base, 2, False)) else _NEWTON
         found = ca.SX(size, 1)
-        for _ in range(1 if self.linear else _NEWTON):
-            force = rigid.inertia @ found + rigid.terms
+        for _ in range(steps):
+            force = now.inertia @ found + now.terms
             load = force[base:]
             taken, by_qdd, by_load = friction(found[base:], load, *self.free)
-            residual, added = ca.SX(force), ca.SX(size, 1)
+            residual, matrix = ca.SX(force), ca.SX(now.inertia)
+            if base:
+                here = ca.densify(found[:base])
+                residual[:base] -= ca.substitute(given, at_base, here)
+                matrix[:base, :base] -= ca.substitute(by_base, at_base, here)
             for j in range(self.n):
                 if j in springy:
-                    residual[base + j] = load[j] - springs[j]
+                    residual[base + j] = load[j] + on_rig[j] - springs[j]
                 else:
-                    residual[base + j] = (load[j] + taken[j] - self.tau[j]) / (1 + by_load[j])
-                    added[base + j] = by_qdd[j] / (1 + by_load[j])
-            found = found - solved_symmetric(rigid.inertia + ca.diag(added), residual)
-        return found, rigid.inertia[base:, :] @ found + rigid.terms[base:]
+                    residual[base + j] = (load[j] + on_rig[j] + taken[j] - self.tau[j]) / (1 + by_load[j])
+                    matrix[base + j, base + j] += by_qdd[j] / (1 + by_load[j])
+            found = found - solved_symmetric(matrix, residual)
+        return found, now.inertia[base:, :] @ found + now.terms[base:]
 
     def _motor(self, friction: ca.Function, j: int, p: Placed, spring: ca.SX) -> ca.SX:
         """Acceleration of the motor before a spring."""
@@ -314,24 +278,9 @@ class _Writer:
             )
         return (self.tau[j] - spring - taken[j]) / by_qdd[j]
 
-    def _hidden_rate(self, p: Placed, motion: tuple, qdd: ca.SX, load: ca.SX, rigid: _Rigid, hidden: list) -> ca.SX:
+    def _hidden_rate(self, p: Placed, motion: tuple, qdd: ca.SX, load: ca.SX, now: Rigid, hidden: list) -> ca.SX:
         j, states = self.laws.joint_of(p), dict((q.key, s) for q, s in hidden)[p.key]
-        return self.laws.rate(p, self._signals(j, motion, qdd[j], load[j], rigid) | states)
-
-    def _bodies(self, end: Tip, pose: ca.SX, twist: ca.SX, qd: ca.SX) -> None:
-        """Pose and twist of the tip, and of a floating base, in the world frame."""
-        ledger, turn = self.ledger, self.turn
-        rate = end.by_base @ twist + end.by_joints @ qd
-        bodies = [("tip", pose[:3] + turn @ end.translation, quaternion_of(turn @ end.rotation), rate)]
-        if self.arm.floating:
-            bodies.append(("base", pose[:3], pose[3:] / ca.norm_2(pose[3:]), twist))
-        for body, position, quaternion, motion in bodies:
-            ledger.vector(f"pos.{body}", "m", position, f"position of {body} in the world frame")
-            ledger.vector(
-                f"quat.{body}", "1", quaternion, f"attitude of {body} in the world frame (quaternion)", "wxyz"
-            )
-            ledger.vector(f"vel.{body}", "m/s", turn @ motion[:3], f"velocity of {body} in the world frame")
-            ledger.vector(f"omega.{body}", "rad/s", turn @ motion[3:], f"angular velocity of {body} in the world frame")
+        return self.laws.rate(p, self._signals(j, motion, qdd[j], load[j], now) | states)
 
     def _stiff(self, rates: list[ca.SX]) -> bool:
         """Whether 1 ms is too long for explicit Runge-Kutta, at rest or with every joint at 0.1 rad/s or m/s."""

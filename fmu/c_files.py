@@ -9,7 +9,7 @@ import casadi as ca
 from ..errors import InputError
 from .equations import Equations, Variable
 
-_OURS = ("instance.h", "instance.c")
+_OURS = ("instance.h", "instance.c", "calls.c")
 _OF_EQUATIONS = ("equations.h", "equations.c", "rosenbrock.c")
 _OF_HOSTED = ("hosted.h", "hosted.c")
 _HEADERS = {

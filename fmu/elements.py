@@ -7,6 +7,7 @@ import casadi as ca
 import numpy as np
 
 from ..models.effects import get_effect
+from ..models.floating.arm import FloatingArm
 from ..models.floating.ets_vii import ets_vii
 from ..models.floating.space_arm import CAPTURE_POSE, space_arm, space_arm_drive
 from ..models.model import Model
@@ -88,9 +89,17 @@ def ets_vii_arm() -> Equations:
     return arm_equations(model, arm)
 
 
-def station_arm() -> Equations:
-    """The arm of seven joints on a base of 40 t: servo, friction and rotors of `snarelab.models.floating.space_arm`."""
-    arm = space_arm()
+def station_arm(arm: FloatingArm | None = None, stiff: bool | None = None) -> Equations:
+    """The arm of seven joints on a base of 40 t: servo, friction and rotors of `snarelab.models.floating.space_arm`.
+
+    Parameters
+    ----------
+    arm : FloatingArm or None
+        The same arm with another tip, or with a mount on its base; None: `space_arm`.
+    stiff : bool or None
+        As `arm_equations` has it.
+    """
+    arm = space_arm() if arm is None else arm
     drive = space_arm_drive(arm)
     speeds = {f"speed_scale.{joint.name}": joint.speed for joint in arm.tree.joints}
     values, effects = {**drive.values, **speeds}, tuple(drive.effects)
@@ -98,7 +107,7 @@ def station_arm() -> Equations:
         Path(arm.tree.name), "space_arm", "free_floating_arm", None, arm.tree, "fixed", effects, {}, None, values
     )
     servo = Servo(np.asarray(drive.stiffness).tolist(), np.asarray(drive.damping).tolist())
-    return arm_equations(model, arm, servo=servo, start=CAPTURE_POSE)
+    return arm_equations(model, arm, stiff, servo, CAPTURE_POSE)
 
 
 ELEMENTS: dict[str, Callable[[], Equations]] = {

@@ -5,7 +5,8 @@ import struct
 from pathlib import Path
 
 _MACHINES = {"x86_64": 62, "aarch64": 183, "i686": 3, "i386": 3, "armv7l": 40, "riscv64": 243, "ppc64le": 21}
-_DYNAMIC_SYMBOLS = 11
+_DYNAMIC_SYMBOLS, _SYMBOL = 11, 24  # a section's kind, and the size of its entries
+_LONGEST = 4096  # bytes of a name; the rest is left out
 
 
 class ElfFault(Exception):
@@ -34,14 +35,16 @@ def exported_symbols(path: Path) -> set[str]:
         headers = [struct.unpack_from("<IIQQQQIIQQ", data, sections + size * k) for k in range(count)]
         found: set[str] = set()
         for _, kind, _, _, offset, length, link, _, _, each in headers:
-            if kind != _DYNAMIC_SYMBOLS or not each:
+            if kind != _DYNAMIC_SYMBOLS:
                 continue
+            if found or each != _SYMBOL:
+                raise ElfFault("is a broken ELF file")
             names = headers[link][4]
             for at in range(offset, offset + length, each):
                 name, _, _, section = struct.unpack_from("<IBBH", data, at)
                 if section:
                     start = names + name
-                    found.add(data[start : data.index(b"\0", start)].decode("ascii", "replace"))
+                    found.add(data[start : start + _LONGEST].split(b"\0", 1)[0].decode("ascii", "replace"))
         return found
     except (struct.error, IndexError, ValueError):
         raise ElfFault("is a broken ELF file") from None

@@ -1,20 +1,25 @@
-"""What ``snarelab export`` writes: an arm from its model file, a model of the package's own, or a participant."""
+"""What ``snarelab export`` writes: an arm or a capture from a model file, a model of our own, or a participant."""
 
 import os
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import InputError
-from ..models.floating.arm import FloatingArm, load_arm
+from ..models.floating.arm import FloatingArm
+from ..models.floating.ets_vii import ets_vii
+from ..models.floating.tree import FloatingTree, arm_on
 from ..models.model import Model
 from ..models.model_file import load_model
+from ..models.snare.setup import SnareTree
 from .arm import arm_equations
 from .build import write_fmu
 from .elements import ELEMENTS
 from .equations import Equations
-from .hosted import participant_names, write_hosted
+from .hosted import capture_class, participant_names, write_hosted, write_hosted_class
 from .inverse import inverse_equations
+from .placed_laws import identifier, missing_values
 
 
 def export(what: str, version: int, out: str | Path, inverse: bool = False, stiff: bool | None = None) -> None:
@@ -44,6 +49,9 @@ def export(what: str, version: int, out: str | Path, inverse: bool = False, stif
         raise InputError(f"{out}: its folder does not exist or cannot be written; make it first")
     if what.endswith(".toml") or Path(what).is_file():
         model = load_model(what)
+        if isinstance(model.tree, SnareTree):
+            _export_capture(model, model.tree, version, out, inverse)
+            return
         write_fmu(inverse_equations(model) if inverse else model_equations(model, stiff), out, version)
         return
     if inverse:
@@ -57,12 +65,27 @@ def export(what: str, version: int, out: str | Path, inverse: bool = False, stif
         raise InputError(f"{what!r} is neither a model file (.toml) nor a participant; known participants: {known}")
 
 
+def _export_capture(model: Model, tree: SnareTree, version: int, out: Path, inverse: bool) -> None:
+    """A capture's model file: Python beside the importer, as the snare needs it."""
+    if inverse:
+        raise InputError(f"{model.path}: --inverse follows the joints of an arm, and a capture has none; leave it out")
+    missing = missing_values(model)
+    if missing:
+        raise InputError(missing)
+    setup = tree.setup.with_values(model.values)
+    arguments = {
+        "parameters": asdict(setup.parameters),
+        "target": asdict(setup.target),
+        "effects": [p.effect.name for p in model.effects],
+    }
+    write_hosted_class(capture_class(), arguments, out, version, identifier(model.name))
+
+
 def model_equations(model: Model, stiff: bool | None = None) -> Equations:
-    """Forward dynamics of a model file's arm, its tip the frame of the last link that carries no other."""
-    parents = {joint.parent for joint in model.tree.joints}
-    tip = max(k for k in range(model.tree.n_joints) if k not in parents)
-    if model.system == "free_floating_arm" and model.urdf is not None:
-        arm = load_arm(model.urdf, model.tree.links[tip].name, True, model.tree.gravity)
+    """Forward dynamics of a model file's arm; its tip is the last link's frame, ETS-VII's its end effector."""
+    tree = model.tree
+    if isinstance(tree, FloatingTree):
+        arm = ets_vii() if model.urdf is None else arm_on(tree, tree.phi)
     else:
-        arm = FloatingArm(model.tree, np.zeros(10), tip, floating=False)
+        arm = FloatingArm(tree, np.zeros(10), tree.n_joints - 1, floating=False)
     return arm_equations(model, arm, stiff)

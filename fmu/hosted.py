@@ -59,6 +59,16 @@ def participant_names() -> list[str]:
     return list(_participants())
 
 
+def participant_class(name: str) -> type:
+    """The class behind one of `participant_names`."""
+    return _participants()[name]
+
+
+def capture_class() -> type:
+    """The participant that a capture's model file becomes."""
+    return import_module(f"{_PARTICIPANTS}.snare_model").SnareModelParticipant
+
+
 def write_hosted(name: str, path: str | Path, version: int) -> Path:
     """Write the FMU of a participant by name.
 
@@ -67,7 +77,7 @@ def write_hosted(name: str, path: str | Path, version: int) -> Path:
     InputError
         No C compiler, a system without Unix sockets, or a place that cannot be written.
     """
-    return write_hosted_class(_participants()[name], {}, path, version, name)
+    return write_hosted_class(participant_class(name), {}, path, version, name)
 
 
 def write_hosted_class(cls: type, arguments: dict[str, Any], path: str | Path, version: int, name: str) -> Path:
@@ -88,7 +98,17 @@ def write_hosted_class(cls: type, arguments: dict[str, Any], path: str | Path, v
         raise InputError(f"{name}: FMUs with Python inside need Unix sockets; export it on Linux or macOS")
     participant = cls(**arguments)
     variables = tuple(
-        Variable(v.name, v.causality, v.unit, v.start, v.description, v.minimum, v.maximum, True, v.depends)
+        Variable(
+            v.name,
+            v.causality,
+            v.unit,
+            v.start,
+            v.description.replace("`", ""),
+            v.minimum,
+            v.maximum,
+            fixed=v.causality == "parameter",
+            depends=v.depends,
+        )
         for v in sorted(participant.variables, key=lambda v: ("input", "parameter", "output").index(v.causality))
     )
     saves, interpolates = participant.can_restore, participant.input_order > 0
@@ -103,7 +123,7 @@ def write_hosted_class(cls: type, arguments: dict[str, Any], path: str | Path, v
     }
     participant.close()
     sources, token = hosted_files(variables, version, json.dumps(config))
-    description = " ".join((inspect.getdoc(cls) or name).split("\n\n")[0].split())
+    description = " ".join((inspect.getdoc(cls) or name).split("\n\n")[0].replace("`", "").split())
     about = About(
         name=name,
         identifier=name,

@@ -1,8 +1,12 @@
 """Torque of a model along a given motion, as ``snarelab simulate`` has it: inverse dynamics with every effect.
 
-Inputs are the motion ``q qd qdd`` of every joint, outputs ``tau`` as the sensors would read it. Hidden states are
-stepped by ROS2 (Verwer, Spee, Blom and Hundsdorfer 1999), with the motion linear between communication points, just as
-`snarelab.models.hidden_state` steps them between samples.
+Inputs are the motion ``q qd qdd`` of every joint, outputs ``tau`` as the sensors would read it. The motion is the true
+one: where a position sensor is late, ``sensor.q.<joint>`` is what it reads of it. (A recording has the reading, and
+`simulate`, which knows all of it, turns the delay round; an FMU cannot know a motion ahead.) On a floating base its
+motion is given too, and the force and moment that it needs from outside come out: none, where the model is complete.
+
+Hidden states are stepped by ROS2 (Verwer, Spee, Blom and Hundsdorfer 1999), with the motion linear between
+communication points, just as `snarelab.models.hidden_state` steps them between samples.
 """
 
 from collections.abc import Callable
@@ -10,12 +14,14 @@ from collections.abc import Callable
 import casadi as ca
 import numpy as np
 
-from ..errors import InputError
+from ..models.floating.tree import n_carriers
 from ..models.model import Model, Placed
 from ..models.rig.rig import Rig
 from ..models.rigid_body import symbolic_torque
+from .base_motion import BaseMotion
 from .equations import Equations, Ledger
 from .placed_laws import PlacedLaws, identifier
+from .suspension import PLACES, rig_reach, rig_signals
 
 _GAMMA = 1 - np.sqrt(0.5)
 _Signals = dict[str, ca.SX]
@@ -32,19 +38,8 @@ def inverse_equations(model: Model) -> Equations:
     Raises
     ------
     InputError
-        A parameter without a value, an effect of a suspension rig, or a delayed position sensor, whose torque
-        would have to be known ahead of time.
+        A parameter without a value.
     """
-    for p in model.effects:
-        if p.effect.at not in ("joint", "link", "sensor"):
-            raise InputError(
-                f"{model.path}: {p.key} is of a suspension rig or a base, and an FMU of an arm has none; drop it"
-            )
-        if p.at.startswith("q."):
-            raise InputError(
-                f"{model.path}: {p.key} makes the torque early against the motion: an FMU that follows it would "
-                "have to know it ahead; drop the effect and shift the motion, or export without --inverse"
-            )
     return _Follower(model).written()
 
 
@@ -52,14 +47,19 @@ class _Follower:
     """Writes one model into a ledger."""
 
     def __init__(self, model: Model) -> None:
-        self.model, self.ledger, self.n = model, Ledger(), len(model.joints)
-        self.units = [("m", "N") if j.kind == "prismatic" else ("rad", "N*m") for j in model.tree.joints]
+        self.model, self.ledger, self.first = model, Ledger(), n_carriers(model.tree)
+        self.joints, joints = model.joints[self.first :], model.tree.joints[self.first :]
+        self.n = len(joints)
+        self.units = [("m", "N") if j.kind == "prismatic" else ("rad", "N*m") for j in joints]
         for name, rate, words in (("q", "", "position"), ("qd", "/s", "speed"), ("qdd", "/s^2", "acceleration")):
-            for joint, (unit, _) in zip(model.joints, self.units, strict=True):
+            for joint, (unit, _) in zip(self.joints, self.units, strict=True):
                 self.ledger.input(f"{name}.{joint}", unit + rate, f"{words} of {joint}")
+        self.base = BaseMotion(self.ledger) if self.first else None
         self.laws = PlacedLaws(model, self.ledger)
+        self.encoders: dict[str, ca.SX] = {}
         self.phi = ca.vertcat(*self.laws.link_parameters())
-        q, qd, qdd = (ca.SX.sym(name, self.n) for name in ("position", "speed", "acceleration"))
+        size = self.first + self.n
+        q, qd, qdd = (ca.SX.sym(name, size) for name in ("position", "speed", "acceleration"))
         # Slings of a rig move with the arm, and carry what its nominal masses weigh.
         self.balanced = isinstance(model.tree, Rig)
         felt = ca.SX(3, 1) if self.balanced else self._gravity
@@ -70,19 +70,41 @@ class _Follower:
     def _gravity(self) -> ca.SX:
         return ca.SX(ca.DM(self.model.tree.gravity))
 
+    def _motion(self, u: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+        """Positions, rates and second rates of all the tree's joints."""
+        own = u[: self.n], u[self.n : 2 * self.n], u[2 * self.n : 3 * self.n]
+        if self.base is None:
+            return own
+        q, qd, qdd = (ca.vertcat(*both) for both in zip(self.base.carriers(u), own, strict=True))
+        return q, qd, qdd
+
     def written(self) -> Equations:
         ledger, t, u = self.ledger, self.ledger.time, self.ledger.inputs()
         states: dict[str, ca.SX] = {}
+        memory = ca.SX(0, 1)
+        if self.base is not None:
+            first = self.base.start(u)
+            states["memory"] = memory = ca.vertcat(*(ledger.state(x) for x in ca.vertsplit(first)))
 
         def at_rest(p: Placed, signals: list[_Signals]) -> list[ca.SX]:
-            found = self.laws.steady(p, signals[0])
+            n = len(p.effect.states)
+            found = ca.SX.zeros(n) if p.effect.from_zero else self.laws.steady(p, signals[0])
             states[p.key] = ca.vertcat(*(ledger.state(x) for x in ca.vertsplit(found)))
             return [found]
 
-        self._torque([(t, u)], at_rest)
-        (readings,) = self._torque([(t, u)], lambda p, _: [states[p.key]])
-        for joint, (_, unit), reading in zip(self.model.joints, self.units, ca.vertsplit(readings), strict=True):
+        self._torque([(t, u, memory if self.base is None else self.base.start(u))], at_rest)
+        (readings,) = self._torque([(t, u, memory)], lambda p, _: [states[p.key]])
+        if self.base is not None:
+            words = "that the base's motion needs from outside, in its axes"
+            ledger.vector("force.base", "N", readings[:3], f"force {words}")
+            ledger.vector("torque.base", "N*m", readings[3:6] - self.base.wheels(u, memory), f"moment {words}")
+        for joint, (_, unit), reading in zip(
+            self.joints, self.units, ca.vertsplit(readings[self.first :]), strict=True
+        ):
             ledger.output(f"tau.{joint}", unit, reading, f"torque or force at {joint} as its sensor reads it")
+        for channel, reading in self.encoders.items():
+            unit = self.units[self.joints.index(channel.removeprefix("q."))][0]
+            ledger.output(f"sensor.{channel}", unit, reading, f"what the sensor of {channel} reads")
         words = ", ".join(dict.fromkeys(p.effect.name for p in self.model.effects)) or "no effects"
         description = f"Torques of an arm of {self.n} joints along a given motion; with {words}."
         return ledger.following(f"{identifier(self.model.name)}_inverse", description, self._advance(states))
@@ -98,38 +120,56 @@ class _Follower:
             later[p.key] = self._stepped(p, states[p.key], here, there, h)
             return [states[p.key], later[p.key]]
 
-        self._torque([(t, before), (t + h, u)], stepped)
+        memories = [ca.SX(0, 1)] * 2
+        if self.base is not None:
+            later["memory"] = self.base.later(states["memory"], before, u, h)
+            memories = [states["memory"], later["memory"]]
+        self._torque([(t, before, memories[0]), (t + h, u, memories[1])], stepped)
         x = ca.vertcat(*states.values()) if states else ca.SX(0, 1)
         found = ca.vertcat(*later.values()) if later else ca.SX(0, 1)
         return ca.Function("model_advance", [t, h, x, before, u, ledger.parameters()[0]], [ca.cse(ca.densify(found))])
 
     def _torque(
-        self, ends: list[tuple[ca.SX, ca.SX]], states_at: Callable[[Placed, list[_Signals]], list[ca.SX]]
+        self, ends: list[tuple[ca.SX, ca.SX, ca.SX]], states_at: Callable[[Placed, list[_Signals]], list[ca.SX]]
     ) -> list[ca.SX]:
-        """Readings (J,) at each (time, inputs), effect after effect; ``states_at`` gives an effect's states there."""
-        n, laws = self.n, self.laws
-        motions = [(u[:n], u[n : 2 * n], u[2 * n : 3 * n]) for _, u in ends]
+        """Readings (base and J,) at each (time, inputs, base's memory); ``states_at`` gives an effect's states there.
+
+        What position sensors read at the last of them is left in ``encoders``.
+        """
+        n, laws = self.first + self.n, self.laws
+        motions = [self._motion(u) for _, u, _ in ends]
         loads = [symbolic_torque(self.model.tree, q, qd, qdd, self._gravity, self.phi) for q, qd, qdd in motions]
         if self.balanced:
             still, nominal = ca.SX(n, 1), ca.SX(self.model.tree.phi)
             weights = [symbolic_torque(self.model.tree, m[0], still, still, self._gravity, nominal) for m in motions]
             loads = [load - weight for load, weight in zip(loads, weights, strict=True)]
         slopes = [self.slopes(q, qd, qdd) for q, qd, qdd in motions]
-        readings = list(loads)
+        readings, rig = list(loads), self.model.tree
         # Sensors read what all the others add up to, so they come last.
-        for p in laws.at("joint") + laws.at("sensor"):
+        for p in laws.at("joint", "base", *PLACES) + laws.at("sensor"):
             if p.at.startswith("q_link."):
-                continue  # no torque's business
-            j = laws.joint_of(p)
+                continue  # neither torque nor motor's position
+            j = self.first + laws.joint_of(p)
+            encoder = p.effect.at == "sensor" and p.at.startswith("q.")
             signals = [
-                self._signals(j, *end) | {"load": load[j], "value": reading[j], "inertia": by_qdd[j, j]}
+                self._signals(p, *end) | {"load": load[j], "value": reading[j], "inertia": by_qdd[j, j]}
                 for end, load, reading, (_, _, by_qdd) in zip(ends, loads, readings, slopes, strict=True)
             ]
+            if isinstance(rig, Rig) and p.effect.at in PLACES:
+                signals = [s | rig_signals(rig, p, m[0], m[1]) for s, m in zip(signals, motions, strict=True)]
+            if encoder:
+                signals = [s | {"value": m[0][j]} for s, m in zip(signals, motions, strict=True)]
             states = states_at(p, signals) if p.effect.states else [ca.SX(0, 1)] * len(ends)
             for k, (given, x) in enumerate(zip(signals, states, strict=True)):
                 law, change = laws.law(p, given | _named(p, x)), ca.SX(n, 1)
-                if p.effect.at == "sensor":
+                if encoder:
+                    self.encoders[p.at] = law
+                elif p.effect.at == "sensor":
                     change[j] = law - readings[k][j]
+                elif p.effect.at == "base":  # what the effect gives the base, nothing else has to
+                    change[: self.first] = -law
+                elif isinstance(rig, Rig) and p.effect.at in PLACES:
+                    change = rig_reach(rig, p, motions[k][0]) @ law
                 elif p.effect.acts_on == "torque":
                     change[j] = law
                 else:
@@ -139,16 +179,18 @@ class _Follower:
                 readings[k] = readings[k] + change
         return readings
 
-    def _signals(self, j: int, t: ca.SX, u: ca.SX) -> _Signals:
-        """What joint j's effects may read at a time and inputs."""
-        n, here = self.n, ca.vertcat(self.ledger.time, self.ledger.inputs())
+    def _signals(self, p: Placed, t: ca.SX, u: ca.SX, memory: ca.SX) -> _Signals:
+        """What an effect may read of time, inputs and the base's memory."""
+        n, j, here = self.n, self.laws.joint_of(p), ca.vertcat(self.ledger.time, self.ledger.inputs())
         own = {name: ca.substitute(x, here, ca.vertcat(t, u)) for name, x in self.laws.signals(j).items()}
+        if p.effect.at == "base" and self.base is not None:
+            return own | self.base.signals(u, memory)
         return own | {"q": u[j], "qd": u[n + j], "qdd": u[2 * n + j]}
 
     def _stepped(self, p: Placed, x: ca.SX, here: _Signals, there: _Signals, h: ca.SX) -> ca.SX:
         """One step of ROS2 (see `snarelab.models.hidden_state`)."""
         state = ca.SX.sym("state", x.numel())
-        read = {name: ca.SX.sym(name) for name in here}
+        read = {name: ca.SX.sym(name, x.numel()) for name, x in here.items()}
         u, rate = ca.vertcat(*read.values()), self.laws.rate(p, read | _named(p, state))
         parameters = self.ledger.parameters()[0]
         f = ca.Function("f", [state, u, parameters], [rate, ca.jacobian(rate, state), ca.jacobian(rate, u)])

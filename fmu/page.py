@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 STYLE = """body{font:15px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem;color:#1c2530}
 table{border-collapse:collapse;width:100%;margin-bottom:1.5rem}th,td{text-align:left;padding:.25rem .6rem;border-bottom:
-1px solid #d8dee6;vertical-align:top}td.n{text-align:right;font-variant-numeric:tabular-nums}code{font-size:.95em}
-h1{font-size:1.5rem}h2{font-size:1.1rem;margin-top:2rem}"""
+1px solid #d8dee6;vertical-align:top}td.b{white-space:nowrap}td.n{text-align:right;font-variant-numeric:tabular-nums}
+code{font-size:.95em}h1{font-size:1.5rem}h2{font-size:1.1rem;margin-top:2rem}"""
 
 _HEADINGS = {"input": "Inputs", "parameter": "Parameters", "output": "Outputs"}
 
@@ -45,14 +45,20 @@ def page(about: "About", variables: tuple[Variable, ...], version: int) -> str:
         parts.append(f"<h2>{_HEADINGS[causality]}</h2><table><tr><th>name</th><th>unit</th>")
         parts.append("<th>meaning</th>" if causality == "output" else "<th>start</th><th>bounds</th><th>meaning</th>")
         for v in members:
-            numbers = "" if causality == "output" else f'<td class="n">{v.start:.6g}</td><td>{_bounds(v)}</td>'
+            numbers = (
+                "" if causality == "output" else f'<td class="n">{v.start:.6g}</td><td class="b">{_bounds(v)}</td>'
+            )
             fixed = " (fixed after initialization)" if v.fixed else ""
             parts.append(
-                f"<tr><td><code>{escape(v.name)}</code></td><td>{escape(v.unit)}</td>{numbers}"
+                f"<tr><td><code>{escape(v.name)}</code></td><td>{escape(_unit(v.unit))}</td>{numbers}"
                 f"<td>{escape(v.description)}{fixed}</td></tr>"
             )
         parts.append("</table>")
     return "\n".join([*parts, "</html>"]) + "\n"
+
+
+def _unit(text: str) -> str:
+    return text.replace("**", "^").replace("*", "·")
 
 
 def _bounds(v: Variable) -> str:

@@ -1,15 +1,17 @@
 """Laws of a model's effects as expressions: parameters and hidden states go into the ledger, laws come out."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import casadi as ca
 import numpy as np
 
 from ..errors import InputError
-from ..models.effect import Effect, Parameter
-from ..models.hidden_state import SIGNALS
+from ..models.effect import Parameter
+from ..models.floating.tree import n_carriers
+from ..models.hidden_state import reads
 from ..models.model import Model, Placed
-from ..models.rig.kinematics import far_end
+from ..models.rig.kinematics import far_end, sling_of
+from ..models.rig.rig import Rig
 from .equations import Ledger
 from .symbolic import root
 
@@ -36,49 +38,52 @@ class PlacedLaws:
     def __init__(self, model: Model, ledger: Ledger) -> None:
         """Register every parameter of the model's effects."""
         self._model, self._ledger = model, ledger
+        self._joints = model.tree.joints[n_carriers(model.tree) :]
         self._parameters: dict[str, dict[str, ca.SX]] = {}
         self._scales: dict[int, ca.SX] = {}
         self._temperatures: dict[int, ca.SX] = {}
-        wanted = [f"{p.key}.{x.name}" for p in model.effects for x in p.effect.parameters]
-        wanted += [
-            f"speed_scale.{model.joints[self.joint_of(p)]}" for p in model.effects if "speed_scale" in _read(p.effect)
-        ]
-        missing = [key for key in wanted if key not in model.values]
+        speeds = [f"speed_scale.{self._name(p)}" for p in model.effects if "speed_scale" in reads(p.effect)]
+        missing = missing_values(model, speeds)
         if missing:
-            raise InputError(
-                f"{model.path}: no value for {missing[0]!r} ({len(missing)} missing); write it under [parameters], "
-                "or let 'snarelab identify --save-model' do it"
-            )
+            raise InputError(missing)
         for p in model.effects:
             self._parameters[p.key] = {x.name: self._parameter(p, x) for x in p.effect.parameters}
-            j = self.joint_of(p)
-            read = _read(p.effect)
+            j, read = self.joint_of(p), reads(p.effect)
             if "speed_scale" in read and j not in self._scales:
-                name = f"speed_scale.{model.joints[j]}"
+                name = f"speed_scale.{self._name(p)}"
                 words = "peak speed in the recordings that the model was fitted to; sets how sharp friction turns over"
                 unit = self.unit(j, "S/s")
                 self._scales[j] = ledger.parameter(name, unit, model.values[name], words, (1e-9, np.inf))
             if "temperature" in read and j not in self._temperatures:
-                name = f"temp.{model.joints[j]}"
-                self._temperatures[j] = ledger.input(name, "degC", f"temperature of {model.joints[j]}")
+                self._temperatures[j] = ledger.input(f"temp.{self._name(p)}", "degC", f"temperature of {self._name(p)}")
 
-    def at(self, kind: str) -> list[Placed]:
-        """Placed effects that act at joints, links or sensors, in the model's order."""
-        return [p for p in self._model.effects if p.effect.at == kind]
+    def at(self, *kinds: str) -> list[Placed]:
+        """Placed effects that act at joints, links, sensors, ..., in the model's order."""
+        return [p for p in self._model.effects if p.effect.at in kinds]
 
     def joint_of(self, p: Placed) -> int:
-        """Index of the joint that an effect's place belongs to."""
-        if p.effect.at == "link":
-            return [link.name for link in self._model.tree.links].index(p.at)
-        return self._model.joints.index(p.at.removeprefix("tau.").removeprefix("q.").removeprefix("q_link."))
+        """Index among the arm's joints of the one that an effect's place belongs to; -1 for a floating base."""
+        if p.effect.at == "sling":
+            assert isinstance(self._model.tree, Rig)
+            return sling_of(self._model.tree, p.at).link
+        if p.effect.at in ("link", "boom", "base"):
+            return self._link_of(p) - n_carriers(self._model.tree)
+        names = [joint.name for joint in self._joints]
+        return names.index(p.at.removeprefix("tau.").removeprefix("q.").removeprefix("q_link."))
+
+    def _link_of(self, p: Placed) -> int:
+        return [link.name for link in self._model.tree.links].index(p.at)
+
+    def _name(self, p: Placed) -> str:
+        return self._joints[self.joint_of(p)].name
 
     def unit(self, joint: int, unit: str, channel: str = "") -> str:
         """A unit with the joint's torque, position and channel units written out."""
-        torque, position = ("N", "m") if self._model.tree.joints[joint].kind == "prismatic" else ("N*m", "rad")
-        reading = position if channel.startswith("q.") else torque
+        torque, position = ("N", "m") if self._joints[joint].kind == "prismatic" else ("N*m", "rad")
+        reading = position if channel.startswith(("q.", "q_link.")) else torque
         return "".join({"T": torque, "S": position, "U": reading}.get(c, c) for c in unit)
 
-    def signals(self, joint: int) -> dict[str, ca.SX]:
+    def signals(self, joint: int = -1) -> dict[str, ca.SX]:
         """Signals that depend on the place alone: time, temperature, speed scale."""
         found = {"time": self._ledger.time}
         if joint in self._scales:
@@ -110,14 +115,14 @@ class PlacedLaws:
             for link in tree.links
         ]
         for p in self.at("link"):
-            k = self.joint_of(p)
+            k = self._link_of(p)
             tip = ca.SX(far_end(tree, k))
             found[k] = found[k] + self.law(p, {"phi": nominal[k], "tip": tip}) - nominal[k]
         return found
 
     def _parameter(self, p: Placed, x: Parameter) -> ca.SX:
         name, joint = f"{p.key}.{x.name}", self.joint_of(p)
-        scale = self._model.values.get(f"speed_scale.{self._model.joints[joint]}") if x.relative_to == "speed" else None
+        scale = self._model.values.get(f"speed_scale.{self._name(p)}") if x.relative_to == "speed" else None
         known = not x.relative_to or scale is not None
         factor = 1.0 if scale is None else scale
         low, high = (
@@ -132,18 +137,19 @@ class PlacedLaws:
         )
 
 
+def missing_values(model: Model, more: Sequence[str] = ()) -> str:
+    """What is wrong where the model file lacks a parameter of its effects, or one of ``more``; else empty."""
+    wanted = [f"{p.key}.{x.name}" for p in model.effects for x in p.effect.parameters] + list(more)
+    missing = [key for key in wanted if key not in model.values]
+    if not missing:
+        return ""
+    return (
+        f"{model.path}: no value for {missing[0]!r} ({len(missing)} missing); write it under [parameters], "
+        "or let 'snarelab identify --save-model' do it"
+    )
+
+
 def identifier(name: str) -> str:
     """A model's name as the C identifier that FMI wants."""
     kept = "".join(c if c.isascii() and c.isalnum() else "_" for c in name) or "model"
     return f"_{kept}" if kept[0].isdigit() else kept
-
-
-def _read(effect: Effect) -> set[str]:
-    """Names of the joint signals that an effect's law or rate reads."""
-    if effect.at == "link":
-        return set()
-    signals = {name: ca.SX.sym(name) for name in SIGNALS["sensor"]}
-    states = {name: ca.SX.sym(name) for name in effect.states}
-    p = {x.name: ca.SX.sym(x.name) for x in effect.parameters}
-    read = ca.vertcat(effect.law(signals | states, p), *(effect.rate(signals | states, p) if effect.rate else []))
-    return {name for name, u in signals.items() if any(ca.which_depends(read, u, 1, False))}

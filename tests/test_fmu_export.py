@@ -2,12 +2,16 @@
 
 import argparse
 
+import numpy as np
 import pytest
 
 from bench.fmu_models import write_model
 from snarelab.errors import InputError
 from snarelab.fmu.archive import open_fmu
 from snarelab.fmu.command import add_parser
+from snarelab.fmu.elements import ELEMENTS
+from snarelab.fmu.export import model_equations
+from snarelab.models.model_file import load_model
 
 
 def run(*given):
@@ -44,6 +48,19 @@ def test_refusals(tmp_path):
     refused(tmp_path, r"ends in .fmu", "joint_friction", "--fmi", 2, "--out", tmp_path / "x.zip")
     refused(tmp_path, r"folder does not exist", "joint_friction", "--fmi", 2, "--out", tmp_path / "no" / "x.fmu")
     refused(tmp_path, r"--inverse is for model files", "joint_friction", "--fmi", 2, "--out", out, "--inverse")
+    capture = tmp_path / "capture.toml"
+    capture.write_text('system = "snare_capture"\neffects = ["contact_friction"]\n')
+    refused(tmp_path, r"no value for 'contact_friction.pin.coefficient'", capture, "--fmi", 2, "--out", out)
+    refused(tmp_path, r"a capture has none", capture, "--fmi", 2, "--out", out, "--inverse")
+
+
+def test_the_built_in_satellite_from_a_model_file_is_the_one_by_name(tmp_path):
+    (tmp_path / "ets.toml").write_text('name = "ets"\nsystem = "free_floating_arm"\n')
+    found, wanted = model_equations(load_model(tmp_path / "ets.toml")), ELEMENTS["ets_vii_arm"]()
+    rng = np.random.default_rng(0)
+    x, u = rng.normal(size=found.n_states), rng.normal(size=len(found.of("input")))
+    values = [np.array(e.functions["rate"](0, x, u, e.starts("parameter"))) for e in (found, wanted)]
+    np.testing.assert_array_equal(values[0], values[1])
 
 
 def test_no_compiler(tmp_path, monkeypatch):

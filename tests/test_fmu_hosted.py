@@ -105,17 +105,19 @@ def test_two_models_share_no_module(make, tmp_path, version):
 
 
 @pytest.mark.parametrize(
-    ("wish", "words"),
+    ("version", "wish", "words"),
     [
-        (1, "it will not, 100 %"),
-        (2, "ValueError: something broke"),
-        (3, "it ended with status 7"),
-        (4, "SystemExit: out"),
+        (2, 1, "it will not, 100 %"),
+        (2, 2, "ValueError: something broke"),
+        (2, 3, "it ended with status 7"),
+        (2, 4, "SystemExit: out"),
+        (3, 2, "ValueError: something broke"),
+        (3, 3, "it ended with status 7"),
     ],
 )
-def test_what_fails_in_the_model_is_a_status_and_a_line(make, tmp_path, wish, words):
+def test_what_fails_in_the_model_is_a_status_and_a_line(make, tmp_path, version, wish, words):
     logged = []
-    s = Slave(make("m", 1.0), tmp_path / "x", {"u": 1.0, "wish": 0.0}, logged=logged)
+    s = Slave(make("m", 1.0, version), tmp_path / "x", {"u": 1.0, "wish": 0.0}, logged=logged)
     s.step(0.1)
     state = s.save()
     s.set({"wish": wish})
@@ -139,17 +141,18 @@ def changed(source, target, **entries):
 
 
 @pytest.mark.parametrize(
-    ("entries", "words"),
+    ("version", "entries", "words"),
     [
-        ({"module": "no_such_package.model"}, "ModuleNotFoundError"),
-        ({"class": "Nobody"}, "AttributeError"),
-        ({"output": ["y", "z"]}, "export it again"),
-        ({"arguments": {"gain": 1.0, "nonsense": 2.0}}, "TypeError"),
-        ({"token": "{another}"}, "has the token"),
+        (2, {"module": "no_such_package.model"}, "ModuleNotFoundError"),
+        (3, {"module": "no_such_package.model"}, "ModuleNotFoundError"),
+        (2, {"class": "Nobody"}, "AttributeError"),
+        (2, {"output": ["y", "z"]}, "export it again"),
+        (2, {"arguments": {"gain": 1.0, "nonsense": 2.0}}, "TypeError"),
+        (2, {"token": "{another}"}, "has the token"),
     ],
 )
-def test_what_is_missing_is_told_at_instantiation(make, tmp_path, entries, words):
-    path, logged = changed(make("m", 1.0), tmp_path / "bad.fmu", **entries), []
+def test_what_is_missing_is_told_at_instantiation(make, tmp_path, version, entries, words):
+    path, logged = changed(make("m", 1.0, version), tmp_path / "bad.fmu", **entries), []
     with pytest.raises(Exception, match="Failed to instantiate"):
         Slave(path, tmp_path / "x", logged=logged)
     assert any(words in line for line in logged), logged

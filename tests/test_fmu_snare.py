@@ -4,6 +4,7 @@ import importlib.util
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,11 +12,13 @@ from scipy.spatial.transform import Rotation
 
 from bench.fmu_models import Slave, everywhere, tool_environment, write_model
 from snarelab.cosim.participants.fmu import Fmu
+from snarelab.cosim.participants.snare import SnareParticipant
 from snarelab.cosim.setup import Setup
 from snarelab.cosim.ssp_write import write_ssp
 from snarelab.cosim.system import System
 from snarelab.fmu.build import write_fmu
 from snarelab.fmu.export import export, model_equations
+from snarelab.fmu.hosted import participant_class
 from snarelab.models.model_file import load_model
 
 SIZE, STEPS = 2.0**-8, 16
@@ -41,10 +44,12 @@ def folder(tmp_path_factory):
     return place
 
 
-def test_native_numbers_and_exact_rollback(folder):
-    from snarelab.cosim.participants.snare import SnareParticipant
-
-    s, p = Slave(folder / "snare.fmu", folder / "snare"), SnareParticipant()
+@pytest.mark.parametrize(("name", "version"), [("snare", 2), ("held_snare", 3)])
+def test_native_numbers_and_exact_rollback(folder, name, version):
+    path = folder / f"{name}.fmu"
+    if not path.is_file():
+        export(name, version, path)
+    s, p = Slave(path, folder / name), participant_class(name)()
     p.initialize()
     inputs = [v for v in p.variables if v.causality == "input"]
     values = np.array([v.start for v in inputs])
@@ -67,6 +72,24 @@ def test_native_numbers_and_exact_rollback(folder):
             s.step(SIZE)
         wanted = s.get().tobytes() if wanted is None else wanted
         assert s.get().tobytes() == wanted
+    s.close()
+
+
+def test_a_capture_from_its_model_file(folder, tmp_path):
+    """Effects under the vocabulary's names, the file's values at the start; the numbers are those of its set-up."""
+    lines = ['name = "test 1"', 'system = "snare_capture"', 'effects = ["contact_friction", "umbilical_stiffness"]']
+    lines += ["[capture]", "ring_rate = 0.7", "[parameters]", '"contact_friction.pin.coefficient" = 0.2']
+    (tmp_path / "c.toml").write_text("\n".join([*lines, '"umbilical_stiffness.target.stiffness" = 30.0']) + "\n")
+    export(str(tmp_path / "c.toml"), 3, tmp_path / "c.fmu")
+    tree: Any = load_model(tmp_path / "c.toml").tree
+    values = {"contact_friction.pin.coefficient": 0.3, "umbilical_stiffness.target.stiffness": 20.0}
+    setup = tree.setup.with_values(values)
+    s, p = Slave(tmp_path / "c.fmu", tmp_path / "c", values), SnareParticipant(setup.parameters, setup.target)
+    p.initialize()
+    for k in range(12):
+        s.step(SIZE)
+        p.step(k * SIZE, SIZE)
+    assert s.get(p.names("output")).tobytes() == p.outputs().tobytes()
     s.close()
 
 

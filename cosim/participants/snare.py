@@ -6,6 +6,7 @@ which stand for the middle of the step, at pose + twist·H/2.
 """
 
 from collections.abc import Mapping
+from dataclasses import fields
 from typing import Any, Literal
 
 import numpy as np
@@ -19,6 +20,12 @@ from ...models.snare.target import Target, unit_quaternion
 from ..participant import Participant, StepError, Variable
 
 _POSE_SIZE = 13
+_LOWEST = {
+    item.name: {"> 0": 1e-12, ">= 0": 0.0}[item.metadata["allowed"]]
+    for item in fields(SnareParameters)
+    if item.metadata["allowed"] in ("> 0", ">= 0")
+}
+_BODIES = {"effector": "the end effector", "pin": "the pin's foot"}
 
 
 class SnareParticipant(Participant):
@@ -66,17 +73,32 @@ class SnareParticipant(Participant):
         if self._moves_target:
             bodies.append(("pin", pin))
         outputs = [
-            Variable(f"{kind}.{body}.{axis}", "output", unit, 0.0, f"of the cables on the {body}, {axis}")
+            Variable(
+                f"{kind}.{body}.{axis}",
+                "output",
+                unit,
+                0.0,
+                f"{kind} of the cables on {_BODIES[body]}, world frame, {axis}",
+            )
             for body in ("effector", "pin")
             for kind, unit in (("force", "N"), ("torque", "N*m"))
             for axis in "xyz"
         ]
-        outputs.append(Variable("angle.ring", "output", "rad", 0.0, "of the rotating ring, positive as it closes"))
+        outputs.append(
+            Variable("angle.ring", "output", "rad", 0.0, "angle of the rotating ring, positive as it closes")
+        )
         if not self._moves_target:
             outputs += _pose_variables("pin", "output", pin)
         self.variables = (
             *(
-                Variable(item.name, "parameter", item.unit, item.value, item.source)
+                Variable(
+                    item.name,
+                    "parameter",
+                    item.unit,
+                    item.value,
+                    f"{item.name.replace('_', ' ')}; {item.kind}: {item.source}",
+                    _LOWEST.get(item.name, -np.inf),
+                )
                 for item in self._default.dimensions()
             ),
             *(variable for body, values in bodies for variable in _pose_variables(body, "input", values)),
@@ -193,9 +215,18 @@ def _values(pose: Pose) -> np.ndarray:
 
 
 def _pose_variables(body: str, causality: Any, values: np.ndarray) -> list[Variable]:
-    kinds = (("pos", "m", "xyz"), ("quat", "1", "wxyz"), ("vel", "m/s", "xyz"), ("omega", "rad/s", "xyz"))
-    described = [(f"{kind}.{body}.{axis}", unit) for kind, unit, axes in kinds for axis in axes]
+    kinds = (
+        ("pos", "m", "xyz", "position"),
+        ("quat", "1", "wxyz", "attitude (quaternion)"),
+        ("vel", "m/s", "xyz", "velocity"),
+        ("omega", "rad/s", "xyz", "angular velocity"),
+    )
+    described = [
+        (f"{kind}.{body}.{axis}", unit, f"{words} of {_BODIES[body]} in the world frame, {axis}")
+        for kind, unit, axes, words in kinds
+        for axis in axes
+    ]
     return [
-        Variable(key, causality, unit, float(value), "in the world frame")
-        for (key, unit), value in zip(described, values, strict=True)
+        Variable(key, causality, unit, float(value), words)
+        for (key, unit, words), value in zip(described, values, strict=True)
     ]

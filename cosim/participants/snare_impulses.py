@@ -24,7 +24,7 @@ _ENERGIES = ("ring_work", "strain", "kinetic", "overlap", "target", "damped", "f
 
 
 class ImpulseSnareParticipant(SnareParticipant):
-    """As `SnareParticipant`, with more outputs.
+    """A snare that sums up the impulses it gives: `SnareParticipant` with more outputs.
 
     ``impulse.effector.*`` and ``angular_impulse.effector.*`` [N·s, N·m·s] are what the snare has given the end effector
     since the start, the moment about its origin; the same of ``pin``, about its foot, where it is moved from outside.
@@ -37,14 +37,18 @@ class ImpulseSnareParticipant(SnareParticipant):
         super().__init__(*arguments, **keywords)
         bodies = ("effector", "pin") if self._moves_target else ("effector",)
         shown = [
-            (f"{kind}.{body}.{axis}", unit, f"on the {body} since the start, world frame")
+            (f"{kind}.{body}.{axis}", unit, f"{kind.replace('_', ' ')} on the {body} since the start, world frame")
             for body in bodies
             for kind, unit in (("impulse", "N*s"), ("angular_impulse", "N*m*s"))
             for axis in "xyz"
         ]
         for kind, unit in (("linear", "N*s"), ("angular", "N*m*s")):
-            shown += [(f"momentum.{kind}.{axis}", unit, "of cables and floating target") for axis in "xyz"]
-        shown += [(f"energy.{name}", "J", "of the snare, since the start where it is lost") for name in _ENERGIES]
+            shown += [
+                (f"momentum.{kind}.{axis}", unit, f"{kind} momentum of cables and floating target") for axis in "xyz"
+            ]
+        shown += [
+            (f"energy.{name}", "J", f"{name.replace('_', ' ')}; since the start where it is lost") for name in _ENERGIES
+        ]
         self.variables = (*self.variables, *(Variable(name, "output", unit, 0.0, text) for name, unit, text in shown))
         self._passed, self._momentum = np.zeros(6), np.zeros(6)
 

@@ -9,6 +9,18 @@
 #include "equations.c"
 #endif
 
+#define FMI(name) fmi2##name
+#define FMI_STATE(before, after) STATE_NAME(before, after)
+#define STATE_NAME(before, after) fmi2##before##FMUstate##after
+#define DESERIALIZE DeSerialize
+#define EXPORT FMI2_Export
+typedef fmi2Status Result;
+typedef fmi2Boolean Boolean;
+typedef fmi2String String;
+typedef fmi2Byte Byte;
+typedef fmi2FMUstate Saved;
+typedef fmi2Component Handle;
+
 typedef struct {
   Instance *instance;
   fmi2CallbackLogger logger;
@@ -51,11 +63,9 @@ static void path_of(const char *uri, char *path, size_t size) {
   path[n] = 0;
 }
 
+#include "calls.c"
+
 FMI2_Export const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
-FMI2_Export const char *fmi2GetVersion(void) { return fmi2Version; }
-FMI2_Export fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const fmi2String categories[]) {
-  return (void)c, (void)on, (void)n, (void)categories, fmi2OK; /* only what goes wrong is ever logged */
-}
 
 FMI2_Export fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String token, fmi2String resources,
                                           const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean on) {
@@ -69,20 +79,11 @@ FMI2_Export fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2St
   }
   snprintf(c->name, sizeof c->name, "%s", name ? name : "");
   if (resources) path_of(resources, path, sizeof path);
-  if (type != fmi2CoSimulation) report(c, STATUS_ERROR, "this FMU is for co-simulation only");
-  else c->instance = instance_new(token, path, report, c);
-  if (c->instance) return c;
+  if (type == fmi2CoSimulation) return component_with(c, token, path);
+  report(c, STATUS_ERROR, "this FMU is for co-simulation only");
   free(c);
   return NULL;
 }
-
-FMI2_Export void fmi2FreeInstance(fmi2Component c) {
-  if (!c) return;
-  instance_free(((Component *)c)->instance);
-  free(c);
-}
-
-#define HERE (((Component *)c)->instance)
 
 FMI2_Export fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, fmi2Real tolerance,
                                            fmi2Real start, fmi2Boolean stop_defined, fmi2Real stop) {
@@ -95,9 +96,6 @@ FMI2_Export fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranc
 FMI2_Export fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
   return (fmi2Status)instance_enter_initialization(HERE, HERE->now.time);
 }
-FMI2_Export fmi2Status fmi2ExitInitializationMode(fmi2Component c) { return (fmi2Status)instance_exit_initialization(HERE); }
-FMI2_Export fmi2Status fmi2Terminate(fmi2Component c) { return (fmi2Status)instance_terminate(HERE); }
-FMI2_Export fmi2Status fmi2Reset(fmi2Component c) { return (fmi2Status)instance_reset(HERE); }
 
 FMI2_Export fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference r[], size_t n, fmi2Real value[]) {
   return (fmi2Status)instance_get(HERE, r, n, value);
@@ -106,9 +104,6 @@ FMI2_Export fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference r[]
   return (fmi2Status)instance_set(HERE, r, n, value);
 }
 
-static fmi2Status none_of(fmi2Component c, size_t n, const char *type) {
-  return n ? (fmi2Status)say(HERE, STATUS_ERROR, "this model has no %s variables", type) : fmi2OK;
-}
 #define NO_VARIABLES(Type, word)                                                                                   \
   FMI2_Export fmi2Status fmi2Get##Type(fmi2Component c, const fmi2ValueReference r[], size_t n, fmi2##Type value[]) {    \
     return (void)r, (void)value, none_of(c, n, word);                                                                    \
@@ -119,30 +114,6 @@ static fmi2Status none_of(fmi2Component c, size_t n, const char *type) {
 NO_VARIABLES(Integer, "Integer")
 NO_VARIABLES(Boolean, "Boolean")
 NO_VARIABLES(String, "String")
-
-FMI2_Export fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
-  return (fmi2Status)instance_save(HERE, state);
-}
-FMI2_Export fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
-  return (fmi2Status)instance_restore(HERE, state);
-}
-FMI2_Export fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state) {
-  (void)c;
-  free(*state);
-  *state = NULL;
-  return fmi2OK;
-}
-FMI2_Export fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size) {
-  (void)c;
-  *size = instance_serialised_size(state);
-  return *size ? fmi2OK : fmi2Error;
-}
-FMI2_Export fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size) {
-  return (fmi2Status)instance_serialise(HERE, state, bytes, size);
-}
-FMI2_Export fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state) {
-  return (fmi2Status)instance_deserialise(HERE, bytes, size, state);
-}
 
 FMI2_Export fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknown[], size_t n_unknown,
                                                     const fmi2ValueReference known[], size_t n_known,

@@ -9,6 +9,18 @@
 #include "equations.c"
 #endif
 
+#define FMI(name) fmi3##name
+#define FMI_STATE(before, after) STATE_NAME(before, after)
+#define STATE_NAME(before, after) fmi3##before##FMUState##after
+#define DESERIALIZE Deserialize
+#define EXPORT FMI3_Export
+typedef fmi3Status Result;
+typedef fmi3Boolean Boolean;
+typedef fmi3String String;
+typedef fmi3Byte Byte;
+typedef fmi3FMUState Saved;
+typedef fmi3Instance Handle;
+
 typedef struct {
   Instance *instance;
   fmi3LogMessageCallback log;
@@ -21,12 +33,7 @@ static void report(void *host, Status status, const char *message) {
   if (c->log) c->log(c->environment, (fmi3Status)status, categories[status], message);
 }
 
-#define HERE (((Component *)c)->instance)
-
-FMI3_Export const char *fmi3GetVersion(void) { return fmi3Version; }
-FMI3_Export fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean on, size_t n, const fmi3String categories[]) {
-  return (void)c, (void)on, (void)n, (void)categories, fmi3OK; /* only what goes wrong is ever logged */
-}
+#include "calls.c"
 
 FMI3_Export fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3String resources,
                                                      fmi3Boolean visible, fmi3Boolean on, fmi3Boolean event_mode,
@@ -39,10 +46,7 @@ FMI3_Export fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String
   if (!c) return NULL;
   c->log = log;
   c->environment = environment;
-  c->instance = instance_new(token, resources ? resources : "", report, c);
-  if (c->instance) return c;
-  free(c);
-  return NULL;
+  return component_with(c, token, resources ? resources : "");
 }
 
 static fmi3Instance refused(fmi3InstanceEnvironment environment, fmi3LogMessageCallback log) {
@@ -63,20 +67,11 @@ FMI3_Export fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3
   return refused(environment, log);
 }
 
-FMI3_Export void fmi3FreeInstance(fmi3Instance c) {
-  if (!c) return;
-  instance_free(HERE);
-  free(c);
-}
-
 FMI3_Export fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean tolerance_defined, fmi3Float64 tolerance,
                                                    fmi3Float64 start, fmi3Boolean stop_defined, fmi3Float64 stop) {
   (void)tolerance_defined, (void)tolerance, (void)stop_defined, (void)stop;
   return (fmi3Status)instance_enter_initialization(HERE, start);
 }
-FMI3_Export fmi3Status fmi3ExitInitializationMode(fmi3Instance c) { return (fmi3Status)instance_exit_initialization(HERE); }
-FMI3_Export fmi3Status fmi3Terminate(fmi3Instance c) { return (fmi3Status)instance_terminate(HERE); }
-FMI3_Export fmi3Status fmi3Reset(fmi3Instance c) { return (fmi3Status)instance_reset(HERE); }
 
 static fmi3Status matched(fmi3Instance c, size_t n_references, size_t n_values) {
   if (n_references == n_values) return fmi3OK;
@@ -91,9 +86,6 @@ FMI3_Export fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference r
   return matched(c, n, nv) ? fmi3Error : (fmi3Status)instance_set(HERE, r, n, v);
 }
 
-static fmi3Status none_of(fmi3Instance c, size_t n, const char *type) {
-  return n ? (fmi3Status)say(HERE, STATUS_ERROR, "this model has no %s variables", type) : fmi3OK;
-}
 #define NO_VARIABLES(Type)                                                                                               \
   FMI3_Export fmi3Status fmi3Get##Type(fmi3Instance c, const fmi3ValueReference r[], size_t n, fmi3##Type v[],           \
                                        size_t nv) {                                                                      \
@@ -127,28 +119,6 @@ FMI3_Export fmi3Status fmi3GetClock(fmi3Instance c, const fmi3ValueReference r[]
 }
 FMI3_Export fmi3Status fmi3SetClock(fmi3Instance c, const fmi3ValueReference r[], size_t n, const fmi3Clock v[]) {
   return (void)r, (void)v, none_of(c, n, "Clock");
-}
-
-FMI3_Export fmi3Status fmi3GetFMUState(fmi3Instance c, fmi3FMUState *state) { return (fmi3Status)instance_save(HERE, state); }
-FMI3_Export fmi3Status fmi3SetFMUState(fmi3Instance c, fmi3FMUState state) {
-  return (fmi3Status)instance_restore(HERE, state);
-}
-FMI3_Export fmi3Status fmi3FreeFMUState(fmi3Instance c, fmi3FMUState *state) {
-  (void)c;
-  free(*state);
-  *state = NULL;
-  return fmi3OK;
-}
-FMI3_Export fmi3Status fmi3SerializedFMUStateSize(fmi3Instance c, fmi3FMUState state, size_t *size) {
-  (void)c;
-  *size = instance_serialised_size(state);
-  return *size ? fmi3OK : fmi3Error;
-}
-FMI3_Export fmi3Status fmi3SerializeFMUState(fmi3Instance c, fmi3FMUState state, fmi3Byte bytes[], size_t size) {
-  return (fmi3Status)instance_serialise(HERE, state, bytes, size);
-}
-FMI3_Export fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_t size, fmi3FMUState *state) {
-  return (fmi3Status)instance_deserialise(HERE, bytes, size, state);
 }
 
 FMI3_Export fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference unknown[], size_t n_unknown,
