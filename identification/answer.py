@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..models.floating.tree import channel, n_carriers
 from ..models.model import Model
+from .bursts import bursts
 from .diagnosis import Candidate, ChannelFit, Diagnosis, Estimate, Finding, Misfit, Moved, Rival, Step, Trace
 from .experiment import Experiment
 from .fit import Fit, channel_rms
@@ -25,7 +26,10 @@ NAMELESS = 0.1
 ..."""
 
 MATERIAL = 0.015
-"""... if they also amount to this share of the channel's RMS torque."""
+"""... if they also amount to this share of the channel's RMS torque, ..."""
+
+PLAIN = 0.5
+"""... or if they are this much of the residual: on a joint that carries a lot, plain and yet a small share of it."""
 
 
 def report_on(
@@ -59,16 +63,30 @@ def report_on(
     findings = tuple(_finding(t, final, trials, channels) for t in confirmed)
     fits = _fits(model, found.first, final, train, locked)
     nameless = {c: x for c, x in found.closing.nameless.items() if x > NAMELESS}
-    size = {c: float(np.sqrt(x)) * fits[c].train.relative_after for c, x in nameless.items()}
-    words = {
-        c: (
-            f"on {channels[c]}, smooth curves over {found.closing.over[c]} together still explain "
-            f"{percent(x)} of the residual in blocks that they were not fitted to "
-            f"({percent(size[c])} of the channel's torque)"
+    unsteady = bursts(final, train)
+
+    def size(c: int, share: float) -> float:
+        return float(np.sqrt(share)) * fits[c].train.relative_after
+
+    said = [
+        (
+            c,
+            x,
+            f"on {channels[c]}, smooth curves over {found.closing.over[c]} together still explain {percent(x)} of the "
+            f"residual in blocks that they were not fitted to ({percent(size(c, x))} of the channel's torque)",
         )
         for c, x in nameless.items()
-    }
-    description = "; ".join(text for c, text in words.items() if size[c] >= MATERIAL)
+    ] + [
+        (
+            c,
+            b.share,
+            f"on {channels[c]}, {percent(b.share)} of the residual comes in bursts, at {b.frequency:.2g} Hz where "
+            f"it is strongest ({percent(size(c, b.share))} of the channel's torque)",
+        )
+        for c, b in unsteady.items()
+    ]
+    loud = {c for c, x, _ in said if size(c, x) >= MATERIAL or x > PLAIN}
+    description = "; ".join(text for c, _, text in said if c in loud)
     if findings:
         verdict = "missing_physics"
         remainder = f" Still unnamed: {description}." if description else ""
@@ -83,7 +101,7 @@ def report_on(
         for t in found.taken
         if t.judged.placed.key not in named
     ]
-    notes += [f"too little to speak of: {text}" for c, text in words.items() if size[c] < MATERIAL]
+    notes += [f"too little to speak of: {text}" for c, _, text in said if c not in loud]
     notes += _excitation(train)
     candidates = tuple(
         Candidate(j.placed.effect.name, j.placed.at, float(j.explained), float(j.score), j.placed.key in named)
@@ -92,9 +110,9 @@ def report_on(
     )
     explained = [_explained(found.first, final, e) for e in train]
     if not findings:
-        # What has no name stands in the residual itself, on the channels where smooth curves could follow it.
-        loud = [c in nameless and size[c] >= MATERIAL for c in range(len(channels))]
-        explained = [(e.measured - e.motion.to_band(final.assembly.torque(e, final.theta))) * loud for e in train]
+        # What has no name stands in the residual itself, on the channels that have something to say.
+        spoken = [c in loud for c in range(len(channels))]
+        explained = [(e.measured - e.motion.to_band(final.assembly.torque(e, final.theta))) * spoken for e in train]
     return Diagnosis(
         verdict,
         verdict_sentence(findings, fits, remainder),

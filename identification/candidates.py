@@ -201,7 +201,7 @@ def nameless_columns(experiment: Experiment, state: Evaluation, joint: int) -> d
     either = np.concatenate([forth * local, (1 - forth) * local], axis=1)
     found["position, apart for either direction,"] = experiment.to_band(either, joint)
     for c, other in enumerate(motion.joints):
-        if abs(c - joint) == 1 and np.ptp(motion.q[:, c]):
+        if c != joint and np.ptp(motion.q[:, c]):
             curves = np.concatenate([_hats(motion.q[:, c], 8), _hats(motion.qd[:, c], 8)], axis=1)
             found[f"position and speed of {other}"] = experiment.to_band(curves, joint)
     return found

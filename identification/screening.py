@@ -161,9 +161,7 @@ def screen(
             case = samples.case(variant, {c: parts})
             score = case.gain().total - 0.5 * len(free) * log_size
             spread = float(found.sigma[c])  # a curve is no taller than what is left over, before it is seen
-            fresh = np.sort(case.fresh_gains(spread))
-            # Neither the worst of many blocks counts nor the best: one may go where no other has been.
-            if score > threshold[(c,)] and reliably_positive(fresh[1:-1] if len(fresh) > 4 else fresh):
+            if score > threshold[(c,)] and reliably_positive(case.fresh_gains(spread)):
                 share = min(samples.foreseen(variant, {c: parts}, spread), 1.0)
                 if share > nameless.get(c, 0.0):
                     nameless[c], over[c] = share, words
@@ -282,8 +280,14 @@ def _limits(assembly: Assembly, evidence: Evidence, j: Judged, needed: float) ->
 
 
 def reliably_positive(gains: Array, errors: float = 2.0) -> bool:
-    """Mean over blocks left out above zero by so many standard errors (two: one-sided 2.5 %)."""
-    return bool(np.mean(gains) > errors * np.std(gains, ddof=1) / np.sqrt(len(gains)))
+    """Mean over blocks left out above zero by so many standard errors (two: one-sided 2.5 %).
+
+    With all of them, or without the best and the worst: one may be where no other has been, and a gain there that
+    dwarfs the others is no reason to doubt them.
+    """
+    inner = np.sort(gains)[1:-1]
+    some = [gains, inner] if len(inner) > 2 else [gains]
+    return any(bool(np.mean(x) > errors * np.std(x, ddof=1) / np.sqrt(len(x))) for x in some)
 
 
 def _with(variant: Variant, subset: NDArray[np.int_]) -> Variant:

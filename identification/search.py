@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..models.model import Model, Placed
 from .assembly import Assembly
 from .base_parameters import BaseParameters
-from .closed_loop import planned
+from .closed_loop import DRIVEN, planned
 from .evidence import ABSORBED
 from .experiment import Experiment, Scales
 from .fit import Fit, fit
@@ -149,7 +149,9 @@ def _passing(result: Screening, joints: Sequence[str]) -> list[Judged]:
     """Candidates that pass every test, best first; what acts at a joint finds its channel among ``joints``."""
     passing = []
     for j in result.judged:
-        if j.score <= result.threshold[j.channels] or j.explained < WORTH:
+        # What a disturbance drives is let into the motion up to a share, and looks like a late sensor.
+        late = j.placed.effect.at == "sensor" and bool(j.placed.effect.states)
+        if j.score <= result.threshold[j.channels] or j.explained < (DRIVEN if late else WORTH):
             continue
         if reliably_positive(j.case.fresh_gains()):
             passing.append(j)
