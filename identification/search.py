@@ -33,6 +33,9 @@ ALIKE = 0.98
 TIE = 2.0
 """Difference of two scores that says nothing."""
 
+AHEAD = 1.15
+"""Ratio of scores up to which a special case is preferred to what contains it."""
+
 MOST_ROUNDS = 8
 BOOTSTRAPS = 400
 
@@ -206,7 +209,7 @@ def _near_rest(result: Screening, j: Judged) -> bool:
 
 def _choose(result: Screening, passing: Sequence[Judged]) -> list[Judged]:
     """The best candidate, and beside it the best on every channel that no better candidate reaches."""
-    keys = {j.placed.key for j in passing}
+    scores = {j.placed.key: j.score for j in passing}
     best: dict[int, Judged] = {}
     for j in passing:
         if len(j.channels) == 1:
@@ -214,8 +217,9 @@ def _choose(result: Screening, passing: Sequence[Judged]) -> list[Judged]:
     chosen: list[Judged] = []
     reached: set[int] = set()
     for j in passing:
-        if any(f"{name}.{j.placed.at}" in keys for name in j.placed.effect.contains):
-            continue  # a special case of it passes too, and goes first
+        special = [scores.get(f"{name}.{j.placed.at}", -np.inf) for name in j.placed.effect.contains]
+        if j.score < AHEAD * max(special, default=-np.inf):
+            continue  # a special case of it passes too, explains nearly as much, and goes first
         local = [best[c] for c in j.channels if c in best]
         if len(j.channels) > 1 and local and not _worth_its_reach(result, j, local):
             continue
