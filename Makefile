@@ -6,7 +6,7 @@ STUDIES := emps kuka bam free-floating ground-capture zero-g-rig orbit-inspectio
 
 BENCHES := torque friction_fit diagnosis floating cosim fmu snare ecos_inspection
 
-.PHONY: help demo test check studies bench accuracy proof fmus docs clean $(STUDIES:%=study-%)
+.PHONY: help demo test check studies bench accuracy fuzz kills proof fmus docs clean $(STUDIES:%=study-%)
 
 help:            ## what can be made
 	@sed -n -e 's/^\$$(STUDIES.*## /  make study-NAME\t/p' -e 's/^\([a-z]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
@@ -31,6 +31,14 @@ bench: .venv/installed ## ratios against named rivals, measured in one run
 accuracy: .venv/installed ## the snare on 30 random captures, and against rods in another engine on 10: half an hour
 	$(BIN)/python bench/snare_accuracy.py --result build/bench/snare_accuracy.json
 	OMP_NUM_THREADS=1 $(BIN)/python bench/snare.py --cases 10
+
+SECONDS ?= 60
+fuzz: .venv/installed ## broken files at every reader, SECONDS for each
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt '.[fuzz]'
+	$(BIN)/python tests/fuzz --seconds $(SECONDS)
+
+kills: .venv/installed ## two hundred runs killed at random: nothing lost that was reported done
+	$(BIN)/python bench/kills.py
 
 proof: .venv/installed ## conceal effects in another engine's recordings, let the tool name them, and score it: half an hour
 	$(BIN)/python -m proof

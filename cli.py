@@ -1,24 +1,25 @@
 """The command line: ``snarelab identify | diagnose | simulate | export | cosim | tolerance``.
 
 Exit status 0: it ran, whatever the verdict. 2: unusable input, one line on standard error, nothing written.
-1: a fault of the program.
+130: interrupted (Ctrl-C, or SIGTERM). 1: a fault of the program.
 """
 
 import argparse
+import errno
 import json
 import os
 import sys
-import time
 import warnings
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
 from . import __version__
 from .cosim.command import add_parser as add_cosim
-from .errors import InputError
+from .errors import InputError, one_line
+from .files import written_whole
 from .fmu.command import add_parser as add_export
+from .progress import Progress, start_logging, terminated_is_interrupted
 from .tolerance.command import add_parser as add_tolerance
 
 
@@ -26,16 +27,29 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; see the module's text for the exit status."""
     parser = _parser()
     given = parser.parse_args(arguments)
+    start_logging(given.verbose)
     try:
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), terminated_is_interrupted():
             warnings.showwarning = _notice
             given.run(given)
+            sys.stdout.flush()
     except InputError as error:
-        print(f"snarelab: {' '.join(str(error).split())}", file=sys.stderr)
+        print(f"snarelab: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print("snarelab: interrupted; nothing was written", file=sys.stderr)
+        print("snarelab: interrupted; files that are there are whole; run the same command again", file=sys.stderr)
         return 130
+    except OSError as error:
+        if error.errno not in (errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+            raise
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # else Python complains once more at its end
+        if error.errno == errno.EPIPE:  # whoever reads standard output has closed it, as `head` does
+            return 0
+        print(
+            f"snarelab: {error.filename or 'standard output'}: {error.strerror}; make room and run again",
+            file=sys.stderr,
+        )
+        return 2
     return 0
 
 
@@ -74,13 +88,17 @@ def _parser() -> argparse.ArgumentParser:
 
     p = commands.add_parser("simulate", help="what a model would read along a recorded motion")
     p.add_argument("model", metavar="MODEL.toml")
-    p.add_argument("--motion", required=True, metavar="RECORDING", help="recording whose motion is followed")
+    p.add_argument("--motion", metavar="RECORDING", help="recording whose motion is followed; a capture needs none")
     p.add_argument("--out", required=True, metavar="RECORDING", help="where to write it (.csv or .parquet)")
     p.set_defaults(run=_simulate)
 
     add_export(commands)
     add_cosim(commands)
     add_tolerance(commands)
+    for command in commands.choices.values():
+        command.add_argument(
+            "-v", "--verbose", action="count", default=0, help="log what is under way to standard error; -vv: all of it"
+        )
     return parser
 
 
@@ -91,7 +109,7 @@ def _identify(given: argparse.Namespace) -> None:
 
     _writable([given.json, given.save_model], [*given.recordings, given.holdout])
     model = load_model(given.model)
-    with _Progress() as progress:
+    with Progress() as progress:
         found = identify(model, given.recordings, [given.holdout] if given.holdout else (), progress=progress)
     result = found.to_json()
     if given.save_model:
@@ -113,7 +131,12 @@ def _diagnose(given: argparse.Namespace) -> None:
     outputs = [given.json, given.report, given.save_model, given.next_experiment]
     _writable(outputs, [*given.recordings, given.holdout])
     model, planned = load_model(given.model), None
-    with _Progress() as progress:
+    if given.next_experiment and model.system == "snare_capture":
+        raise InputError(
+            f"{given.model}: no motion is planned for a capture, leave --next-experiment out; "
+            "the result says for each rival what would part it"
+        )
+    with Progress() as progress:
         answer = diagnose(model, given.recordings, given.holdout, progress=progress)
         if given.next_experiment:
             planned = next_experiment(answer.model, answer.diagnosis, given.recordings, progress=progress)
@@ -166,15 +189,8 @@ def _write_json(result: dict[str, Any], path: str) -> None:
     if path == "-":
         sys.stdout.write(text)
         return
-    scratch = Path(path + ".part")
-    try:
-        scratch.write_text(text, encoding="utf-8")
-        scratch.replace(path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}; choose another folder") from None
-    finally:
-        with suppress(OSError):
-            scratch.unlink()
+    with written_whole(Path(path)) as part:
+        part.write_text(text, encoding="utf-8")
 
 
 def _parameter_table(result: dict[str, Any]) -> str:
@@ -197,25 +213,7 @@ def _parameter_table(result: dict[str, Any]) -> str:
 
 def _notice(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
     if issubclass(category, UserWarning):
-        print(f"snarelab: {message}", file=sys.stderr)
-
-
-class _Progress:
-    """One line on a terminal, rewritten; nothing in a pipe."""
-
-    def __enter__(self) -> Callable[[str], None]:
-        self._shown, self._start = sys.stderr.isatty(), time.monotonic()
-        return self._show
-
-    def _show(self, text: str) -> None:
-        if self._shown:
-            print(
-                f"\r\x1b[2K[{time.monotonic() - self._start:5.1f} s] {text[:100]}", end="", file=sys.stderr, flush=True
-            )
-
-    def __exit__(self, *_: object) -> None:
-        if self._shown:
-            print("\r\x1b[2K", end="", file=sys.stderr, flush=True)
+        print(f"snarelab: {one_line(message)}", file=sys.stderr)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,22 @@
 """The one exception that means "the user can mend this"."""
 
+_LONGEST = 4000
+
+
+def one_line(text: object) -> str:
+    """A text from anywhere as one line: control characters written out, cut after 4000 characters."""
+    text = str(text)
+    line = "".join(c if c.isprintable() else " " if c in "\r\n\t" else ascii(c)[1:-1] for c in text[:_LONGEST])
+    return line if len(text) <= _LONGEST else f"{line} ..."
+
 
 class InputError(ValueError):
     """Input that cannot be used: what it is, the value, what is allowed, the mend, in one line.
 
-    The command line prints it as it stands and exits with status 2; nothing is written before it is raised.
+    The command line prints it as it stands and exits with status 2; nothing is written before it is raised. What the
+    message quotes may come from anywhere, see `one_line`.
     """
+
+    def __init__(self, message: object = "") -> None:
+        """Make one line of the message."""
+        super().__init__(one_line(message))

@@ -1,15 +1,12 @@
 """``snarelab cosim SYSTEM.ssp|SYSTEM.toml --out RECORDING``."""
 
 import argparse
-import contextlib
-import signal
 import sys
-import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
+from ..progress import Progress, terminated_is_interrupted
 from .participant import StepError
 
 
@@ -51,9 +48,12 @@ def run(given: argparse.Namespace) -> None:
         changes = {"step": given.step, "stop": given.until}
         setup = replace(setup, **{key: value for key, value in changes.items() if value is not None})
         master = _started(given.system, setup)
-        with _terminated_is_interrupted():
+        span = setup.stop - setup.start
+        with Progress() as progress, terminated_is_interrupted():
             try:
-                result = master.run(setup.stop, _progress(setup.start, setup.stop))
+                result = master.run(
+                    setup.stop, lambda t: progress(f"{t:.3f} s of {setup.stop:.3f} s", (t - setup.start) / span)
+                )
             except StepError as error:
                 write_recording(master.result().recording, out)
                 raise InputError(f"{given.system}: {error}; {out} holds the run up to there") from None
@@ -82,34 +82,3 @@ def _started(path: str, setup: Any) -> Any:
         return setup.master()
     except (InputError, StepError) as error:
         raise InputError(f"{path}: {error}") from None
-
-
-@contextlib.contextmanager
-def _terminated_is_interrupted() -> Iterator[None]:
-    """SIGTERM ends the run as Ctrl-C does: with its recording."""
-
-    def interrupt(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGTERM, interrupt)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
-
-
-def _progress(start: float, stop: float) -> Any:
-    """One line on a terminal, at most five times a second; nothing in a pipe."""
-    if not sys.stderr.isatty():
-        return None
-    shown = 0.0
-
-    def show(reached: float) -> None:
-        nonlocal shown
-        if time.monotonic() - shown > 0.2 or reached >= stop:
-            shown = time.monotonic()
-            end = "\r\x1b[2K" if reached >= stop else ""
-            share = 100 * (reached - start) / (stop - start)
-            print(f"\r\x1b[2K{reached:.3f} s of {stop:.3f} s, {share:.0f} %{end}", end="", file=sys.stderr, flush=True)
-
-    return show

@@ -13,6 +13,7 @@ from .units import quantity
 
 _NUMBERS = ("Real", "Float32", "Float64", "Integer", "Enumeration", "Boolean")
 _WHOLE = re.compile(r"U?Int\d+")
+_MOST = 100_000
 _BASE = {"kg": "kg", "m": "m", "s": "s", "A": "A", "K": "K", "mol": "mol", "cd": "cd", "rad": "rad"}
 
 
@@ -46,8 +47,15 @@ def read_interface(description: Any, path: object) -> Interface:
     Raises
     ------
     InputError
-        For an input of text, bytes or a clock, which nothing here could give.
+        For an input of text, bytes or a clock, which nothing here could give; for numbers and dimensions that are none.
     """
+    try:
+        return _read(description, path)
+    except InputError as error:
+        raise InputError(text if (text := str(error)).startswith(str(path)) else f"{path}: {text}") from None
+
+
+def _read(description: Any, path: object) -> Interface:
     units = {unit.name: unit.baseUnit for unit in description.unitDefinitions}
     sizes = {v.valueReference: v for v in description.modelVariables}
     groups: dict[Causality, list[Slot]] = {"input": [], "output": [], "parameter": []}
@@ -111,9 +119,14 @@ def _zero(read: Any) -> float:
 
 def _names(v: Any, sizes: Mapping[int, Any]) -> tuple[str, ...]:
     """A scalar's name, or one name an element, counted from 1 in the order of the values."""
-    lengths = [int(d.start if d.start is not None else sizes[d.valueReference].start) for d in v.dimensions]
+    try:
+        lengths = [int(d.start if d.start is not None else sizes[d.valueReference].start) for d in v.dimensions]
+    except (TypeError, ValueError, KeyError):
+        raise InputError(f"variable {v.name!r} has a dimension that is no whole number; correct it") from None
     if not lengths:
         return (v.name,)
+    if min(lengths) < 1 or math.prod(lengths) > _MOST:
+        raise InputError(f"variable {v.name!r} has dimensions {lengths}; 1 to {_MOST} elements can be read")
     return tuple(f"{v.name}[{','.join(map(str, at))}]" for at in product(*(range(1, n + 1) for n in lengths)))
 
 
@@ -130,7 +143,7 @@ def _dependencies(description: Any, sizes: Mapping[int, Any]) -> dict[str, tuple
 
 
 def _numbers(text: Any, count: int) -> list[float]:
-    values = str(text).split() if text is not None else ["0"]
+    values = (str(text).split() if text is not None else []) or ["0"]
     return [_number(value, 0.0) for value in (values if len(values) == count else values[:1] * count)]
 
 
@@ -139,4 +152,7 @@ def _number(text: Any, default: float) -> float:
         return default
     if str(text) in ("true", "false"):
         return float(str(text) == "true")
-    return float(text)
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"{text!r} is no number; correct the model description") from None

@@ -18,11 +18,12 @@ from urllib.parse import unquote
 from xml.etree import ElementTree
 
 from ..errors import InputError
+from ..files import ZIP_FAULTS
 from ..recordings import nearest
 from .fmi_variables import pint_unit
 from .participant import Participant
 from .setup import Hosting, Setup
-from .ssp_parameters import Values, bound_parameters
+from .ssp_parameters import Values, bound_parameters, number, transformation
 from .system import Connection, System
 from .units import conversion
 
@@ -32,8 +33,9 @@ RUN = "urn:snarelab:cosim"
 ENTRY = "SystemStructure.ssd"
 _NAMES = {"ssd": SSD, "ssc": SSC, "run": RUN}
 _FMU = "application/x-fmu-sharedlibrary"
-_LARGEST = 64 << 20  # bytes of a description; FMUs have their own bounds
-_LARGEST_FMU = 4 << 30
+_LARGEST = 16 << 20  # bytes of a description; read, it takes fifty times as much
+_LARGEST_FMUS = 4 << 30  # bytes of all FMUs together
+_MOST, _DEEPEST = 500, 32  # components, and levels of systems
 
 Place = tuple[str, str]
 """An element's path and a connector's name."""
@@ -54,17 +56,23 @@ def read_ssp(path: Path, hosting: Hosting) -> Setup:
     folder = Path(tempfile.mkdtemp(prefix="snarelab-ssp-"))
     built: dict[str, Participant] = {}
     try:
-        with zipfile.ZipFile(path) as archive:
+        with _opened(path) as archive:
             return _read(archive, path, hosting, folder, built)
-    except zipfile.BadZipFile:
-        shutil.rmtree(folder, ignore_errors=True)
-        raise InputError(f"{path}: is no SSP file (no ZIP archive)") from None
-    except InputError as error:
+    except BaseException as error:
         shutil.rmtree(folder, ignore_errors=True)
         for participant in built.values():
             participant.close()
-        text = str(error)
-        raise InputError(text if text.startswith(str(path)) else f"{path}: {text}") from None
+        if isinstance(error, InputError):
+            text = str(error)
+            raise InputError(text if text.startswith(str(path)) else f"{path}: {text}") from None
+        raise
+
+
+def _opened(path: Path) -> zipfile.ZipFile:
+    try:
+        return zipfile.ZipFile(path)
+    except ZIP_FAULTS as error:
+        raise InputError(f"is no SSP file (no ZIP archive: {error}); get the file again") from None
 
 
 def _read(archive: zipfile.ZipFile, path: Path, hosting: Hosting, folder: Path, built: dict[str, Participant]) -> Setup:
@@ -78,10 +86,10 @@ def _read(archive: zipfile.ZipFile, path: Path, hosting: Hosting, folder: Path, 
         raise InputError(f"{ENTRY}: has no System; get the file again")
     flat = _Flat()
     _flatten(archive, top, "", flat)
+    most = _LARGEST_FMUS
     for name, (_, component) in flat.components.items():
-        file = folder / f"{len(built)}" / posixpath.basename(unquote(component.get("source", "")))
-        file.parent.mkdir()
-        _extract(archive, component, name, file)
+        file = _extract(archive, component, name, folder / f"{len(built)}", most)
+        most -= file.stat().st_size
         built[name] = hosting.build(Fmu, file, name)
     connections = [_connection(flat, name, c, built) for name, (_, e) in flat.components.items() for c in _inputs(e)]
     parameters = _parameters(flat.values, flat, built)
@@ -100,8 +108,14 @@ def parsed(archive: zipfile.ZipFile, entry: str) -> ElementTree.Element:
     if info.file_size > _LARGEST:
         raise InputError(f"{entry}: would unpack to {info.file_size} bytes; {_LARGEST} is the most that is read")
     try:
-        return ElementTree.fromstring(archive.read(info), ElementTree.XMLParser(target=_NoDoctype()))
-    except ElementTree.ParseError as error:
+        content = archive.read(info)
+    except ZIP_FAULTS as error:
+        raise InputError(f"{entry}: cannot be unpacked ({error}); get the file again") from None
+    try:
+        return ElementTree.fromstring(content, ElementTree.XMLParser(target=_NoDoctype()))
+    except InputError:
+        raise
+    except (ElementTree.ParseError, ValueError, LookupError) as error:  # the last two: an encoding that expat lacks
         raise InputError(f"{entry}: is no XML that can be read ({error})") from None
 
 
@@ -116,6 +130,10 @@ def _flatten(archive: zipfile.ZipFile, system: ElementTree.Element, path: str, f
     for element in system.iterfind("ssd:Elements/*", _NAMES):
         kind, name = element.tag.rpartition("}")[2], element.get("name", "")
         below = f"{path}.{name}" if path else name
+        if not name or below.replace(".", "_") in flat.components:
+            raise InputError(f"two elements are called {below!r}, or one has no name; name each apart")
+        if len(flat.components) == _MOST or path.count(".") == _DEEPEST:
+            raise InputError(f"has more than {_MOST} components, or systems {_DEEPEST} deep in one another; cut it")
         if kind == "System":
             _flatten(archive, element, below, flat)
         elif kind == "Component" and element.get("type", _FMU) == _FMU:
@@ -123,36 +141,30 @@ def _flatten(archive: zipfile.ZipFile, system: ElementTree.Element, path: str, f
             flat.values += bound_parameters(archive, element, below)
         else:
             raise InputError(f"element {below!r} is a {element.get('type', kind)}; FMUs and systems can be read")
+    kinds = {e.get("name"): _kinds(e) for e in system.iterfind("ssd:Elements/*", _NAMES)} | {None: _kinds(system)}
     for connection in system.iterfind("ssd:Connections/ssd:Connection", _NAMES):
-        start, end = _ends(connection, system, path)
-        factor, offset = 1.0, 0.0
-        for transformation in connection.iterfind("ssc:*", _NAMES):
-            if not transformation.tag.endswith("}LinearTransformation"):
-                raise InputError(f"{'.'.join(start)} -> {'.'.join(end)}: only linear transformations can be read")
-            factor, offset = (float(transformation.get(key, d)) for key, d in (("factor", 1.0), ("offset", 0.0)))
+        start, end = _ends(connection, kinds, path)
+        factor, offset = transformation(connection, f"{'.'.join(start)} -> {'.'.join(end)}")
         flat.feeds[end] = (start, factor, offset)
         if connection.get("suppressUnitConversion") in ("true", "1"):
             flat.unconverted.add(end)
 
 
-def _ends(connection: ElementTree.Element, system: ElementTree.Element, path: str) -> tuple[Place, Place]:
+def _kinds(element: ElementTree.Element) -> dict[str, str]:
+    return {c.get("name", ""): c.get("kind", "") for c in element.iterfind("ssd:Connectors/ssd:Connector", _NAMES)}
+
+
+def _ends(
+    connection: ElementTree.Element, kinds: Mapping[str | None, Mapping[str, str]], path: str
+) -> tuple[Place, Place]:
     """Both ends, the giving one first; SSP lets a connection be written either way round."""
     places: list[Place] = []
     gives: list[bool] = []
-    elements = {e.get("name"): e for e in system.iterfind("ssd:Elements/*", _NAMES)}
     for side in ("start", "end"):
         name, connector = connection.get(f"{side}Element"), connection.get(f"{side}Connector", "")
-        owner = system if name is None else elements.get(name)
-        if owner is None:
+        if name not in kinds:
             raise InputError(f"a connection names the element {name!r}, which is not there")
-        kind = next(
-            (
-                c.get("kind")
-                for c in owner.iterfind("ssd:Connectors/ssd:Connector", _NAMES)
-                if c.get("name") == connector
-            ),
-            None,
-        )
+        kind = kinds[name].get(connector)
         if kind is None:
             raise InputError(f"a connection names the connector {connector!r} of {name or path!r}, which is not there")
         # Seen from inside, a system's own inputs give and its outputs take.
@@ -202,16 +214,28 @@ def _unit(participant: Participant, name: str) -> str:
     return next((v.unit for v in participant.variables if v.name == name), "")
 
 
-def _extract(archive: zipfile.ZipFile, component: ElementTree.Element, name: str, file: Path) -> None:
+def _extract(archive: zipfile.ZipFile, component: ElementTree.Element, name: str, folder: Path, most: int) -> Path:
+    """Unpack a component's FMU into a new folder; its path."""
     source = unquote(component.get("source", ""))
     try:
         info = archive.getinfo(posixpath.normpath(source))
     except KeyError:
         raise InputError(f"component {name!r}: {source!r} is not in the archive") from None
-    if info.file_size > _LARGEST_FMU:
-        raise InputError(f"component {name!r}: {source!r} would unpack to {info.file_size} bytes; that is refused")
-    with archive.open(info) as stream, file.open("wb") as copy:
-        shutil.copyfileobj(stream, copy)
+    file = folder / posixpath.basename(info.filename)
+    if info.is_dir() or file.parent != folder or file.name in ("", ".", ".."):
+        raise InputError(f"component {name!r}: {source!r} is no file of the archive")
+    if info.file_size > most:
+        raise InputError(
+            f"component {name!r}: {source!r} would unpack to {info.file_size} bytes, and {most} are left of the "
+            f"{_LARGEST_FMUS} that all FMUs may have; that is refused"
+        )
+    try:
+        folder.mkdir()
+        with archive.open(info) as stream, file.open("wb") as copy:
+            shutil.copyfileobj(stream, copy)
+    except ZIP_FAULTS as error:
+        raise InputError(f"component {name!r}: {source!r} cannot be unpacked ({error}); get the file again") from None
+    return file
 
 
 def _parameters(values: list[Values], flat: _Flat, built: Mapping[str, Participant]) -> dict[str, float]:
@@ -238,11 +262,11 @@ def _run(root: ElementTree.Element) -> dict[str, Any]:
     if experiment is not None:
         for key, attribute in (("start", "startTime"), ("stop", "stopTime")):
             if experiment.get(attribute) is not None:
-                run[key] = float(experiment.get(attribute, "0"))
+                run[key] = number(experiment, attribute, 0.0, "DefaultExperiment")
     own = root.find("ssd:Annotations/ssc:Annotation/run:Run", _NAMES)
     if own is not None:
         run |= {key: own.attrib[key] for key in ("scheme", "hold") if key in own.attrib}
         if "step" in own.attrib:
-            run["step"] = float(own.attrib["step"])
+            run["step"] = number(own, "step", 0.0, "Run")
         run["iterate"] = own.get("iterate") == "true"
     return run

@@ -1,5 +1,6 @@
 """Parameter sets and mappings of SSP 1.0: which value each component's variable is to have."""
 
+import math
 import posixpath
 import zipfile
 from dataclasses import dataclass
@@ -81,14 +82,32 @@ def _targets(mapping: ElementTree.Element) -> dict[str, list[tuple[str, float, f
     """For each parameter of the set the variables that it goes to, with factor, offset, and no conversion of units."""
     targets: dict[str, list[tuple[str, float, float, bool]]] = {}
     for entry in mapping.iterfind("ssm:MappingEntry", _NAMES):
-        factor, offset = 1.0, 0.0
-        for transformation in entry.iterfind("ssc:*", _NAMES):
-            if not transformation.tag.endswith("}LinearTransformation"):
-                raise InputError(f"mapping of {entry.get('source')!r}: only linear transformations can be read")
-            factor, offset = (float(transformation.get(key, d)) for key, d in (("factor", 1.0), ("offset", 0.0)))
+        factor, offset = transformation(entry, f"mapping of {entry.get('source')!r}")
         plain = entry.get("suppressUnitConversion") in ("true", "1")
         targets.setdefault(entry.get("source", ""), []).append((entry.get("target", ""), factor, offset, plain))
     return targets
+
+
+def transformation(element: ElementTree.Element, what: str) -> tuple[float, float]:
+    """Factor and offset of a connection or mapping; InputError for a transformation that is not linear."""
+    factor, offset = 1.0, 0.0
+    for child in element.iterfind("ssc:*", _NAMES):
+        if not child.tag.endswith("}LinearTransformation"):
+            raise InputError(f"{what}: only linear transformations can be read")
+        factor, offset = number(child, "factor", 1.0, what), number(child, "offset", 0.0, what)
+    return factor, offset
+
+
+def number(element: ElementTree.Element, key: str, default: float, what: str) -> float:
+    """A finite number among an element's attributes."""
+    text = element.get(key)
+    try:
+        value = default if text is None else float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(f"{what}: {key} = {text!r} is no finite number")
+    return value
 
 
 def _value(parameter: ElementTree.Element) -> tuple[float | None, str]:
@@ -100,8 +119,5 @@ def _value(parameter: ElementTree.Element) -> tuple[float | None, str]:
             text = element.get("value", "")
             if kind == "Boolean":
                 return float(text in ("true", "1")), ""
-            try:
-                return float(text), element.get("unit", "")
-            except ValueError:
-                raise InputError(f"parameter {name!r}: {text!r} is not a number") from None
+            return number(element, "value", math.nan, f"parameter {name!r}"), element.get("unit", "")
     return None, ""

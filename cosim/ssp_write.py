@@ -1,12 +1,12 @@
 """Writing a system as an SSP 1.0 file that other tools load: FMUs, connections, parameter sets."""
 
-import os
 import zipfile
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 from ..errors import InputError
+from ..files import written_whole
 from .participant import Participant
 from .process import OwnProcess
 from .setup import Setup
@@ -123,14 +123,7 @@ def _add_connections(top: ElementTree.Element, setup: Setup) -> None:
 
 
 def _pack(path: Path, description: bytes, stored: dict[Path, str]) -> None:
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
-        with zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED) as archive:
-            archive.writestr(zipfile.ZipInfo(ENTRY, _WHEN), description)
-            for file, entry in stored.items():
-                archive.writestr(zipfile.ZipInfo(entry, _WHEN), file.read_bytes(), zipfile.ZIP_STORED)
-        os.replace(partial, path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror or error}); choose another folder") from None
-    finally:
-        partial.unlink(missing_ok=True)
+    with written_whole(path) as part, zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr(zipfile.ZipInfo(ENTRY, _WHEN), description)
+        for file, entry in stored.items():
+            archive.writestr(zipfile.ZipInfo(entry, _WHEN), file.read_bytes(), zipfile.ZIP_STORED)

@@ -24,12 +24,12 @@ An input names the output that it reads, so that no input can be connected twice
 
 import importlib
 import sys
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
+from ..files import toml_table
 from ..recordings import nearest
 from .iteration import Iteration
 from .participant import Participant
@@ -44,10 +44,7 @@ _PARTICIPANT = ("fmu", "python", "options", "parameters", "own_process", "timeou
 
 def read_toml(path: Path, hosting: Hosting) -> Setup:
     """Read a system and build its participants; raises InputError with the file's name for whatever is wrong in it."""
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
-        raise InputError(f"{path}: is no TOML that can be read: {error}") from None
+    content = toml_table(path)
     built: dict[str, Participant] = {}
     try:
         return _read(content, path, hosting, built)
@@ -106,7 +103,7 @@ def _imported(text: str, place: str) -> Any:
     module, _, name = text.partition(":")
     try:
         found = getattr(importlib.import_module(module), name)
-    except (ImportError, AttributeError, ValueError) as error:
+    except Exception as error:  # the module is the user's own and may raise anything
         raise InputError(f"{place}: python = {text!r} cannot be imported ({error}); write 'module:Class'") from None
     if not (isinstance(found, type) and issubclass(found, Participant)):
         raise InputError(

@@ -4,6 +4,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..recordings import UNITS
+from ..recordings.units import check_unit
 
 _PLAIN = {"": "1", "-": "1", "–": "1"}
 
@@ -31,6 +32,7 @@ def quantity(unit: str) -> Any:
     """A unit, or a number times units (``1000 kg*m``), as pint's quantity; InputError where pint does not know it."""
     text = _PLAIN.get(unit, unit)
     try:
+        check_unit(text)
         return UNITS.Quantity(text) if text[0].isdigit() else UNITS.Quantity(1, UNITS.Unit(text))
     except Exception as error:  # pint raises half a dozen kinds
         raise InputError(f"unit {unit!r} is unknown to pint; write for example rad, deg/s, N*m or degC") from error

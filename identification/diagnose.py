@@ -15,6 +15,7 @@ from ..models.effects import effects
 from ..models.hidden_state import prepare
 from ..models.model import Model
 from ..models.rigid_body import RigidBody
+from ..models.snare.setup import SnareTree
 from .answer import report_on
 from .assembly import Assembly
 from .base_parameters import base_parameters
@@ -26,6 +27,7 @@ from .fit import Fit, channel_rms, fit
 from .identify import inertial_values, physical
 from .rest import bridged, fitted
 from .search import Found, Taken, carry, search, without
+from .snare_diagnose import diagnose_captures
 
 Array = NDArray[np.float64]
 
@@ -73,6 +75,8 @@ def diagnose(
         Whatever is wrong with the recordings, or a holdout that is one of them.
     """
     demand_apart(recordings, holdout)
+    if isinstance(model.tree, SnareTree):
+        return Answer(*diagnose_captures(model, recordings, holdout, progress=progress, seed=seed))
     progress("reading and conditioning the recordings")
     prepare(effects().values())
     body = RigidBody(model.tree)

@@ -11,12 +11,14 @@ from ..models.floating.tree import channel
 from ..models.inertia import Array
 from ..models.model import Model
 from ..models.rigid_body import RigidBody
+from ..models.snare.setup import SnareTree
 from .assembly import Assembly
 from .base_parameters import INERTIAL, BaseParameters, base_parameters
 from .consistent_inertia import ConsistentInertia, consistent_inertia
 from .experiment import Experiment, demand_apart, demand_torque, load_experiments, scales
 from .fit import Fit, channel_rms, fit
 from .friction_curve import friction_curves, identifiable
+from .snare_diagnose import IdentifiedCaptures, identify_captures
 
 
 @dataclass(frozen=True)
@@ -104,7 +106,7 @@ def identify(
     *,
     progress: Callable[[str], None] = lambda _: None,
     seed: int = 0,
-) -> Identified:
+) -> Identified | IdentifiedCaptures:
     """Fit all parameters of a model to all recordings jointly.
 
     Parameters
@@ -125,6 +127,8 @@ def identify(
     """
     for recording in holdout:
         demand_apart(recordings, recording)
+    if isinstance(model.tree, SnareTree):
+        return identify_captures(model, recordings, holdout, progress=progress)
     progress("reading and conditioning the recordings")
     body = RigidBody(model.tree)
     train = load_experiments(model, recordings, body)

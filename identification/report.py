@@ -1,10 +1,10 @@
 """The diagnosis as one self-contained HTML page for test engineers: verdict first, then the grounds for it."""
 
-import os
 from datetime import date
 from pathlib import Path
 
 from ..errors import InputError
+from ..files import written_whole
 from ..report.html import page
 from .diagnosis import Diagnosis
 from .report_findings import STATUS, missing, verdict, where
@@ -20,14 +20,8 @@ def write_report(diagnosis: Diagnosis, path: str | Path) -> None:
     if not path.parent.is_dir():
         raise InputError(f"{path}: the folder {path.parent} does not exist; make it, or choose another")
     document = _document(diagnosis, date.today())
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
-        partial.write_text(document, encoding="utf-8")
-        os.replace(partial, path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror or error}); choose another folder") from error
-    finally:
-        partial.unlink(missing_ok=True)
+    with written_whole(path) as part:
+        part.write_text(document, encoding="utf-8")
 
 
 def _document(diagnosis: Diagnosis, day: date) -> str:

@@ -9,21 +9,24 @@ from ..errors import InputError
 from ..models.floating.tree import FloatingTree
 from ..models.model import Model
 from ..models.rigid_body import RigidBody
+from ..models.snare.setup import SnareTree
 from .assembly import Assembly
 from .base_parameters import INERTIAL
 from .experiment import load_experiments, scales
 from .simulate_floating import simulate_floating
+from .snare_diagnose import simulate_capture
 
 
-def simulate(model: Model, motion: str | Path) -> xr.Dataset:
+def simulate(model: Model, motion: str | Path | None) -> xr.Dataset:
     """Torque of a model along the motion of a recording (inverse dynamics with every effect).
 
     Parameters
     ----------
     model : Model
         Its file must hold values of all parameters that its effects have; `identify` or `diagnose` saves such a file.
-    motion : path
-        Recording with the position of every joint; its torque is only used to choose the analysis band.
+    motion : path or None
+        Recording with the position of every joint; its torque is only used to choose the analysis band. A capture
+        needs none (`simulate_capture`).
 
     Returns
     -------
@@ -37,6 +40,10 @@ def simulate(model: Model, motion: str | Path) -> xr.Dataset:
         A parameter without a value, or whatever is wrong with the recording.
     """
     tree = model.tree
+    if isinstance(tree, SnareTree):
+        return simulate_capture(model, motion)
+    if motion is None:
+        raise InputError(f"{model.path}: system = {model.system!r} follows a motion; give --motion RECORDING")
     read = [] if isinstance(tree, FloatingTree) else load_experiments(model, [motion], RigidBody(tree))
     needed = [f"{p.key}.{x.name}" for p in model.effects for x in p.effect.parameters]
     if model.inertia == "free":

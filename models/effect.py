@@ -12,6 +12,9 @@ place (a joint, a link, a sling, a sensor channel) and one instant, in CasADi sy
   takes each to the torque of every joint.
 - On a free-floating arm: ``at="base"``, the wrench (6,) on the base, force [N] and moment [N·m] about the origin of its
   frame, in its own axes.
+- In a snare: ``at="pin"``, a force [N] at each contact of a cable with the pin; ``at="cables"``, a force [N] or moment
+  [N·m] inside all cables; ``at="target"``, the force (3,) on the target [N]. The snare's engine has the same laws
+  compiled (``models/snare``), at places that no recording shows.
 
 Hidden state (a spring's twist, a delayed signal) is a system of ordinary differential equations: ``states`` names it,
 ``rate`` is its right-hand side, and the law may read it.
@@ -74,7 +77,7 @@ class Effect:
         The vocabulary's word; also the file's name.
     family : str
         Heading of the vocabulary it stands under.
-    at : "joint", "link", "sensor", "sling", "slide", "boom" or "base"
+    at : "joint", "link", "sensor", "sling", "slide", "boom", "base", "pin", "cables" or "target"
         Where it acts; a slide goes by the name of its joint, a boom by that of its link.
     sentence : str
         What a test engineer would say: "friction that does not depend on speed".
@@ -94,7 +97,10 @@ class Effect:
         its joint. Boom: ``spread``, the sum of squared levers of the slings beyond it [m²], in torsion and in bending.
         Base: ``spin`` [rad/s], ``spin_rate`` [rad/s²], ``acceleration`` [m/s²] (of the frame's origin), the spin gained
         since the start ``spin_gained`` and the angular ``impulse`` that wheels were told to give by now [N·m·s], 3
-        numbers each in the base's axes, and ``time``.
+        numbers each in the base's axes, and ``time``. Pin: ``overlap`` [m] and its rate ``approach`` [m/s], the
+        ``elastic_force`` and ``normal_force`` [N], ``slip`` of the cable against the pin (3 numbers [m/s]) and the
+        ``slip_velocity`` [m/s] below which friction is smooth. Cables: ``bending_stiffness`` [N·m²] and
+        ``curvature_rate`` [1/(m·s)]. Target: ``displacement`` since the start (3 numbers [m]).
         A state is read as ``s[state_name]``.
     states : tuple of str
         Names of hidden states, all starting at rest (zero rate), or from zero.
@@ -126,7 +132,7 @@ class Effect:
 
     name: str
     family: str
-    at: Literal["joint", "link", "sensor", "sling", "slide", "boom", "base"]
+    at: Literal["joint", "link", "sensor", "sling", "slide", "boom", "base", "pin", "cables", "target"]
     sentence: str
     equation: str
     source: str

@@ -10,6 +10,7 @@ from .floating.tree import n_carriers
 from .hidden_state import rows
 from .rig.kinematics import booms, reached_joints, slides
 from .rig.rig import Rig
+from .snare.setup import SnareTree, snare_places
 from .tree import Tree
 
 
@@ -41,10 +42,11 @@ class Model:
         The file.
     name, system : str
     urdf : Path or None
-        None for the built-in rig, and for the built-in ETS-VII.
+        None for the built-in rig, the built-in ETS-VII, and a snare.
     tree : Tree
         Joints, links, nominal inertia and gravity; a `Rig` for ``zero_g_rig``, with its slings; a `FloatingTree` for
-        ``free_floating_arm``, whose first six joints carry the base.
+        ``free_floating_arm``, whose first six joints carry the base; a `SnareTree` without joints for
+        ``snare_capture``.
     inertia : "fixed" or "free"
     effects : tuple of Placed
         Physics that the model has, one entry a place.
@@ -79,6 +81,8 @@ class Model:
 
 def places(effect: Effect, tree: Tree) -> tuple[str, ...]:
     """Places of a tree at which an effect can act on some torque; sensor effects act on torque channels by default."""
+    if isinstance(tree, SnareTree):
+        return snare_places(effect.name, tree)
     carriers = n_carriers(tree)
     if effect.at == "joint":
         return tuple(j.name for j in tree.joints[carriers:])
@@ -87,7 +91,7 @@ def places(effect: Effect, tree: Tree) -> tuple[str, ...]:
     if effect.at == "base":
         return ("base",) if carriers else ()
     if effect.at != "sensor":
-        if not isinstance(tree, Rig):
+        if not isinstance(tree, Rig) or effect.at not in ("sling", "slide", "boom"):
             return ()
         every = {"sling": tuple(s.name for s in tree.slings), "slide": slides(tree), "boom": booms(tree)}[effect.at]
         return tuple(at for at in every if reached_joints(tree, effect.at, at, rows(effect)))

@@ -1,7 +1,7 @@
 """Model files (TOML) read, with every mistake named."""
 
 import difflib
-import tomllib
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -9,17 +9,22 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..files import toml_table
 from ..recordings.signals import FORMS, Signal, is_signal, joint_of
 from .effects import get_effect
 from .floating.tree import read_floating
 from .model import Model, Placed, places
 from .rig.file import read_slings
 from .rig.rig import Rig, built_in_rig
+from .snare.setup import read_setup
 from .tree import Tree
 from .urdf import load_urdf
 
-SYSTEMS = ("arm", "zero_g_rig", "free_floating_arm")
-"""Systems that this version can fit; the format reserves snare_capture."""
+SYSTEMS = ("arm", "zero_g_rig", "free_floating_arm", "snare_capture")
+"""Systems that this version can fit."""
+
+_GRAVITY = {"free_floating_arm": [0.0, 0.0, 0.0], "snare_capture": [-9.81, 0.0, 0.0]}
+"""[m/s²], where it is not given: the paper's ground test hangs along the snare's axis."""
 
 _KEYS = (
     "name",
@@ -30,6 +35,7 @@ _KEYS = (
     "inertia",
     "effects",
     "slings",
+    "capture",
     "signals",
     "bandwidth",
     "parameters",
@@ -47,12 +53,7 @@ def load_model(path: str | Path) -> Model:
     path = Path(path)
     if not path.is_file():
         raise InputError(f"{path}: no such model file")
-    try:
-        raw = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: not a TOML file: {error}; mend that line") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); check the file's permissions") from None
+    raw = toml_table(path)
     for key in raw:
         if key not in _KEYS:
             near = difflib.get_close_matches(key, _KEYS, 1)
@@ -64,12 +65,20 @@ def load_model(path: str | Path) -> Model:
     inertia = _text(path, raw, "inertia", "fixed")
     if inertia not in ("fixed", "free"):
         raise InputError(f"{path}: inertia = {inertia!r}; allowed are 'fixed' and 'free'")
-    usual = [0.0, 0.0, 0.0 if system == "free_floating_arm" else -9.81]
+    usual = _GRAVITY.get(system, [0.0, 0.0, -9.81])
     gravity = _numbers(path, raw.get("gravity", usual), "gravity", 3)
     bandwidth = raw.get("bandwidth")
     number = isinstance(bandwidth, int | float) and not isinstance(bandwidth, bool)
     if bandwidth is not None and not (number and 0 < bandwidth < np.inf):
         raise InputError(f"{path}: bandwidth = {bandwidth!r}; allowed is a positive number of hertz")
+    if system == "snare_capture":
+        for key, instead in (("urdf", "[capture] has its sizes"), ("bandwidth", "recordings have none")):
+            if key in raw:
+                raise InputError(f"{path}: system = 'snare_capture' has no {key}, {instead}; take it out")
+        if inertia != "fixed":
+            raise InputError(f"{path}: inertia = {inertia!r}; system = 'snare_capture' allows 'fixed' only")
+    elif "capture" in raw:
+        raise InputError(f"{path}: [capture] belongs to system = 'snare_capture'; take it out")
     urdf = path.parent / _text(path, raw, "urdf", "") if "urdf" in raw else None
     tree = _tree(path, raw, system, urdf, gravity)
     return Model(
@@ -90,6 +99,10 @@ def _tree(path: Path, raw: Mapping[str, Any], system: str, urdf: Path | None, gr
     """The arm of a model file, on its slings where the system is a rig."""
     if "slings" in raw and (system != "zero_g_rig" or urdf is None):
         raise InputError(f"{path}: [slings] belong to system = 'zero_g_rig' with a URDF of your own; take them out")
+    if system == "snare_capture":
+        if "base" in raw:
+            raise InputError(f"{path}: key 'base' belongs to system = 'free_floating_arm'; take it out")
+        return read_setup(path, _text(path, raw, "name", path.stem), raw.get("capture"), list(gravity))
     if system == "free_floating_arm":
         try:
             return read_floating(urdf, tuple(gravity), _text(path, raw, "base", "base"))
@@ -155,9 +168,8 @@ def _placed(path: Path, entries: Any, tree: Tree) -> tuple[Placed, ...]:
         if not isinstance(hold, list) or any(h not in names for h in hold):
             raise InputError(f"{path}: {name} hold = {hold!r}; allowed is a list of {', '.join(names)}")
         found += [Placed(effect, place, tuple(hold)) for place in ((at,) if at else everywhere)]
-    keys = [p.key for p in found]
-    for key in keys:
-        if keys.count(key) > 1:
+    for key, count in Counter(p.key for p in found).items():
+        if count > 1:
             raise InputError(f"{path}: {key} is listed twice in effects; keep one")
     return tuple(found)
 

@@ -2,16 +2,16 @@
 
 import json
 import os
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError
+from ..files import written_whole
 from .effects import get_effect
 from .floating.tree import FloatingTree
 from .model import Model, Placed, places
 from .rig.file import sling_table
 from .rig.rig import Rig
+from .snare.setup import SnareTree
 
 
 def save_model(model: Model, path: str | Path, note: str) -> None:
@@ -52,6 +52,8 @@ def save_model(model: Model, path: str | Path, note: str) -> None:
         lines += ["", "[slings]"]
         for name, fields in sling_table(model.tree).items():
             lines.append(f"{_toml(name)} = {{ {', '.join(f'{k} = {_toml(v)}' for k, v in fields.items())} }}")
+    if isinstance(model.tree, SnareTree) and model.tree.setup.given:
+        lines += ["", "[capture]", *(f"{k} = {_toml(v)}" for k, v in model.tree.setup.given.items())]
     if model.signals:
         lines += ["", "[signals]"]
         for name, signal in model.signals.items():
@@ -60,15 +62,8 @@ def save_model(model: Model, path: str | Path, note: str) -> None:
             lines.append(f"{_toml(name)} = {{ {inner} }}")
     if model.values:
         lines += ["", "[parameters]", *(f"{_toml(k)} = {float(v)!r}" for k, v in model.values.items())]
-    scratch = path.with_name(path.name + ".part")
-    try:
-        scratch.write_text("\n".join(lines) + "\n", encoding="utf-8")
-        scratch.replace(path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}; choose a folder that exists") from None
-    finally:
-        with suppress(OSError):
-            scratch.unlink()
+    with written_whole(path, "choose a folder that exists") as part:
+        part.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def _toml(value: Any) -> str:

@@ -19,10 +19,12 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from ..errors import InputError
+from ..files import content
 from . import inertia
 from .inertia import Array
 from .tree import Joint, Link, Tree
 
+_MOST = 1000
 _KINDS = ("revolute", "continuous", "prismatic", "fixed")
 _KINEMATIC = ("parent", "child", "origin", "axis")
 _INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
@@ -79,13 +81,16 @@ def read_robot(path: Path) -> ET.Element:
     """The <robot> element; prefixes such as drake: stay as written, declared or not."""
     builder, parser = ET.TreeBuilder(), expat.ParserCreate()
     parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
+
+    def refuse_doctype(name: str, *_: object) -> None:
+        raise InputError(f"{path}: declares a document type {name!r}, which a URDF has no use for; take it out")
+
+    parser.StartDoctypeDeclHandler = refuse_doctype  # entities can stand for gigabytes
     try:
-        parser.Parse(path.read_bytes(), True)
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file; name an existing URDF") from None
-    except OSError as problem:
-        raise InputError(f"{path}: cannot be read ({problem.strerror}); name a readable URDF") from None
-    except expat.ExpatError as problem:
+        parser.Parse(content(path), True)
+    except InputError:
+        raise
+    except (expat.ExpatError, ValueError, LookupError) as problem:  # the last two: an encoding that expat lacks
         raise InputError(f"{path}: not XML ({problem}); give a URDF") from None
     robot = builder.close()
     if robot.tag != "robot":
@@ -101,6 +106,8 @@ def checked_root(path: Path, robot: ET.Element) -> str:
         if element.tag.startswith("drake:") and element.tag != "drake:collision_filter_group":
             raise InputError(f"{path}: <{element.tag}> is not supported; use URDF's own joints, or remove it")
     for tag in ("link", "joint"):
+        if len(robot.findall(tag)) > _MOST:
+            raise InputError(f"{path}: has more than {_MOST} {tag}s; give one arm")
         twice = [name for name, count in Counter(e.get("name") for e in robot.findall(tag)).items() if count > 1]
         if twice:
             raise InputError(f"{path}: {tag} name '{twice[0]}' is given twice; give every {tag} its own name")
@@ -125,7 +132,8 @@ def checked_root(path: Path, robot: ET.Element) -> str:
         carried[link] = name or ""
     roots = [link.get("name", "") for link in robot.findall("link") if link.get("name", "") not in carried]
     if len(roots) != 1:
-        raise InputError(f"{path}: root links are {roots}; give exactly one link that is no joint's child")
+        shown = f"{roots[:5]} and {len(roots) - 5} more" if len(roots) > 5 else roots
+        raise InputError(f"{path}: root links are {shown}; give exactly one link that is no joint's child")
     return roots[0]
 
 
@@ -200,7 +208,9 @@ def parse_plant(path: Path, robot: ET.Element, root: str) -> Any:
     for element in robot:
         if element.tag in ("link", "joint"):
             kept = ET.SubElement(bare, element.tag, element.attrib)
-            kept.extend([part for part in element if element.tag == "joint" and part.tag in _KINEMATIC])
+            for part in element:
+                if element.tag == "joint" and part.tag in _KINEMATIC:
+                    ET.SubElement(kept, part.tag, part.attrib)
     plant = MultibodyPlant(0.0)
     try:
         Parser(plant).AddModelsFromString(ET.tostring(bare, encoding="unicode"), "urdf")

@@ -19,6 +19,8 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
+from snarelab.files import written_whole
+
 from . import rivals
 from .cases import ROUND, Answer, draw, planned_cases
 from .page import write_page
@@ -109,7 +111,8 @@ def fill(
     """``run`` on every folder, but for those that ``path`` has a line of with this version; all, in order."""
     lines = path.read_text().splitlines(keepends=True) if path.exists() else []
     kept = [line for line in lines if line.endswith("\n") and json.loads(line)["version"] == version]
-    path.write_text("".join(kept))  # without what other sources made, and without half a line of a run stopped
+    with written_whole(path) as part:
+        part.write_text("".join(kept))  # without what other sources made, and without half a line of a run stopped
     done = {record["case"]: record["found"] for record in map(json.loads, kept)}
     with path.open("a") as file:
         jobs = {pool.submit(run, f): k for k, f in enumerate(folders) if k not in done}

@@ -8,11 +8,18 @@ import difflib
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import InputError
+
+LARGEST = 4 << 30
+"""Most bytes of numbers that are read from a recording, and of a file that is read at once."""
+
+MOST = 10_000
+"""Most columns of a recording; some of what is done to one looks at all the others."""
 
 _ELEMENT = re.compile(r"(?P<name>.+)\[(?P<index>\d+)\]")
 _HEADER = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\[\]]*)\]")
@@ -23,6 +30,21 @@ def nearest(name: str, known: Iterable[str]) -> str:
     by_spelling = {candidate.casefold(): candidate for candidate in known}
     close = difflib.get_close_matches(name.casefold(), by_spelling, n=1, cutoff=0.0)
     return by_spelling[close[0]] if close else ""
+
+
+def check_size(path: Path, size: int) -> None:
+    """Raise InputError where a recording says that it unpacks to more than `LARGEST` bytes; before it does."""
+    if size > LARGEST:
+        raise InputError(
+            f"{path}: unpacks to {size / 2**30:.1f} GiB of numbers and at most {LARGEST >> 30} are read; "
+            "it is damaged, or cut it into parts"
+        )
+
+
+def check_count(path: Path, count: int) -> None:
+    """Raise InputError where a recording has more than `MOST` columns."""
+    if count > MOST:
+        raise InputError(f"{path}: has {count} columns and at most {MOST} are read; leave out what is no signal")
 
 
 def split_header(header: str) -> tuple[str, str | None]:
@@ -116,11 +138,15 @@ class Columns:
             )
         return float(values[0])
 
+    @cached_property
+    def _by_name(self) -> dict[str, str]:
+        """Header by its name without a unit; the first of several."""
+        return {split_header(header)[0]: header for header in reversed(self.names)}
+
     def _locate(self, name: str) -> tuple[str | None, int | None]:
         """The header that ``name`` means, and the index in it; (None, None) if there is none."""
-        by_name = {split_header(header)[0]: header for header in reversed(self.names)}
-        match = _ELEMENT.fullmatch(name)
-        if name in self.names:
+        by_name, match = self._by_name, _ELEMENT.fullmatch(name)
+        if name in self.arrays or name in self.problems or name in self.scalars:
             return name, None
         if name in by_name:
             return by_name[name], None

@@ -12,7 +12,11 @@ import numpy as np
 import pandas as pd
 
 from ..errors import InputError
-from .columns import Columns
+from ..files import content
+from .columns import LARGEST, Columns, check_count
+
+_WALKED = 1 << 30
+"""Bytes of lines that are walked to say where text stands among numbers; a walk for each column with text."""
 
 _MISSING = ("", "NaN", "nan", "NA")
 
@@ -22,40 +26,56 @@ def read(path: Path) -> Columns:
 
     Raises InputError for an empty file, a text encoding other than UTF-8, and rows longer than the header.
     """
-    data = path.read_bytes().removeprefix(b"\xef\xbb\xbf")
+    data = content(path, LARGEST).removeprefix(b"\xef\xbb\xbf")
     try:
-        lines = _lines(data)
-        _, first = next(lines, (0, ""))
-        if not first:
-            raise InputError(f"{path}: the file is empty; a header row and at least 2 rows of numbers are wanted")
-        separator = max(",;\t", key=first.count)
-        header = _cells(first, separator)
-        # pandas would take a first row that is too long for row labels; later ones it refuses itself
-        if len(_cells(next(lines, (0, ""))[1], separator)) > len(header):
-            raise InputError(f"{path}: {_long_row(data, separator, len(header))}")
-        table = _parse(data, separator, header)
+        if not data.isascii():
+            data.decode()
+        header, separator, table = _table(path, data)
     except UnicodeDecodeError as error:
         raise InputError(
             f"{path}: is not UTF-8 text ({error.reason} at byte {error.start}); save it as UTF-8"
         ) from error
-    except pd.errors.ParserError as error:
-        raise InputError(f"{path}: {_long_row(data, separator, len(header))}") from error
+    except csv.Error as error:
+        raise InputError(f"{path}: is not a table that can be read ({error}); check its quotes") from error
     arrays: dict[str, np.ndarray] = {}
     problems: dict[str, str] = {}
     notes = []
+    walks = max(20, _WALKED // len(data))
     for position, name in enumerate(header):
         if name in arrays or name in problems:
             notes.append(f"column {name!r} appears again as column {position + 1} and is ignored there")
             continue
         values = np.asarray(table[position])
         if values.dtype.kind not in "iuf":
+            walks -= 1
+            if walks < 0:
+                problems[name] = "holds text; write numbers, or leave cells empty"
+                continue
             try:
                 values = _numbers(data, separator, position)
-            except ValueError as error:
+            except (ValueError, csv.Error) as error:
                 problems[name] = str(error)
                 continue
         arrays[name] = values
     return Columns(path, arrays, problems=problems, notes=tuple(notes), row=lambda index: _row_number(data, index))
+
+
+def _table(path: Path, data: bytes) -> tuple[list[str], str, pd.DataFrame]:
+    """Header, separator and cells; raises csv.Error for a cell of more than 131072 characters."""
+    lines = _lines(data)
+    _, first = next(lines, (0, ""))
+    if not first:
+        raise InputError(f"{path}: the file is empty; a header row and at least 2 rows of numbers are wanted")
+    separator = max(",;\t", key=first.count)
+    header = _cells(first, separator)
+    check_count(path, len(header))
+    # pandas would take a first row that is too long for row labels; later ones it refuses itself
+    if len(_cells(next(lines, (0, ""))[1], separator)) > len(header):
+        raise InputError(f"{path}: {_long_row(data, separator, len(header))}")
+    try:
+        return header, separator, _parse(data, separator, header)
+    except pd.errors.ParserError as error:
+        raise InputError(f"{path}: {_long_row(data, separator, len(header))}") from error
 
 
 def _parse(data: bytes, separator: str, header: list[str]) -> pd.DataFrame:
@@ -84,6 +104,7 @@ def _lines(data: bytes) -> Iterator[tuple[int, str]]:
 
 
 def _cells(line: str, separator: str) -> list[str]:
+    """Cells of a line; raises csv.Error for one of more than 131072 characters."""
     return [cell.strip() for cell in next(csv.reader([line], delimiter=separator, skipinitialspace=True))]
 
 

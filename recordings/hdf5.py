@@ -1,12 +1,18 @@
 """HDF5 files: datasets are columns, groups are folders (``"arm/current"``), a dataset's attribute ``unit`` its unit."""
 
+import pickle
+import subprocess
+import sys
+import threading
 from pathlib import Path
 
-import h5py
 import numpy as np
 
 from ..errors import InputError
-from .columns import Columns, sorted_by_kind
+from .columns import LARGEST, Columns, sorted_by_kind
+
+PATIENCE = 30.0
+"""Longest that a file may take to be read [s], and 1 s more for each 4 MB of it."""
 
 
 def read(path: Path) -> Columns:
@@ -14,30 +20,29 @@ def read(path: Path) -> Columns:
     return sorted_by_kind(path, datasets(path))
 
 
-def datasets(path: Path, matlab: bool = False) -> dict[str, object]:
-    """All datasets by their path in the file; what is no column (text, images) is left as None.
+def datasets(path: Path, matlab: bool = False) -> dict[str, np.ndarray]:
+    """All datasets by their path in the file; what is no column (text, images) is an array of objects.
 
-    MATLAB 7.3 stores arrays transposed and text as integers: ``matlab`` undoes the first and marks the second.
+    Links to other files are not followed, and data that lies in other files is left as None. MATLAB 7.3 stores arrays
+    transposed and text as integers: ``matlab`` undoes the first and marks the second. A process of its own reads the
+    file, see `hdf5_apart`; the first sight of it costs a quarter of a second.
     """
-    found: dict[str, object] = {}
-
-    def visit(name: str, item: h5py.Group | h5py.Dataset) -> None:
-        if not isinstance(item, h5py.Dataset) or (matlab and name.startswith("#")):
-            return
-        if item.ndim > 2 or item.dtype.kind not in "biuf" or _text(item.attrs.get("MATLAB_class")) == "char":
-            found[name] = np.array(None, dtype=object)
-            return
-        unit = _text(item.attrs.get("unit", item.attrs.get("units")))
-        values = np.asarray(item[()])
-        found[f"{name} [{unit}]" if unit else name] = values.T if matlab else values
-
+    script = str(Path(__file__).with_name("hdf5_apart.py"))
+    command = [sys.executable, "-P", script, str(path.resolve()), str(LARGEST), *(["matlab"] if matlab else [])]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, stdin=subprocess.DEVNULL)
+    watch = threading.Timer(PATIENCE + path.stat().st_size / 4e6, process.kill)
+    watch.start()
     try:
-        with h5py.File(path, "r") as file:
-            file.visititems(visit)
-    except (OSError, RuntimeError, KeyError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read as HDF5; the file is damaged or of another format") from error
+        assert process.stdout is not None
+        found = pickle.load(process.stdout)
+    except (EOFError, pickle.UnpicklingError):
+        found = None  # it crashed, or was ended
+    finally:
+        watch.cancel()
+        process.kill()
+        process.communicate()
+    if isinstance(found, str):
+        raise InputError(f"{path}: {found}")
+    if not isinstance(found, dict):
+        raise InputError(f"{path}: cannot be read as HDF5; the file is damaged or of another format")
     return found
-
-
-def _text(value: object) -> str:
-    return value.decode() if isinstance(value, bytes) else value if isinstance(value, str) else ""

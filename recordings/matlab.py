@@ -3,6 +3,7 @@
 Variables are columns or single numbers, fields of a struct are ``"struct/field"``.
 """
 
+import io
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,7 +13,8 @@ import scipy.io
 from scipy.io.matlab import mat_struct
 
 from ..errors import InputError
-from .columns import Columns, sorted_by_kind
+from ..files import content
+from .columns import LARGEST, Columns, sorted_by_kind
 from .hdf5 import datasets
 from .matlab_structure import check_structure
 
@@ -22,18 +24,22 @@ def read(path: Path) -> Columns:
     if h5py.is_hdf5(path):
         return sorted_by_kind(path, datasets(path, matlab=True))
     try:
-        check_structure(path.read_bytes())
-        content = scipy.io.loadmat(path, squeeze_me=True, struct_as_record=False)
+        data = content(path, LARGEST)
+        check_structure(path, data)
+        found = scipy.io.loadmat(io.BytesIO(data), squeeze_me=True, struct_as_record=False)
+    except (InputError, MemoryError):
+        raise
     except Exception as error:  # a damaged file makes SciPy raise anything from TypeError to zlib.error
         raise InputError(f"{path}: cannot be read as a MATLAB file; it is damaged or of another format") from error
-    variables = {name: value for name, value in content.items() if isinstance(name, str) and not name.startswith("__")}
+    variables = {name: value for name, value in found.items() if isinstance(name, str) and not name.startswith("__")}
     return sorted_by_kind(path, dict(_flat(variables)))
 
 
 def _flat(variables: dict[str, object], prefix: str = "") -> Iterator[tuple[str, object]]:
     for name, value in variables.items():
         if isinstance(value, mat_struct):
-            yield from _flat({field: getattr(value, field) for field in vars(value)["_fieldnames"]}, f"{prefix}{name}/")
+            inside = {field: inner for field, inner in vars(value).items() if field != "_fieldnames"}  # SciPy's own
+            yield from _flat(inside, f"{prefix}{name}/")
         elif isinstance(value, (np.ndarray, np.generic, int, float)):
             yield f"{prefix}{name}", value
         else:

@@ -1,13 +1,17 @@
 """Whether the elements of a MATLAB 5 file fit into one another.
 
-SciPy trusts an element's type and size: a few damaged bytes in an uncompressed file crash the interpreter (seen with
-SciPy 1.17). Compressed variables carry a checksum of their own and need no check.
+SciPy trusts an element's type and size: a few wrong bytes in a file crash the interpreter (seen with SciPy 1.17).
+Compressed variables are unpacked to be checked, one at a time and no further than a recording may go.
 
 Layout: The MathWorks, "MAT-File Format", the part on level 5 files.
 """
 
 import math
 import struct
+import zlib
+from pathlib import Path
+
+from .columns import LARGEST, check_size
 
 _BYTES = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8, 14: 1, 15: 1, 16: 1, 17: 2, 18: 4}
 _NUMBERS = (1, 2, 3, 4, 5, 6, 7, 9, 12, 13)
@@ -20,14 +24,23 @@ _NUMERIC = range(6, 16)
 _Element = tuple[int, bytes]
 
 
-def check_structure(data: bytes) -> None:
-    """Raise ValueError where an element of a version 5 file cannot be what it says it is; other versions pass."""
+def check_structure(path: Path, data: bytes) -> None:
+    """Raise ValueError where an element of a version 5 file cannot be what it says it is; other versions pass.
+
+    Raises InputError where its variables unpack to more than is read of a recording.
+    """
     order = {b"IM": "<", b"MI": ">"}.get(data[126:128])
     if order is not None and data[:4].strip(b"\0"):
+        size = 0
         for kind, content in _elements(data[128:], order):
             _require(kind in (_MATRIX, _COMPRESSED))
-            if kind == _MATRIX:
-                _check_matrix(content, order)
+            if kind == _COMPRESSED:
+                unpacked = zlib.decompressobj().decompress(content, LARGEST + 1 - size)
+                size += len(unpacked)
+                check_size(path, size)
+                ((kind, content),) = _elements(unpacked, order)
+                _require(kind == _MATRIX)
+            _check_matrix(content, order)
 
 
 def _elements(data: bytes, order: str) -> list[_Element]:

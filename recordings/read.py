@@ -9,8 +9,9 @@ import pint
 import xarray as xr
 
 from ..errors import InputError
+from ..files import bounded_memory
 from . import csv_table, hdf5, matlab, parquet, ros_bag
-from .columns import Columns, nearest, split_header
+from .columns import Columns, check_count, nearest, split_header
 from .signals import FORMS, JointKind, Signal, default_unit, is_signal, joint_of
 from .timebase import UNIFORM, sampling
 from .units import convert, fits, parse_unit
@@ -63,6 +64,7 @@ def read_recording(
         if not is_signal(name):
             raise InputError(f"{path}: {name!r} in [signals] is not a signal's name; allowed are {FORMS}")
     columns = _load(path, signals)
+    check_count(path, len(columns.names))
     headers = _signal_headers(columns, signals)
     time_header, time = _time(columns, signals, headers)
     raw = {name: columns.column(header, name, len(time)) for name, header in headers.items() if name != "time"}
@@ -93,8 +95,11 @@ def _load(path: Path, signals: Mapping[str, Signal]) -> Columns:
     if not path.exists():
         raise InputError(f"{path}: there is no such file; check the path")
     suffix = path.suffix.lower()
+    if not (path.is_dir() or path.is_file()):
+        raise InputError(f"{path}: is no plain file; give a file, or the folder of a ROS 2 bag")
     if path.is_dir() or suffix in _BAGS:
-        return ros_bag.read(path, {name: signal.column for name, signal in signals.items()})
+        with bounded_memory(path):
+            return ros_bag.read(path, {name: signal.column for name, signal in signals.items()})
     if suffix not in _READERS:
         raise InputError(
             f"{path}: suffix {suffix!r} is not one of a recording; known are {' '.join([*_READERS, *_BAGS])} "
@@ -103,7 +108,8 @@ def _load(path: Path, signals: Mapping[str, Signal]) -> Columns:
     if path.stat().st_size == 0:
         raise InputError(f"{path}: the file is empty; record it again")
     try:
-        return _READERS[suffix](path)
+        with bounded_memory(path):
+            return _READERS[suffix](path)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error}); check the file's permissions") from error
 
@@ -123,11 +129,11 @@ def _signal_headers(columns: Columns, signals: Mapping[str, Signal]) -> dict[str
 
 def _left_out(columns: Columns, used: Mapping[str, str], gains: set[str]) -> list[str]:
     """Notes on the columns that no signal came from; ``used`` maps signal to header."""
-    notes, unknown = [], []
+    notes, unknown, taken = [], [], set(used.values())
     for header in [*columns.arrays, *columns.problems]:
         bare = split_header(header)[0]
         name = bare.replace("/", ".")
-        if header in used.values() or {header, bare} & gains:
+        if header in taken or {header, bare} & gains:
             continue
         if name in used:
             notes.append(f"column {header!r} is ignored; {name} is taken from {used[name]!r}")
@@ -217,7 +223,8 @@ def _check_numbers(columns: Columns, header: str, values: np.ndarray) -> None:
 def _quality(dataset: xr.Dataset) -> list[str]:
     """Notes on missing samples, gaps and uneven sampling."""
     size = dataset.sizes["time"]
-    counts = {name: int(np.isnan(values.to_numpy()).sum()) for name, values in dataset.data_vars.items()}
+    # by `variables`: to make an array of its own of one, xarray looks at all the others
+    counts = {name: int(np.isnan(dataset.variables[name].to_numpy()).sum()) for name in dataset.data_vars}
     notes = [f"{name}: {count} of {size} samples are missing" for name, count in counts.items() if count]
     rate = sampling(dataset)
     notes += [

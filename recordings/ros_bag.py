@@ -19,10 +19,11 @@ from typing import Any
 
 import numpy as np
 from rosbags.highlevel import AnyReader
-from rosbags.interfaces import Connection
+from rosbags.interfaces import Connection, Nodetype
 from rosbags.typesys import Stores, get_typestore
 
 from ..errors import InputError
+from ..files import content
 from .columns import Columns, nearest
 
 _JOINT_STATE = "sensor_msgs/msg/JointState"
@@ -52,17 +53,39 @@ class _Stream:
         return np.array(self.header_stamps if any(self.header_stamps) else self.bag_stamps, dtype=np.int64)
 
 
+_LARGEST_ARRAY = 1_000_000
+
+
+def _check_folder(path: Path) -> None:
+    """Refuse a bag's description that a parser would never get done with."""
+    description = path / "metadata.yaml"
+    # rosbag2 writes no aliases, of which a few lines can stand for gigabytes
+    if path.is_dir() and description.exists() and re.search(rb"(?:^|[\s\[{,])[&*]\w", content(description)):
+        raise InputError(f"{description}: has YAML aliases, which no bag needs; write them out")
+
+
+def _check_definitions(path: Path, reader: AnyReader) -> None:
+    """Refuse arrays so long that the code that rosbags writes to read them, line by line, would not fit in memory."""
+    for name, (_, fields) in reader.typestore.fielddefs.items():
+        for field_name, description in fields:
+            kind, inside = description
+            if kind == Nodetype.ARRAY and int(inside[1]) > _LARGEST_ARRAY:
+                raise InputError(f"{path}: {name} has {inside[1]} of {field_name}; {_LARGEST_ARRAY} is the most")
+
+
 def read(path: Path, wanted: Mapping[str, str]) -> Columns:
     """Read the joint states of a bag, and the columns that [signals] ``wanted`` (signal name to column) asks for.
 
     Raises InputError for a bag that cannot be read, a topic or field that is not there, and a bag with nothing to read.
     """
+    _check_folder(path)
     try:
         with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+            _check_definitions(path, reader)
             topics = {connection.topic for connection in reader.connections}
             fields = {column: _topic_and_field(path, column, topics) for column in wanted.values() if column[:1] == "/"}
             streams = _streams(path, reader, fields)
-    except InputError:
+    except (InputError, MemoryError):
         raise
     except Exception as error:  # rosbags raises sqlite3, struct, type system and file errors as they come
         reason = " ".join(str(error).split())[:100]

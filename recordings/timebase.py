@@ -46,7 +46,7 @@ def sampling(dataset: xr.Dataset) -> Sampling:
     period = float(np.median(steps))
     regular = steps <= GAP * period
     names = joint_signals(map(str, dataset.data_vars)) or list(dataset.data_vars)
-    missing = np.all([np.isnan(dataset[name].to_numpy()) for name in names], axis=0)
+    missing = np.all([np.isnan(dataset.variables[name].to_numpy()) for name in names], axis=0)
     jitter = float(np.max(np.abs(steps[regular] - period), initial=0.0) / period)
     ends = np.unique(np.concatenate([[0], np.flatnonzero(~missing), [len(time) - 1]]))
     wide = (np.diff(time[ends]) > GAP * period) | (np.diff(ends) > 1) | missing[ends[:-1]] | missing[ends[1:]]

@@ -1,5 +1,6 @@
 """Units, through pint."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +15,29 @@ UNITS.define("newton_meter = newton * meter = Nm")
 _DIMENSIONLESS = {"-": "", "–": "", "1": ""}
 
 
+_POWER = re.compile(r"(?:\*\*|\^)\s*[-+]?\d{1,2}(?:\.\d{1,6})?(?![\d.])(?!\s*(?:\*\*|\^))")
+_FACTOR = re.compile(r"\s*-?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?")
+
+
+def check_unit(text: str) -> None:
+    """Raise ValueError for a unit that pint could take forever to work out.
+
+    pint computes with the numbers in a unit, whatever their powers: ``9**9**9**9`` has 10^369693100 digits. Allowed are
+    a factor in front, exponents of two digits on units, and ``1/``.
+    """
+    factor = _FACTOR.match(text)
+    rest = text[factor.end() :] if factor else text
+    bare = _POWER.sub(" ", rest)
+    raised = (factor and rest.lstrip().startswith(("**", "^"))) or re.search(r"\d\s*[⁰¹²³⁴-⁹]", text)
+    numbers = set(re.findall(r"(?<![\w.])[\d.]+", bare)) - {"1"}
+    if len(text) > 100 or raised or numbers or "**" in bare or "^" in bare:
+        raise ValueError(f"unit {text!r} has numbers that a unit has no use for")
+
+
 def parse_unit(text: str, column: str, path: Path) -> pint.Unit:
     """The unit that ``text`` writes; InputError naming the column when pint does not know it."""
     try:
+        check_unit(text)
         return UNITS.Unit(_DIMENSIONLESS.get(text, text))
     except Exception as error:  # pint raises half a dozen kinds, AssertionError among them
         raise InputError(

@@ -1,6 +1,5 @@
 """Writing a recording."""
 
-import os
 from pathlib import Path
 
 import pyarrow as pa
@@ -8,6 +7,7 @@ import pyarrow.parquet as pq
 import xarray as xr
 
 from ..errors import InputError
+from ..files import written_whole
 
 
 def write_recording(dataset: xr.Dataset, path: str | Path) -> None:
@@ -19,14 +19,8 @@ def write_recording(dataset: xr.Dataset, path: str | Path) -> None:
     if path.suffix.lower() not in (".csv", ".parquet"):
         raise InputError(f"{path}: a recording is written as .csv or .parquet, not {path.suffix!r}; change the suffix")
     table = dataset.to_dataframe().reset_index()
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
+    with written_whole(path) as part:
         if path.suffix.lower() == ".csv":
-            table.to_csv(partial, index=False, lineterminator="\n")
+            table.to_csv(part, index=False, lineterminator="\n")
         else:
-            pq.write_table(pa.Table.from_pandas(table, preserve_index=False), partial)
-        os.replace(partial, path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror or error}); choose another folder") from error
-    finally:
-        partial.unlink(missing_ok=True)
+            pq.write_table(pa.Table.from_pandas(table, preserve_index=False), part)

@@ -25,6 +25,7 @@ from ..recordings.find import SHA256
 from .bam_figures import explained, positions
 from .bam_naming import START, Fitted, Round, Tried, Values, fit, name_missing, rms
 from .bam_servo import DUTY, MOTOR, ServoRun, position_error, read_run
+from .command import status_of
 from .outcome import FOLDER, Quantity, table, write_result
 from .page import Picture, Section, write_page
 
@@ -237,4 +238,4 @@ def save(values: Values, note: str) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(status_of(main))

@@ -31,6 +31,7 @@ from ..models.floating.plant import FloatingPlant, Run
 from ..models.inertia import Array, to_central
 from ..report.drawing import AFTER, BEFORE, MEASURED, drawing, line, margins, svg
 from ..report.playback import Playback
+from .command import status_of
 from .outcome import Quantity, table, write_result
 from .page import Picture, Section, write_page
 
@@ -267,4 +268,4 @@ def _playback(arm: FloatingArm, run: Run) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(status_of(main))

@@ -18,6 +18,7 @@ from ..models.snare.model import SnareModel
 from ..models.snare.parameters import WIDE_RING, SnareParameters
 from ..models.snare.target import Target
 from ..report.snare_scene import snare_scene
+from .command import status_of
 from .ground_capture_figures import sections
 from .outcome import Quantity, table, write_result
 from .page import write_page
@@ -172,4 +173,4 @@ def _say(text: str) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(status_of(main))

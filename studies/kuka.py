@@ -28,6 +28,7 @@ from ..models.model_file import load_model
 from ..models.model_write import save_model
 from ..models.rigid_body import RigidBody
 from ..recordings import find_recording
+from .command import status_of
 from .kuka_figures import MDEG, differences, left_over, pattern, rms, without
 from .outcome import FOLDER, Quantity, table, write_result
 from .page import Picture, Section, write_page
@@ -180,4 +181,4 @@ def springs_of_measured_torque(
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(status_of(main))

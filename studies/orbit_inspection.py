@@ -2,6 +2,7 @@
 
 import sys
 
+from .command import status_of
 from .orbit.capture import study
 
 
@@ -11,4 +12,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(status_of(main))

@@ -6,6 +6,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from ..files import written_whole
+
 FOLDER = Path("build/studies")
 
 
@@ -46,9 +48,9 @@ def write_result(
         "quantities": [asdict(q) for q in quantities],
         **(extra or {}),
     }
-    path, part = folder / "result.json", folder / "result.json.part"
-    part.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-    part.replace(path)
+    path = folder / "result.json"
+    with written_whole(path) as part:
+        part.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     return path
 
 

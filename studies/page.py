@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 
+from ..files import written_whole
 from ..report.html import figure, page, paragraph, table
 from .outcome import FOLDER, Quantity
 
@@ -91,9 +92,9 @@ def write_page(
     document = page(title, header, parts, f"Written by snarelab: make study-{study}.")
     folder = FOLDER / study
     folder.mkdir(parents=True, exist_ok=True)
-    path, partial = folder / "report.html", folder / "report.html.part"
-    partial.write_text(document, encoding="utf-8")
-    partial.replace(path)
+    path = folder / "report.html"
+    with written_whole(path) as part:
+        part.write_text(document, encoding="utf-8")
     return path
 
 

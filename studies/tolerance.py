@@ -17,6 +17,7 @@ from ..tolerance.report import summarise
 from ..tolerance.results import Results
 from ..tolerance.run import run_study
 from ..tolerance.study import Study, load_study
+from .command import status_of
 from .outcome import FOLDER, Quantity, table, write_result
 
 STUDIES = ("ground", "inspection")
@@ -94,4 +95,4 @@ def _page(sentences: str, quantities: list[Quantity], found: list[tuple[dict[str
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(status_of(main))

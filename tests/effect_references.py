@@ -9,6 +9,8 @@ from scipy.integrate import solve_ivp
 from scipy.signal import lsim
 from scipy.spatial.transform import Rotation
 
+from snarelab.models.snare import law as contact_law
+
 
 @dataclass(frozen=True)
 class Reference:
@@ -212,6 +214,43 @@ def extra_bodies(s, *change):
     return s["phi"] + inertial_parameters(*clouds)
 
 
+def at_contact(s, stiffness, damping, friction):
+    """Force on the cable by the snare's own compiled law, at overlaps along z and without a cable's give."""
+    law = np.array([stiffness, damping, friction, s["slip_velocity"][0], 0.0, 0.0])
+    up = (0.0, 0.0, 1.0)
+    sink = zip(s["overlap"], s["approach"], s["slip"], strict=True)
+    return np.array([contact_law.force(law, -x, 0.0, up, (v[0], v[1], -rate)) for x, rate, v in sink])
+
+
+def engine_friction(s, coefficient):
+    """On the pin, of a contact whose slip lies across z; the normal force is the signals' own, as 2 x^1.5 is."""
+    flat = {**s, "approach": 0.0 * s["approach"]}
+    across = s["slip"] * [1.0, 1.0, 0.0]
+    ours = at_contact(flat, 2.0, 0.0, 0.0) - at_contact(flat, 2.0, 0.0, coefficient)
+    small, whole = np.hypot(*across.T[:2]), np.linalg.norm(s["slip"], axis=1)
+    # The signals slip along z, too: turn the whole into the plane and back.
+    size = np.hypot(ours[:, 0], ours[:, 1]) * np.hypot(small, 2e-4) / small * whole / np.hypot(whole, 2e-4)
+    return s["slip"] / whole[:, None] * size[:, None]
+
+
+def engine_damping(s, coefficient):
+    slow = {**s, "approach": 1e-3 * s["approach"]}  # where the whole force stays above zero
+    return 1e3 * (at_contact(slow, 2.0, coefficient, 0.0) - at_contact(slow, 2.0, 0.0, 0.0))[:, 2]
+
+
+def engine_stiffness(s, stiffness):
+    return at_contact({**s, "approach": 0.0 * s["approach"]}, stiffness, 0.0, 0.0)[:, 2]
+
+
+def bending(s):
+    """Moment of a rope whose curvature swings: its rate is the signal."""
+    return s["bending_stiffness"] * np.cumsum(s["curvature_rate"]) * DT
+
+
+def three_springs(s, stiffness):
+    return np.stack([np.interp(x, [-9, 9], [9 * stiffness, -9 * stiffness]) for x in s["displacement"].T], axis=1)
+
+
 EXTRA = (np.array([0.8, -0.3, 0.5]), np.array([[0.3, -0.9, 1.1], [0.7, 0.4, -0.6], [-1.0, 0.8, 0.5]]))
 TEN = ("mass", *(f"moment_{a}" for a in "xyz"), *(f"inertia_{ab}" for ab in ("xx", "xy", "xz", "yy", "yz", "zz")))
 MAKKAR = {"stribeck_level": 2.0, "stribeck_speed": 0.03, "stribeck_ratio": 12.0, "coulomb_level": 4.0}
@@ -257,6 +296,14 @@ REFERENCES = {
         tolerance=0.05,
         likeness=2e-2,  # the law brings a wheel to rest over 0.1 s
     ),
+    "contact_friction": Reference({"coefficient": 0.2}, engine_friction),
+    "contact_damping": Reference({"coefficient": 0.3}, engine_damping),
+    "contact_stiffness": Reference({"stiffness": 3.0}, engine_stiffness),
+    "cable_damping": Reference(
+        {"time": 0.02}, lambda s, t: np.gradient(bending(s), DT, edge_order=2) * t, likeness=1e-2
+    ),
+    "cable_pretension": Reference({"tension": 40.0}, lambda s, tension: np.full(TIME.size, tension)),
+    "umbilical_stiffness": Reference({"stiffness": 80.0}, three_springs),
     "sensor_bias": Reference({"offset": 0.3}, lambda s, offset: np.polyval([1.0, offset], s["value"])),
     "sensor_drift": Reference({"rate": 0.05}, lambda s, rate: np.interp(TIME, [0, 9], [0, 9 * rate]) + s["value"]),
     "sensor_gain": Reference({"error": -0.07}, lambda s, error: np.polyval([1 + error, 0.0], s["value"])),

@@ -48,7 +48,17 @@ def signals():
     links |= slings | {"spread": np.stack([4 + 3 * q**2, 20 + qd**2], axis=1)}
     links |= {"spin_rate": shaken(TIME)[0], "acceleration": shaken(TIME)[1]}
     links |= {"spin": spin(TIME), "spin_gained": spin(TIME), "impulse": told(TIME)[0]}
-    return scalars | links | {"points": points, "masses": masses}
+    return scalars | links | contacts() | {"points": points, "masses": masses}
+
+
+def contacts():
+    """A cable on a pin, the cables' bending, and a target's motion: what laws of a capture read."""
+    overlap, approach, _ = wave(TIME, (0.4, 0.3, 0.2))
+    elastic = 2.0 * np.abs(overlap + 0.5) ** 1.5
+    found = {"overlap": np.abs(overlap + 0.5), "approach": approach, "elastic_force": elastic, "normal_force": elastic}
+    found |= {"slip": hang_point(TIME)[1], "slip_velocity": np.full(TIME.size, 2e-4)}
+    found |= {"bending_stiffness": np.full(TIME.size, 0.25), "curvature_rate": wave(TIME, (3.0, 0.9, 0.1))[1]}
+    return found | {"displacement": hang_point(TIME)[0]}
 
 
 def shaken(time):

@@ -328,7 +328,10 @@ def test_interrupted_it_writes_nothing(folder, capfd, monkeypatch, command):
     monkeypatch.setattr(f"snarelab.identification.{command}.{command}", stop)
     before = sorted(folder.iterdir())
     assert main(arguments(command)) == 130
-    assert capfd.readouterr() == ("", "snarelab: interrupted; nothing was written\n")
+    assert capfd.readouterr() == (
+        "",
+        "snarelab: interrupted; files that are there are whole; run the same command again\n",
+    )
     assert sorted(folder.iterdir()) == before
 
 

@@ -91,7 +91,7 @@ def test_toml_becomes_a_run(folder):
         ('flow = "left.v"', 'flow = "left.x"', "is not a power"),
         ("[bonds]", "[[bonds]]", "bonds: "),
         ("parameters = { mass = 2 }", "parameters = { mas = 2 }", "nearest parameter is 'left.mass'"),
-        ("[connections]", "[connections", "no TOML that can be read"),
+        ("[connections]", "[connections", "not a TOML file"),
         ('scheme = "gauss_seidel"', 'scheme = "both"', "choose jacobi or gauss_seidel"),
     ],
 )

@@ -83,7 +83,7 @@ def test_broken_toml(folder, text, word):
 def test_bytes_that_are_no_text(folder):
     path = folder / "model.toml"
     path.write_bytes(b"name = \xff\xfe\n")
-    refused(path, "not a TOML file")
+    refused(path, "is not UTF-8 text")
 
 
 def test_missing_urdf_file(folder):
@@ -162,7 +162,7 @@ def test_a_mistake_is_named(folder, line, words):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ('system = "snare_capture"\nurdf = "arm.urdf"\n', ("'snare_capture'", "allowed: arm, zero_g_rig")),
+        ('system = "snare_capture"\nurdf = "arm.urdf"\n', ("'snare_capture'", "has no urdf")),
         ('system = "arm"\n', ("key 'urdf' is missing",)),
         ("urdf = 3\n", ("urdf = 3", "text in quotes")),
         ('name = 3\nurdf = "arm.urdf"\n', ("name = 3", "text in quotes")),

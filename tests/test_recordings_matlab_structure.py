@@ -2,6 +2,7 @@
 
 import io
 import itertools
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -33,7 +34,7 @@ def test_sound_files_pass(compressed):
         "nested": {"inner": {"value": 1.0}},
         "sparse": scipy.sparse.eye_array(4, format="csc"),
     }
-    check_structure(bytes(saved(content, compressed)))
+    check_structure(Path("x.mat"), bytes(saved(content, compressed)))
 
 
 # Offsets into the first array, at byte 128: class at 16, dimensions at 32, name "time" in one word, data at 48.
@@ -72,4 +73,4 @@ def test_damage_inside_a_struct_is_refused():
         damaged = data.copy()
         damaged[field + offset] = value
         with pytest.raises(ValueError, match="does not fit"):
-            check_structure(bytes(damaged))
+            check_structure(Path("x.mat"), bytes(damaged))

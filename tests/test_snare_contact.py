@@ -13,6 +13,7 @@ from snarelab.models.snare.cubic import combine, first_weights, weights
 from snarelab.models.snare.ends import REACTION
 from snarelab.models.snare.forces import system_forces, system_jacobian
 from snarelab.models.snare.law import force, give, hertz_overlap, law_constants, powers
+from snarelab.models.snare.line import LINE_SIZE
 from snarelab.models.snare.parameters import SnareParameters
 from snarelab.models.snare.pin import distance, pin_cylinders, surface
 from snarelab.models.snare.settled import settled
@@ -63,7 +64,8 @@ def touching_state(n_pin, overlap=1.0e-4, turn=(0.0, 0.3, 0.2), seed=0):
     pin[1:3] = rng.normal(size=(2, 3)) * 0.05
     fittings = rng.normal(size=(8, 3))
     fittings /= np.linalg.norm(fittings, axis=1, keepdims=True)
-    fixed = (reference, N, SIZE, n_pin, pin_cylinders(P), law_constants(P), P.cable_radius, 0.1, 0.0)
+    no_line = np.zeros(LINE_SIZE)
+    fixed = (reference, N, SIZE, n_pin, pin_cylinders(P), law_constants(P), P.cable_radius, 0.1, 0.0, no_line)
     moving = (pin, euler, np.zeros((24, 4)), np.zeros((12, 5)), fittings)
     return np.zeros_like(reference), rng.normal(size=reference.shape) * 0.05, fixed, moving
 
@@ -124,7 +126,7 @@ def test_jacobian_of_crossing_cables():
 def test_contact_balances_force_and_moment():
     """On cables (as forces on r and couples through r'), pin and bearings together: nothing is left over."""
     q, v, fixed, moving = touching_state(7)
-    fixed = (*fixed[:-2], 0.0, 2e-3)
+    fixed = (*fixed[:-3], 0.0, 2e-3, np.zeros(LINE_SIZE))
     forces = system_forces(q, v, fixed, moving)
     on_nodes, on_pin = forces[:198].reshape(-1, 3), forces[198:]
     coordinates = fixed[0][:198].reshape(-1, 3)

@@ -72,7 +72,7 @@ def test_damping_balances_force_and_moment_and_is_what_energy_counts():
     forces = damping(positions, velocities)
     assert np.abs(forces[0::2].sum(axis=0)).max() < 1e-12 * np.abs(forces).sum()
     assert np.abs(np.cross(positions, forces).sum(axis=0)).max() < 1e-12 * np.abs(forces).sum()
-    section = np.array([P.mass_per_length, P.axial_stiffness, P.bending_stiffness, 0.0, P.bending_damping])
+    section = np.array([P.mass_per_length, P.axial_stiffness, P.bending_stiffness, 0.0, P.bending_damping, 0.0])
     none = np.zeros((0, 5))
     lost = cable_energies(
         positions, velocities, N, SIZE, section, np.zeros((2, 3)), np.zeros((6, 3)), np.zeros(6), none, 0, none, 0

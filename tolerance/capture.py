@@ -116,7 +116,7 @@ def find_capture(name: str) -> Capture:
         raise InputError(f"capture = {name!r}; allowed are {', '.join(BUILT_IN)}, or your own as 'package.module:NAME'")
     try:
         found = getattr(importlib.import_module(module), attribute)
-    except (ImportError, AttributeError) as error:
+    except Exception as error:  # the module is the user's own and may raise anything
         raise InputError(f"capture = {name!r} cannot be loaded: {error}; put its folder on PYTHONPATH") from None
     if not isinstance(found, Capture):
         raise InputError(

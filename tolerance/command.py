@@ -20,6 +20,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 def run(given: argparse.Namespace) -> None:
     """Run it; raises InputError for unusable input."""
+    from ..progress import Progress
     from .report import summarise
     from .results import Results
     from .run import run_study
@@ -27,21 +28,14 @@ def run(given: argparse.Namespace) -> None:
 
     study = load_study(given.study)
     results = Results(given.out, study)
-    shown = sys.stderr.isatty()
-
-    def say(text: str) -> None:
-        if shown:
-            print(f"\r\x1b[2K{text[:100]}", end="", file=sys.stderr, flush=True)
-
     try:
-        run_study(study, results, jobs=given.jobs, scheduler=given.scheduler, say=say)
+        with Progress() as progress:
+            run_study(study, results, jobs=given.jobs, scheduler=given.scheduler, say=progress)
+            progress("summing up")
+            content = summarise(study, results)
     except KeyboardInterrupt:
-        print(f"\nsnarelab: interrupted; {len(results)} cases are kept, the same command goes on", file=sys.stderr)
+        print(f"snarelab: interrupted; {len(results)} cases are kept, the same command goes on", file=sys.stderr)
         sys.exit(130)
-    say("summing up")
-    content = summarise(study, results)
-    if shown:
-        print("\r\x1b[2K", end="", file=sys.stderr)
     print(f"{content['sentence']}\nReport: {results.folder / 'report.html'}")
 
 

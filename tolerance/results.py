@@ -6,7 +6,6 @@ moment leaves whole files only, and a row that stands twice is the same row.
 """
 
 import json
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from pathlib import Path
@@ -15,9 +14,11 @@ from typing import Any
 import pandas as pd
 
 from ..errors import InputError
+from ..files import bounded_memory, json_value, written_whole
 from .capture import Outcome
 from .study import Study
 
+_SAFE = "finished cases are safe; make room and run again"
 _OUTCOME = tuple(f.name for f in fields(Outcome))
 
 
@@ -43,14 +44,17 @@ class Results:
         identity = self.folder / "study.json"
         if identity.exists():
             _same(identity, study)
-        elif self.folder.exists() and (not self.folder.is_dir() or any(self.folder.iterdir())):
+        elif self.folder.exists() and not (self.folder.is_dir() and all(_scrap(p) for p in self.folder.iterdir())):
             raise InputError(f"{self.folder}: is there and holds no tolerance results; name a new folder")
-        with _writing(self.folder):
-            self._cases.mkdir(parents=True, exist_ok=True)
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
             if not identity.exists():
-                _whole(identity, json.dumps(study.identity(), indent=1) + "\n")
-            for scrap in self._cases.glob("*.part"):
+                self.write(identity.name, json.dumps(study.identity(), indent=1) + "\n")
+            self._cases.mkdir(exist_ok=True)
+            for scrap in filter(_scrap, self._cases.iterdir()):
                 scrap.unlink()
+        except OSError as error:
+            raise InputError(f"{self.folder}: cannot be written: {error.strerror}; {_SAFE}") from None
         self._rows = self._read()
 
     def __len__(self) -> int:
@@ -80,14 +84,13 @@ class Results:
     def table(self, stage: str | None = None) -> pd.DataFrame:
         """Every recorded case in order, of one stage or of all."""
         rows = [self._rows[key] for key in sorted(self._rows) if stage in (None, key[0])]
-        columns = ["stage", "case", *(a.name for a in self.study.capture.axes), *_OUTCOME, "margin"]
-        return pd.DataFrame(rows, columns=pd.Index(columns))
+        return pd.DataFrame(rows, columns=pd.Index(self._columns))
 
     def write(self, name: str, content: Any) -> Path:
         """Write a summary beside the cases: text, or a JSON object; returns its path."""
         text = content if isinstance(content, str) else json.dumps(content, indent=1, allow_nan=False) + "\n"
-        with _writing(self.folder):
-            _whole(self.folder / name, text)
+        with written_whole(self.folder / name, _SAFE) as part:
+            part.write_text(text, encoding="utf-8")
         return self.folder / name
 
     def write_table(self) -> Path:
@@ -100,62 +103,39 @@ class Results:
         return {"stage": stage, "case": number, **values, **asdict(outcome), "margin": margin}
 
     def _write(self, rows: Sequence[Mapping[str, Any]], path: Path) -> None:
-        part = path.with_name(path.name + ".part")
-        with _writing(self.folder):
-            try:
-                pd.DataFrame(rows).to_parquet(part, index=False)
-                with part.open("rb") as file:
-                    os.fsync(file.fileno())
-                part.replace(path)
-            finally:
-                part.unlink(missing_ok=True)
+        with written_whole(path, _SAFE) as part:
+            pd.DataFrame(rows).to_parquet(part, index=False)
 
     def _read(self) -> dict[tuple[str, int], dict[str, Any]]:
         rows = {}
         for path in sorted(self._cases.glob("*.parquet")):
             try:
-                frame = pd.read_parquet(path)
-            except (OSError, ValueError) as error:
-                raise InputError(f"{path}: damaged ({error}); delete it, and its cases are run again") from None
-            for row in frame.to_dict("records"):
-                rows[str(row["stage"]), int(row["case"])] = row
+                with bounded_memory(path):
+                    for row in pd.read_parquet(path).to_dict("records"):
+                        rows[str(row["stage"]), int(row["case"])] = {name: row[name] for name in self._columns}
+            except (InputError, MemoryError):
+                raise
+            except Exception as error:  # a damaged file makes pyarrow raise anything
+                reason = " ".join(f"{type(error).__name__}: {error}".split())[:100]
+                raise InputError(f"{path}: damaged ({reason}); delete it, and its cases are run again") from None
         return rows
+
+    @property
+    def _columns(self) -> list[str]:
+        return ["stage", "case", *(a.name for a in self.study.capture.axes), *_OUTCOME, "margin"]
+
+
+def _scrap(path: Path) -> bool:
+    """What a process left that was killed while it wrote."""
+    return path.name.endswith(".part")
 
 
 def _same(identity: Path, study: Study) -> None:
-    try:
-        found = json.loads(identity.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError(f"{identity}: cannot be read ({error}); name a new folder") from None
+    found = json_value(identity)
     for key, value in study.identity().items():
         if not isinstance(found, dict) or found.get(key) != value:
             was = found.get(key) if isinstance(found, dict) else found
             raise InputError(
-                f"{identity.parent}: holds results of another study ({key} was {was}, is {value}); name a new folder"
+                f"{identity.parent}: holds results of another study ({key} was {str(was)[:80]}, is {value}); "
+                "name a new folder"
             )
-
-
-def _whole(path: Path, text: str) -> None:
-    part = path.with_name(path.name + ".part")
-    try:
-        part.write_text(text, encoding="utf-8")
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
-
-
-class _writing:
-    """Turns a full disk and its like into one line that says that nothing is lost."""
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-
-    def __enter__(self) -> None:
-        pass
-
-    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        if isinstance(error, OSError):
-            why = error.strerror or str(error)
-            raise InputError(
-                f"{self._folder}: cannot be written: {why}; finished cases are safe; make room and run again"
-            ) from None

@@ -1,6 +1,8 @@
 """Run the cases of a study on Dask workers, record each as it ends, and choose the next ones from what is known."""
 
 import logging
+import signal
+import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -92,6 +94,7 @@ class _Runner:
     def stage(self, stage: str, points: np.ndarray, count: int, first: int = 0) -> None:
         """Run cases ``first`` to ``first + count`` of a stage; points of the varied axes, shape (count, n_ranges)."""
         study, results = self._study, self._results
+        most = study.cases + (study.box_cases if study.box else 0)
         for start in range(0, count, study.batch):
             numbers = range(first + start, first + min(start + study.batch, count))
             wanted = {n: study.values(points[n - first]) for n in numbers if not results.done(stage, n)}
@@ -99,7 +102,7 @@ class _Runner:
                 results.add(stage, number, wanted[number], outcome)
                 self._ran += 1
                 rate = self._ran / (time.monotonic() - self._begun)
-                self._say(f"{stage} case {number + 1}: {len(results)} recorded, {3600 * rate:.0f} an hour")
+                self._say(f"{len(results)} of at most {most} cases recorded, {3600 * rate:.0f} an hour")
             results.merge(stage, numbers)
 
     def _outcomes(self, wanted: Mapping[int, Mapping[str, float]]) -> Iterator[tuple[int, Outcome]]:
@@ -160,7 +163,21 @@ def local_cluster(jobs: int) -> Any:
     from dask.distributed import LocalCluster
 
     options: dict[str, Any] = {"dashboard_address": None, "scheduler_kwargs": {"dashboard_address": "127.0.0.1:0"}}
-    return LocalCluster(n_workers=jobs, threads_per_worker=1, silence_logs=logging.ERROR, **options)
+    with _ignored_interrupt():
+        return LocalCluster(n_workers=jobs, threads_per_worker=1, silence_logs=logging.ERROR, **options)
+
+
+@contextmanager
+def _ignored_interrupt() -> Iterator[None]:
+    """Processes that are started meanwhile never see Ctrl-C: this one ends them, and they say nothing."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 @contextmanager

@@ -1,7 +1,6 @@
 """The study file (TOML): what is varied over which ranges, what success means, and how cases are chosen."""
 
 import difflib
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..files import toml_table
 from .capture import Capture, Outcome, find_capture
 
 SAMPLINGS = ("adaptive", "sobol", "latin_hypercube")
@@ -120,14 +120,7 @@ class Study:
 def load_study(path: str | Path) -> Study:
     """Read a study file; raises InputError with what is wrong, the value, what is allowed and the mend."""
     path = Path(path)
-    try:
-        raw = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such study file") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: not a TOML file: {error}; mend that line") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); name a file that can") from None
+    raw = toml_table(path)
     _known(path, "", raw, _KEYS)
     try:
         capture = find_capture(_text(path, raw, "capture", ""))

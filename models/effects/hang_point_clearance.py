@@ -3,6 +3,9 @@
 The offset of the sling's line from the middle of the hole turns with the direction of the horizontal motion and stays
 when the motion stops; its moment with the weight carried is felt by joints with horizontal axes. Along a straight line
 the offset closes in on the trailing edge exponentially in the distance gone.
+
+On a snare's hanging target the play is at the top of its line, without friction: the line hangs upright, and pulls
+nowhere sideways, until it meets the rim (``models/snare/line.py``; Nordin and Gutman 2002).
 """
 
 import casadi as ca

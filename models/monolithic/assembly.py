@@ -19,6 +19,7 @@ from ..snare.drive import Pose, ring_ends, ring_motion
 from ..snare.ends import REACTION
 from ..snare.engine import exudyn, items
 from ..snare.forces import MOST_CONTACTS, MOST_CROSSINGS, system_forces, system_jacobian
+from ..snare.line import LINE_SIZE
 from ..snare.parameters import SnareParameters
 from ..snare.target import Target
 from .kinematics import TreeFrames
@@ -218,7 +219,7 @@ class MonolithicAssembly(Assembly):
         self.reference = reference
         self.fixed = (
             reference, self.n_elements, self.size, self.n_pin, self.cylinders, self.law, p.cable_radius,
-            p.end_stiffness, p.end_friction,
+            p.end_stiffness, p.end_friction, np.zeros(LINE_SIZE),
         )  # fmt: skip
         self.moving = (
             self.pin, self.euler, np.zeros((MOST_CONTACTS, 4)), np.zeros((MOST_CROSSINGS, 5)), np.zeros((8, 3)),

@@ -5,6 +5,7 @@ of stress (`strainIsRelativeToReference` = 0): Exudyn's other choice is not fram
 Nor is its damping in bending: `damping` takes its place.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any, cast
@@ -18,9 +19,12 @@ from .engine import exudyn, items
 from .forces import MOST_CONTACTS, MOST_CROSSINGS, system_forces, system_jacobian
 from .geometry import N_CABLES
 from .law import law_constants
+from .line import CLEARANCE, DOWN, FREE_LENGTH, LINE_SIZE, LOCAL, STIFFNESS, TAUT, TOP
 from .parameters import SnareParameters
 from .pin import pin_cylinders
 from .target import Target
+
+Drive = Callable[[float], tuple[float, float]]
 
 
 @dataclass
@@ -35,12 +39,15 @@ class Assembly:
         Cables at the start, in the world.
     effector : Pose
         The end effector's at the start.
+    drive : callable or None
+        Angle and rate of the ring at a time, in place of the parameters' ramp.
     """
 
     parameters: SnareParameters
     target: Target
     nodes: np.ndarray
     effector: Pose
+    drive: Drive | None = None
     container: Any = field(init=False)
     system: Any = field(init=False)
 
@@ -53,6 +60,7 @@ class Assembly:
         self.n_pin = 0 if self.target.support == "moved" else 7 if self.target.rotates else 3
         self.cylinders = pin_cylinders(p)
         self.law = law_constants(p)
+        self.line = np.zeros(LINE_SIZE)
         self.effector_path = np.zeros(PATH_SIZE)
         self.target_path = np.zeros(PATH_SIZE)
         self.pin = target_pose(self.target).frame()
@@ -104,10 +112,17 @@ class Assembly:
         )
         self.ground = ground
 
+    def ring_at(self, time: float) -> tuple[float, float]:
+        """Angle [rad] and rate [rad/s] of the ring at a time [s]."""
+        if self.drive is not None:
+            return self.drive(time)
+        p = self.parameters
+        return ring_motion(time, p.ring_rate, p.ring_travel, p.ring_ramp)
+
     def ends_at(self, time: float) -> np.ndarray:
         """Where the rings hold the cable ends at a time [s], shape (18,); leaves the speeds in `end_speeds`."""
         p = self.parameters
-        angle, rate = ring_motion(time, p.ring_rate, p.ring_travel, p.ring_ramp)
+        angle, rate = self.ring_at(time)
         frame_at(self.effector_path, time, self.frame)
         ring_ends(self.frame, p.ring_radius, p.ring_distance, p.ring_direction, angle, rate, self.ends, self.end_speeds)
         self._ring_rate = rate
@@ -130,7 +145,7 @@ class Assembly:
         p, fittings = self.parameters, self.moving[4]
         fittings[RING_SPIN] = self.frame[2]
         if p.end_stiffness > 0:
-            angle, _ = ring_motion(time, p.ring_rate, p.ring_travel, p.ring_ramp)
+            angle, _ = self.ring_at(time)
             turn = Rotation.from_euler("x", p.ring_direction * angle).as_matrix()
             fittings[0:6:2] = self._rest[:, 0] @ self.frame[3:].T
             fittings[1:6:2] = self._rest[:, 1] @ turn.T @ self.frame[3:].T
@@ -165,6 +180,18 @@ class Assembly:
         self.target_node = node
         if target.hangs:
             self._hang(body)
+        if target.umbilical > 0:
+            self._tether(body)
+
+    def _tether(self, body: int) -> None:
+        """An extra cable: a spring from the pin's foot to where it starts."""
+        foot = self.system.AddMarker(items.MarkerBodyPosition(bodyNumber=body))
+        start = self.system.AddMarker(
+            items.MarkerBodyPosition(bodyNumber=self.ground, localPosition=list(self.target.position))
+        )
+        self.system.AddObject(
+            items.CartesianSpringDamper(markerNumbers=[start, foot], stiffness=[self.target.umbilical] * 3)
+        )
 
     def _euler_rates(self) -> np.ndarray:
         a, b, c, d = self.target.orientation
@@ -184,7 +211,12 @@ class Assembly:
         foot = system.AddMarker(items.MarkerBodyPosition(bodyNumber=body, localPosition=local.tolist()))
         weight = system.AddMarker(items.MarkerBodyMass(bodyNumber=body))
         system.AddLoad(items.LoadMassProportional(markerNumber=weight, loadVector=gravity.tolist()))
-        if target.support == "pendulum":
+        if target.clearance > 0:
+            stiffness = TAUT if target.support == "pendulum" else target.stiffness
+            self.line[STIFFNESS], self.line[CLEARANCE] = stiffness, target.clearance
+            self.line[FREE_LENGTH] = target.line_length - target.mass * strength / stiffness
+            self.line[DOWN], self.line[TOP], self.line[LOCAL] = gravity / strength, above, local
+        elif target.support == "pendulum":
             system.AddObject(items.DistanceConstraint(markerNumbers=[top, foot], distance=target.line_length))
         else:
             system.AddObject(
@@ -217,7 +249,7 @@ class Assembly:
         self.reference = reference
         self.fixed = (
             reference, self.n_elements, self.size, self.n_pin, self.cylinders, self.law,
-            p.cable_radius, p.end_stiffness, p.end_friction,
+            p.cable_radius, p.end_stiffness, p.end_friction, self.line,
         )  # fmt: skip
         self.moving = (
             self.pin,
@@ -260,6 +292,7 @@ def add_cable(system: Any, nodes: np.ndarray, parameters: SnareParameters) -> li
                 bendingStiffness=p.bending_stiffness,
                 axialStiffness=p.axial_stiffness,
                 axialDamping=p.axial_damping * p.axial_stiffness,
+                referenceAxialStrain=-p.prestrain,
                 strainIsRelativeToReference=0.0,
                 nodeNumbers=[first, second],
                 useReducedOrderIntegration=2,

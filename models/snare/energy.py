@@ -34,7 +34,7 @@ def cable_energies(
 ):
     """Energies and losses of all cables, shape (7,), in the order above.
 
-    `section`: ρA, EA, EI, and the stiffness-proportional damping of tension and of bending [s].
+    `section`: ρA, EA, EI, the stiffness-proportional damping of tension and of bending [s], and the prestrain.
     """
     result = np.zeros(7)
     for first_row in range(0, positions.shape[0] - 2, 2):
@@ -47,7 +47,7 @@ def cable_energies(
             share = TENSION_POINTS[i, 1] * size * section[1]
             tangent, tangent_rate = combine(n1, element), combine(n1, rates)
             stretch = length(tangent)
-            result[STRAIN] += 0.5 * share * (stretch - 1.0) ** 2
+            result[STRAIN] += 0.5 * share * (stretch - 1.0 + section[5]) ** 2
             result[AXIAL_LOSS] += share * section[3] * (dot(tangent, tangent_rate) / stretch) ** 2
         for i in range(2):
             n1, n2 = first_weights(BENDING_POINTS[i, 0], size), second_weights(BENDING_POINTS[i, 0], size)

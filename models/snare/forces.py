@@ -2,8 +2,8 @@
 
 `fixed` and `moving` bundle what the compiled functions see: (reference coordinates, elements per cable, their length,
 number of the pin's coordinates, its cylinders, constants of the laws, cable radius, stiffness and friction of the
-ends), and the arrays that they fill, (pin, Euler parameters and rates, contacts, crossings, fittings of the ends: see
-`ends`).
+ends, the `line` of a hang point with play), and the arrays that they fill, (pin, Euler parameters and rates, contacts,
+crossings, fittings of the ends: see `ends`).
 """
 
 import numpy as np
@@ -22,9 +22,10 @@ from .ends import (
 )
 from .energy import BENDING_LOSS, STRAIN, cable_energies
 from .law import DAMPING
-from .vector import compiled, cross, dot, row, subtract
+from .line import line_pull, line_slope
+from .vector import add, compiled, cross, dot, rotate, row, subtract
 
-MOST_TRIPLETS = MOST_CONTACTS * 19 * 19 + MOST_CROSSINGS * 24 * 24 + 54 + 27
+MOST_TRIPLETS = MOST_CONTACTS * 19 * 19 + MOST_CROSSINGS * 24 * 24 + 54 + 27 + 9
 """Beside those of damping."""
 
 
@@ -64,7 +65,7 @@ def read_state(q, rates, fixed, moving):
 @compiled
 def system_forces(q, rates, fixed, moving):
     """Generalised forces on all coordinates, shape (n_coordinates,), at displacements q and rates."""
-    _, n_elements, size, n_pin, cylinders, law, radius, stiffness, friction = fixed
+    _, n_elements, size, n_pin, cylinders, law, radius, stiffness, friction, line = fixed
     pin, euler, contacts, crossings, fittings = moving
     positions, velocities = read_state(q, rates, fixed, moving)
     result, n_cables = np.zeros(q.size), positions.size
@@ -77,6 +78,10 @@ def system_forces(q, rates, fixed, moving):
         add_end_springs(positions, n_elements, stiffness, fittings, forces)
     add_bearing_friction(positions, velocities, n_elements, friction, fittings, forces)
     add_damping(positions, velocities, n_elements, size, law[DAMPING], forces)
+    if line[0] > 0.0:
+        arm = rotate(pin[3:6], (line[9], line[10], line[11]))
+        pull, _ = line_pull(line, add(row(pin, 0), arm))
+        push, moment = add(push, pull), add(moment, cross(arm, pull))
     for k in range(min(n_pin, 3)):
         result[n_cables + k] = push[k]
     if n_pin == 7:
@@ -88,7 +93,7 @@ def system_forces(q, rates, fixed, moving):
 @compiled
 def system_jacobian(q, rates, fixed, moving, factor, rate_factor):
     """Triplets (row, column, value) of −(factor ∂f/∂q + rate_factor ∂f/∂q̇), shape (n_triplets, 3)."""
-    _, n_elements, size, n_pin, cylinders, law, radius, stiffness, friction = fixed
+    _, n_elements, size, n_pin, cylinders, law, radius, stiffness, friction, line = fixed
     pin, euler, contacts, crossings, fittings = moving
     positions, velocities = read_state(q, rates, fixed, moving)
     n_all = positions.shape[0] // 2 // (n_elements + 1) * n_elements
@@ -105,7 +110,23 @@ def system_jacobian(q, rates, fixed, moving, factor, rate_factor):
     if rate_factor != 0.0:
         count = add_bearing_jacobian(positions, n_elements, friction, rate_factor, triplets, count)
         count = add_damping_jacobian(positions, n_elements, size, law[DAMPING], rate_factor, triplets, count)
+    if line[0] > 0.0:
+        count = _add_line_jacobian(q.size - n_pin, pin, line, factor, triplets, count)
     return triplets[:count].copy()
+
+
+@compiled
+def _add_line_jacobian(first, pin, line, factor, triplets, count):
+    """Append those of −factor ∂f/∂q for the target's position; what its turning changes matters to no result."""
+    slopes = np.empty((3, 3))
+    line_slope(line, add(row(pin, 0), rotate(pin[3:6], (line[9], line[10], line[11]))), slopes)
+    for i in range(3):
+        for k in range(3):
+            triplets[count, 0] = first + i
+            triplets[count, 1] = first + k
+            triplets[count, 2] = -factor * slopes[i, k]
+            count += 1
+    return count
 
 
 @compiled
@@ -126,7 +147,7 @@ def measure(q, rates, fixed, moving, section, pull, ends, end_speeds, effector, 
     float
         Power of the rings on the cables [W].
     """
-    _, n_elements, size, _, cylinders, law, radius, stiffness, friction = fixed
+    _, n_elements, size, _, cylinders, law, radius, stiffness, friction, _ = fixed
     pin, _, contacts, crossings, fittings = moving
     positions, velocities = read_state(q, rates, fixed, moving)
     count = find_contacts(positions, n_elements, size, cylinders, pin, radius, contacts)

@@ -23,6 +23,8 @@ class SnareHistory:
         `force` averaged since the time before [N].
     pin_force, pin_torque : arrays (n_times, 3)
         Of the cables on the target, about the pin's foot [N, N·m].
+    mean_pin_force : array (n_times, 3)
+        `pin_force` averaged since the time before [N].
     ring_angle : array (n_times,)
         [rad]
     cables : array (n_times, 3, n_nodes, 3)
@@ -49,6 +51,7 @@ class SnareHistory:
     mean_force: np.ndarray
     pin_force: np.ndarray
     pin_torque: np.ndarray
+    mean_pin_force: np.ndarray
     ring_angle: np.ndarray
     cables: np.ndarray
     end_forces: np.ndarray

@@ -10,9 +10,9 @@ from typing import Literal
 import numpy as np
 
 from ...errors import InputError
-from .assembly import Assembly
+from .assembly import Assembly, Drive
 from .contact import start_overlap
-from .drive import Pose, fill_path, go_on, ring_motion
+from .drive import Pose, fill_path, go_on
 from .history import SnareHistory
 from .parameters import SnareParameters
 from .recorder import Recorder
@@ -75,6 +75,8 @@ class SnareModel:
         Where the end effector stands at the start; None: at the origin, at rest.
     time : float
         Start [s], 0 or later; the ring starts to turn at 0.
+    drive : callable or None
+        Angle [rad] and rate [rad/s] of the ring at a time, in place of the parameters' ramp; 0 at the start.
 
     Raises
     ------
@@ -96,6 +98,7 @@ class SnareModel:
         accuracy: Literal["default", "fine"] | Accuracy = "default",
         effector: Pose | None = None,
         time: float = 0.0,
+        drive: Drive | None = None,
     ) -> None:
         """Settle the cables, build the system, check that the pin is clear."""
         if isinstance(accuracy, str) and accuracy not in ACCURACIES:
@@ -111,7 +114,7 @@ class SnareModel:
         near = replace(target, position=tuple(np.asarray(target.position) - self.origin))
         start = Pose(np.zeros(3), start.rotation, start.velocity, start.angular_velocity)
         nodes = settled(parameters, self.accuracy.n_elements) @ start.rotation.T
-        self.assembly = Assembly(parameters, near, nodes, start)
+        self.assembly = Assembly(parameters, near, nodes, start, drive)
         self._check_clear(nodes)
         self._start = time
         self._frames = (start.frame(), self.assembly.pin.copy())  # of effector and moved target, where they are now
@@ -217,8 +220,7 @@ class SnareModel:
     @property
     def ring_angle(self) -> float:
         """How far the ring has turned [rad]."""
-        p = self.parameters
-        return ring_motion(self.time, p.ring_rate, p.ring_travel, p.ring_ramp)[0]
+        return self.assembly.ring_at(self.time)[0]
 
     def target_pose(self) -> Pose:
         """Where the target is, and how it moves."""

@@ -85,6 +85,7 @@ class SnareParameters:
     contact_damping: float = _dimension(1.0, "s/m", "chosen", "Hunt and Crossley 1975: share of force per m/s", ">= 0")
     friction: float = _dimension(0.1, "1", "chosen", "polished pin; the paper says small", ">= 0")
     slip_velocity: float = _dimension(2e-4, "m/s", "chosen", "where the regularised Coulomb law bends")
+    cable_pretension: float = _dimension(0.0, "N", "chosen", "of a cable held straight; not in the paper", ">= 0")
 
     def __post_init__(self) -> None:
         """Refuse what cannot be built."""
@@ -120,9 +121,14 @@ class SnareParameters:
 
     @property
     def section(self) -> tuple[float, ...]:
-        """What `cable_energies` takes: ρA [kg/m], EA [N], EI [N·m²], damping of tension and of bending [s]."""
+        """What `cable_energies` takes: ρA [kg/m], EA [N], EI [N·m²], damping of tension and bending [s], prestrain."""
         stiffness = self.axial_stiffness, self.bending_stiffness
-        return (self.mass_per_length, *stiffness, self.axial_damping, self.bending_damping)
+        return (self.mass_per_length, *stiffness, self.axial_damping, self.bending_damping, self.prestrain)
+
+    @property
+    def prestrain(self) -> float:
+        """Axial strain that the pretension stands for: by this share the cable, left free, would be shorter."""
+        return self.cable_pretension / self.axial_stiffness
 
     def dimensions(self) -> tuple[Dimension, ...]:
         """Every number with unit and source, in the order of the fields."""

@@ -6,10 +6,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from .assembly import Assembly
-from .drive import ring_motion
 from .energy import KINETIC, OVERLAP, STRAIN
 from .forces import measure
 from .history import SnareHistory
+from .line import LOCAL, line_pull
 
 _IMPULSE = slice(0, 3)
 _RING_WORK, _DAMPED, _FRICTION = 3, 4, 5
@@ -132,7 +132,6 @@ class Recorder:
     def record(self, time: float) -> None:
         """Keep what is now."""
         a = self._assembly
-        p = a.parameters
         coordinates = self._data.GetODE2Coordinates() + a.reference
         cables = coordinates[: a.n_cable_coordinates].reshape(a.nodes.shape)[:, :, 0]
         self._rows.append(
@@ -144,7 +143,7 @@ class Recorder:
                 "totals": self._totals.copy(),
                 "energies": self._energies,
                 "target": self._target_energy(),
-                "ring": ring_motion(time, p.ring_rate, p.ring_travel, p.ring_ramp)[0],
+                "ring": a.ring_at(time)[0],
                 "cables": cables + self._origin,
                 "ends": np.reshape(self._data.GetAECoordinates()[self._ends], (6, 3)),
                 "contacts": self._contacts,
@@ -164,7 +163,12 @@ class Recorder:
             energy += 0.5 * spin @ rotation @ np.asarray(target.inertia) @ rotation.T @ spin
         if target.hangs:
             energy -= target.mass * np.asarray(target.gravity) @ (a.pin[0] + arm)
-        if target.support == "spring":
+        if target.umbilical:
+            energy += 0.5 * target.umbilical * float(np.sum((a.pin[0] - target.position) ** 2))
+        if target.clearance:
+            arm = rotation @ a.line[LOCAL]
+            energy += line_pull(a.line, tuple(a.pin[0] + arm))[1]
+        elif target.support == "spring":
             local = np.asarray(target.hang_point) if target.rotates else np.zeros(3)
             line = np.linalg.norm(a.hang_top - a.pin[0] - rotation @ local)
             energy += 0.5 * target.stiffness * (line - a.free_length) ** 2
@@ -180,9 +184,12 @@ class Recorder:
         times, totals, pins, energies = stack("time"), stack("totals"), stack("pin"), stack("energies")
         quaternions = np.roll(Rotation.from_matrix(pins[:, 3:]).as_quat(canonical=True), 1, axis=1)
         intervals = np.diff(times, prepend=times[0])[:, None]
-        impulse = np.diff(totals[:, _IMPULSE], axis=0, prepend=totals[:1, _IMPULSE])
-        wrench = stack("wrench")
-        mean = np.where(intervals > 0, impulse / np.where(intervals > 0, intervals, 1.0), wrench[:, :3])
+        wrench, pin_wrench = stack("wrench"), stack("pin_wrench")
+
+        def mean(impulses: np.ndarray, now: np.ndarray) -> np.ndarray:
+            gained = np.diff(impulses, axis=0, prepend=impulses[:1])
+            return np.where(intervals > 0, gained / np.where(intervals > 0, intervals, 1.0), now)
+
         return SnareHistory(
             times=times,
             target_position=pins[:, 0] + self._origin,
@@ -191,9 +198,10 @@ class Recorder:
             target_angular_velocity=pins[:, 2],
             force=wrench[:, :3],
             torque=wrench[:, 3:],
-            mean_force=mean,
-            pin_force=stack("pin_wrench")[:, :3],
-            pin_torque=stack("pin_wrench")[:, 3:],
+            mean_force=mean(totals[:, _IMPULSE], wrench[:, :3]),
+            pin_force=pin_wrench[:, :3],
+            pin_torque=pin_wrench[:, 3:],
+            mean_pin_force=mean(totals[:, _PIN_IMPULSE][:, :3], pin_wrench[:, :3]),
             ring_angle=stack("ring"),
             cables=stack("cables"),
             end_forces=stack("ends"),

@@ -93,7 +93,8 @@ def _rest(parameters: SnareParameters, n_elements: int, guess: np.ndarray) -> np
         element = ca.reshape(nodes[4 * number : 4 * number + 8], 2, 4)
         for x, weight in TENSION_POINTS.tolist():
             tangent = element @ ca.vertcat(*first_weights(x, size))
-            energy += 0.5 * weight * size * parameters.axial_stiffness * (ca.norm_2(tangent) - 1) ** 2
+            strain = ca.norm_2(tangent) - 1 + parameters.prestrain
+            energy += 0.5 * weight * size * parameters.axial_stiffness * strain**2
         for x, weight in BENDING_POINTS.tolist():
             tangent = element @ ca.vertcat(*first_weights(x, size))
             bow = element @ ca.vertcat(*second_weights(x, size))

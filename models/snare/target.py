@@ -45,6 +45,11 @@ class Target:
         Of the spring [N/m, N·s/m].
     gravity : three floats
         In the world [m/s²], where a line holds the target.
+    clearance : float
+        Radius of the play at the line's top [m], see `line`; in the middle of it at the start.
+    umbilical : float
+        Stiffness of an extra cable that draws the pin's foot back to where it started [N/m], the same in every
+        direction.
 
     Raises
     ------
@@ -65,6 +70,8 @@ class Target:
     stiffness: float = PAPER_SPRING
     damping: float = 0.0
     gravity: Sequence[float] = (-9.81, 0.0, 0.0)
+    clearance: float = 0.0
+    umbilical: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse what cannot be."""
@@ -79,6 +86,11 @@ class Target:
         for name in ("mass", "line_length", "stiffness"):
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
                 raise InputError(f"target: {name} is {getattr(self, name)}; give a number > 0")
+        for name in ("clearance", "umbilical"):
+            if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
+                raise InputError(f"target: {name} is {getattr(self, name)}; give a number >= 0")
+        if self.clearance > 0 and not self.hangs:
+            raise InputError(f"target: clearance is {self.clearance:g} m, and no line holds it; give 0")
         if self.inertia is not None:
             self._check_inertia(np.asarray(self.inertia, dtype=float))
 

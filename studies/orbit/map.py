@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...files import json_value, written_whole
 from ...models.snare.parameters import SnareParameters
 from ..outcome import FOLDER
 from .ledger import peak_force
@@ -48,10 +49,10 @@ def resistance_map(start: Setting, snare: SnareParameters, study: str, say: Call
             if not path.exists():
                 say(f"  map: friction {level:g} N·m, stiffness {stiffness:g} N·m/rad ...")
                 path.parent.mkdir(parents=True, exist_ok=True)
-                part = path.with_suffix(".part")
-                part.write_text(json.dumps(asdict(_cell(start, snare, level, stiffness))), encoding="utf-8")
-                part.replace(path)
-            cells.append(Cell(**json.loads(path.read_text(encoding="utf-8"))))
+                cell = asdict(_cell(start, snare, level, stiffness))
+                with written_whole(path) as part:
+                    part.write_text(json.dumps(cell), encoding="utf-8")
+            cells.append(Cell(**json_value(path)))
     return cells
 
 

@@ -19,6 +19,7 @@ from ...identification.report import write_report
 from ...models.model_file import load_model
 from ...models.model_write import save_model
 from ...models.rig.rig import built_in_rig
+from ..command import status_of
 from ..outcome import FOLDER, Quantity, table, write_result
 from ..page import Section, write_page
 from . import figures
@@ -183,4 +184,4 @@ def sections(friction: Friction, found: Diagnosis, words: list[str], truth: dict
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(status_of(main))

@@ -1,0 +1,118 @@
+"""Long work on the terminal: one line, rewritten, with the time left where that is known; nothing in a pipe.
+
+With ``--verbose`` each message is a line of Python's logging on standard error instead, in a pipe too.
+"""
+
+import logging
+import re
+import signal
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from .errors import one_line
+
+LOG = logging.getLogger("snarelab")
+_COUNT = re.compile(r"(\d+) of (?:at most )?(\d+)")
+_INTERRUPTED = threading.Event()
+_RARELY = 0.2
+"""Least time between two rewritten lines of the same kind [s]."""
+
+
+class Progress:
+    """A context that gives ``show(text)``.
+
+    Time left is extrapolated from the share that is done: the caller's ``share``, or "3 of 8" in the text, which then
+    counts from the first text of that wording on.
+    """
+
+    def __init__(self) -> None:
+        """Start the clock."""
+        self._shown = sys.stderr.isatty() and not LOG.isEnabledFor(logging.INFO)
+        self._start = self._since = time.monotonic()
+        self._wording, self._first, self._last = "", 0.0, 0.0
+
+    def __enter__(self) -> "Progress":
+        """Ready."""
+        return self
+
+    def __call__(self, text: str, share: float | None = None) -> None:
+        """Say what is under way, and which share of it is done, 0 to 1."""
+        if _INTERRUPTED.is_set():
+            raise KeyboardInterrupt
+        text, now = one_line(text), time.monotonic()
+        wording = re.sub(r"[\d.]+", "", text)
+        if share is None and (count := _COUNT.search(text)):
+            share = int(count[1]) / max(int(count[2]), 1)
+        if wording != self._wording:
+            LOG.info(text)
+            self._wording, self._since, self._first, self._last = wording, now, share or 0.0, 0.0
+        else:
+            LOG.debug(text)
+        if not self._shown or now - self._last < _RARELY:
+            return
+        self._last = now
+        left = ""
+        if share is not None and share > self._first and now > self._since:
+            left = f", {duration((1.0 - share) * (now - self._since) / (share - self._first))} left"
+        line = f"[{duration(now - self._start)}{left}] {text}"
+        print(f"\r\x1b[2K{line[:110]}", end="", file=sys.stderr, flush=True)
+
+    def __exit__(self, *_: object) -> None:
+        """Leave the line empty."""
+        if self._shown:
+            print("\r\x1b[2K", end="", file=sys.stderr, flush=True)
+
+
+def duration(seconds: float) -> str:
+    """``8 s``, ``2 min 05 s``, ``3 h 20 min``."""
+    whole = round(max(seconds, 0.0))
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60:02} s"
+    return f"{whole // 3600} h {whole % 3600 // 60:02} min"
+
+
+@contextmanager
+def terminated_is_interrupted() -> Iterator[None]:
+    """SIGTERM ends a command as Ctrl-C does: with whole files.
+
+    Where Python is in an object's finaliser as the signal comes, it drops the KeyboardInterrupt (Dask's futures have
+    such); the next call of a `Progress` then raises it again.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def interrupt(*_: object) -> None:
+        _INTERRUPTED.set()
+        raise KeyboardInterrupt
+
+    before = {kind: signal.getsignal(kind) for kind in (signal.SIGINT, signal.SIGTERM)}
+    hook = sys.unraisablehook
+    sys.unraisablehook = lambda dropped: None if dropped.exc_type is KeyboardInterrupt else hook(dropped)
+    _INTERRUPTED.clear()
+    try:
+        for kind, handler in before.items():
+            if handler != signal.SIG_IGN:
+                signal.signal(kind, interrupt)
+        yield
+    finally:
+        for kind, handler in before.items():
+            signal.signal(kind, handler)
+        sys.unraisablehook = hook
+        _INTERRUPTED.clear()
+
+
+def start_logging(verbose: int) -> None:
+    """Log to standard error from warnings on, with ``-v`` what is under way, with ``-vv`` every step of it."""
+    level = (logging.WARNING, logging.INFO, logging.DEBUG)[min(verbose, 2)]
+    LOG.setLevel(level)
+    LOG.handlers.clear()
+    handler = logging.StreamHandler()
+    handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(name)s: %(message)s", "%H:%M:%S"))
+    LOG.addHandler(handler)
+    LOG.propagate = False

@@ -1,0 +1,20 @@
+"""A study as a command: the statuses of ``snarelab``, and one line where it is refused or stopped."""
+
+import sys
+from collections.abc import Callable
+
+from ..errors import InputError
+from ..progress import terminated_is_interrupted
+
+
+def status_of(study: Callable[[], int]) -> int:
+    """Run a study; its status, 2 for unusable input, 130 where Ctrl-C or SIGTERM stopped it."""
+    try:
+        with terminated_is_interrupted():
+            return study()
+    except InputError as error:
+        print(f"snarelab: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("snarelab: interrupted; files that are there are whole; run the same command again", file=sys.stderr)
+        return 130

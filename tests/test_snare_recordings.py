@@ -1,0 +1,263 @@
+"""Captures as recordings: model files, what is refused, simulate, identify, and a diagnosis of closed forms."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from snarelab.cli import main
+from snarelab.errors import InputError
+from snarelab.identification.snare_diagnose import diagnose_captures, identify_captures, simulate_capture
+from snarelab.identification.snare_fit import HANDLES
+from snarelab.identification.snare_library import library
+from snarelab.identification.snare_recording import Track, load_captures, sensed_by
+from snarelab.identification.snare_runs import Job, simulated
+from snarelab.models.effects import effects
+from snarelab.models.model import places
+from snarelab.models.model_file import load_model
+from snarelab.models.model_write import save_model
+from snarelab.models.snare.setup import APPLIED, NUMBERS, SnareTree
+
+PLAIN = 'name = "capture"\nsystem = "snare_capture"\n'
+FAR, SPEED, MASS, LINE = np.array([0.6, 0.3, 0.0]), 0.03, 25.0, 2.0
+"""A target out of the cables' reach that swings: closed forms are all there is to it."""
+
+
+def setup_of(model):
+    assert isinstance(model.tree, SnareTree)
+    return model.tree.setup
+
+
+def written(folder, text, name="model.toml"):
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def swinging(folder, name, columns=None, umbilical=0.0, direction=0.3, seconds=2.5, seed=1):
+    """A pendulum on a long line, with an umbilical, pushed at the start: y, z = v/w sin(w t), w^2 = g/l + k/m."""
+    time = np.arange(0, seconds + 1e-9, 0.01)
+    rate = np.sqrt(9.81 / LINE + umbilical / MASS)
+    rng = np.random.default_rng(seed)
+    moved = SPEED / rate * np.sin(rate * time)[:, None] * [0.0, np.cos(direction), np.sin(direction)]
+    table = {"time": time, "angle.ring": 0.0 * time}
+    noise = 5e-5 * rng.normal(size=moved.shape)
+    table |= {f"pos.target.{a}": (FAR + moved + noise)[:, i] for i, a in enumerate("xyz")}
+    path = folder / name
+    pd.DataFrame(table | (columns or {})).to_csv(path, index=False)
+    return path
+
+
+def test_a_plain_model_is_the_built_in_snare_without_any_effect(tmp_path):
+    model = load_model(written(tmp_path, PLAIN))
+    setup = setup_of(model)
+    assert model.effects == ()
+    assert model.joints == ()
+    np.testing.assert_array_equal(model.tree.gravity, [-9.81, 0.0, 0.0])
+    assert (setup.parameters.friction, setup.parameters.contact_damping, setup.target.umbilical) == (0.0, 0.0, 0.0)
+    assert setup.parameters.bending_damping == 1e-3  # no rope has none, no contact is without stiffness
+    assert {e.name for e in effects().values() if places(e, model.tree)} == set(APPLIED)
+    assert set(HANDLES) == {*APPLIED, *NUMBERS}
+
+
+def test_set_up_and_effects_come_back_from_a_saved_model(tmp_path):
+    text = PLAIN + (
+        'effects = ["contact_friction", { name = "umbilical_stiffness", at = "target", hold = ["stiffness"] }]\n'
+        'gravity = [0.0, 0.0, -1.62]\n[capture]\ntarget = "pendulum"\nmass = 12\ninertia = [0.1, 0.2, 0.2]\n'
+        'ring_radius = 0.13\nposition = [0.2, 0.05, 0.0]\n[parameters]\n"contact_friction.pin.coefficient" = 0.2\n'
+    )
+    model = load_model(written(tmp_path, text))
+    assert setup_of(model).target.rotates
+    assert setup_of(model).target.mass == 12.0
+    save_model(model, tmp_path / "saved.toml", "a note")
+    again = load_model(tmp_path / "saved.toml")
+    assert again.effects == model.effects
+    assert again.values == model.values
+    assert setup_of(again) == setup_of(model)
+    setup = setup_of(model).with_values(model.values)
+    assert setup.parameters.friction == 0.2
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[capture]\nfriction = 0.1", ("contact_friction", "[parameters]")),
+        ("[capture]\numbilical = 0.1", ("umbilical_stiffness",)),
+        ("[capture]\nring_radios = 0.1", ("'ring_radios'", "did you mean 'ring_radius'")),
+        ('[capture]\ntarget = "moved"', ("'moved'", "spring, pendulum, free")),
+        ('[capture]\nmass = "heavy"', ("mass = 'heavy'", "a number")),
+        ("[capture]\nposition = [0.0, 1.0]", ("position = [0.0, 1.0]", "a list of 3 numbers")),
+        ("[capture]\nmass = -1.0", ("mass is -1.0",)),
+        ("[capture]\ncable_length = 0.1", ()),
+        ("capture = 3", ("capture = 3", "a table")),
+        ('urdf = "arm.urdf"', ("has no urdf", "take it out")),
+        ("bandwidth = 3.0", ("has no bandwidth",)),
+        ('base = "hub"', ("'base'",)),
+        ('inertia = "free"', ("inertia = 'free'",)),
+        ("gravity = [0.0, 0.0, 0.0]", ("target = 'free'",)),
+        ('effects = ["viscous_friction"]', ("viscous_friction acts at a joint",)),
+        ('effects = [{ name = "contact_friction", at = "cables" }]', ("this model has pin",)),
+        ('effects = ["hang_point_clearance"]\n[capture]\ntarget = "free"', ("hang_point_clearance",)),
+    ],
+)
+def test_a_mistake_in_a_model_file_is_named(tmp_path, text, words):
+    if "cable_length" in text:  # shorter than the way from ring to ring: found when the snare is built
+        model = load_model(written(tmp_path, PLAIN + text))
+        job = Job(setup_of(model), None, 3)
+        assert simulated(job, {}) is None
+        return
+    with pytest.raises(InputError) as caught:
+        load_model(written(tmp_path, PLAIN + text))
+    line = str(caught.value)
+    assert "\n" not in line
+    assert all(word in line for word in words), line
+
+
+def test_capture_belongs_to_a_snare(tmp_path):
+    with pytest.raises(InputError, match="belongs to system = 'snare_capture'"):
+        load_model(written(tmp_path, 'system = "arm"\n[capture]\nmass = 3.0\n'))
+
+
+def test_what_a_recording_says_of_its_start(tmp_path):
+    model = load_model(written(tmp_path, PLAIN))
+    force = {f"force.wrist.{a}": np.where(np.arange(251) < 150, 2.0, 5.0) for a in "xyz"}
+    path = swinging(tmp_path, "a.csv", {**force, "force.half.x": np.zeros(251)})
+    (capture,) = load_captures(model, [path])
+    start = capture.setup.target
+    # Noise alone gives a cubic's slope at its end over half a second some 16/(0.5 s sqrt(50)) of its size: 0.2 mm/s.
+    np.testing.assert_allclose(start.velocity, [0.0, SPEED * np.cos(0.3), SPEED * np.sin(0.3)], atol=1e-3)
+    np.testing.assert_allclose(start.position, FAR, atol=1e-4)
+    assert capture.sensors == {"effector": "wrist"}
+    np.testing.assert_allclose(capture.measured.force["effector"][1:29], 0.0, atol=1e-12)
+    np.testing.assert_allclose(capture.measured.force["effector"][-10:], 3.0, atol=1e-12)
+    assert any("quat.target is not recorded" in note for note in capture.notes)
+    assert any("force.half is not used" in note for note in capture.notes)
+    # Means over 50 ms about each time are the motion itself but for its curvature.
+    rate = np.sqrt(9.81 / LINE)
+    y = FAR[1] + SPEED / rate * np.sin(rate * capture.times) * np.cos(0.3)
+    np.testing.assert_allclose(capture.measured.position[1:-1, 1], y[1:-1], atol=1.2e-4)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda t: t.drop(columns="pos.target.y"), "pos.target.x, .y and .z are missing"),
+        (lambda t: t[t.time < 1.0], "it lasts"),
+        (lambda t: t[::10], "a sample every 0.1 s"),
+        (lambda t: t.assign(**{"angle.ring": 0.5}), "ring open"),
+        (lambda t: t.assign(**{"pos.target.x": t["pos.target.x"].where(t.time > 0.6)}), "no sample in the first"),
+    ],
+)
+def test_a_recording_that_cannot_be_used_is_named(tmp_path, change, words):
+    model = load_model(written(tmp_path, PLAIN))
+    table = pd.read_csv(swinging(tmp_path, "a.csv"))
+    change(table).to_csv(tmp_path / "b.csv", index=False)
+    with pytest.raises(InputError, match=words) as caught:
+        load_captures(model, [tmp_path / "b.csv"])
+    assert "b.csv" in str(caught.value)
+
+
+def test_simulate_writes_a_recording_that_is_read_back(tmp_path, capsys):
+    text = PLAIN + 'effects = ["contact_friction"]\n'
+    model = written(tmp_path, text)
+    assert main(["simulate", str(model), "--out", str(tmp_path / "out.csv")]) == 2
+    assert "contact_friction.pin.coefficient" in capsys.readouterr().err
+    assert not (tmp_path / "out.csv").exists()
+    known = '[parameters]\n"contact_friction.pin.coefficient" = 0.1\n'
+    model = written(tmp_path, text + "[capture]\nring_rate = 0.6\n" + known)
+    motion = swinging(tmp_path, "motion.csv", seconds=2.0)
+    out = tmp_path / "out.csv"
+    assert main(["simulate", str(model), "--motion", str(motion), "--out", str(out)]) == 0
+    table = pd.read_csv(out)
+    rate = np.sqrt(9.81 / LINE)
+    y = FAR[1] + SPEED / rate * np.sin(rate * table.time) * np.cos(0.3)
+    # The start velocity is the recording's, known to a millimetre per second.
+    np.testing.assert_allclose(table["pos.target.y"], y, atol=1e-3 / rate)
+    (capture,) = load_captures(load_model(model), [out])
+    assert capture.sensors == {"effector": "ring", "target": "target"}
+
+
+def test_an_umbilical_on_a_pendulum_is_named_and_told_by_its_stiffness(tmp_path):
+    model = load_model(written(tmp_path, PLAIN + '[capture]\ntarget = "pendulum"\nline_length = 2.0\n'))
+    train = swinging(tmp_path, "train.csv", umbilical=80.0)
+    held = swinging(tmp_path, "held.csv", umbilical=80.0, direction=1.2, seed=2)
+    said = []
+    diagnosis, after = diagnose_captures(model, [train], held, progress=said.append, jobs=1)
+    answer = json.loads(json.dumps(diagnosis.to_json(), allow_nan=False))
+    assert answer["verdict"] == "missing_physics"
+    assert [e["name"] for e in answer["effects"]] == ["umbilical_stiffness"]
+    stiffness = answer["effects"][0]["parameters"]["stiffness"]
+    assert stiffness["value"] == pytest.approx(80.0, rel=0.05)
+    assert stiffness["unit"] == "N/m"
+    fit = answer["fit"]["pos.target.z"]["holdout"]
+    assert fit["rms_after"] < 0.2 * fit["rms_before"]
+    assert "umbilical stiffness" in answer["sentence"]
+    assert said
+    save_model(after, tmp_path / "after.toml", diagnosis.sentence)
+    along = simulate_capture(load_model(tmp_path / "after.toml"), held)
+    truth = pd.read_csv(held)
+    known = np.interp(along["time"].values, truth.time, truth["pos.target.z"])
+    assert np.sqrt(np.mean((along["pos.target.z"].values - known) ** 2)) < 1e-3
+
+
+def test_a_pendulum_alone_is_told_well_and_what_would_have_shown(tmp_path, monkeypatch):
+    model = written(tmp_path, PLAIN + '[capture]\ntarget = "pendulum"\nline_length = 2.0\n')
+    train, held = swinging(tmp_path, "train.csv", seed=3), swinging(tmp_path, "held.csv", direction=1.2, seed=4)
+    out, page = tmp_path / "out.json", tmp_path / "out.html"
+    monkeypatch.setenv("SNARELAB_JOBS", "1")
+    asked = ["diagnose", str(model), str(train), "--holdout", str(held), "--json", str(out), "--report", str(page)]
+    assert main(asked) == 0
+    answer = json.loads(out.read_text())
+    assert answer["verdict"] == "adequate"
+    assert answer["effects"] == []
+    (limit,) = [x for x in answer["limits"] if x["name"] == "umbilical_stiffness"]
+    assert 0 < limit["value"] < 80.0
+    assert "adequate" in page.read_text(encoding="utf-8")
+
+
+def test_identify_finds_a_listed_effect(tmp_path):
+    text = PLAIN + 'effects = ["umbilical_stiffness"]\n[capture]\ntarget = "pendulum"\nline_length = 2.0\n'
+    model = load_model(written(tmp_path, text))
+    found = identify_captures(model, [swinging(tmp_path, "train.csv", umbilical=80.0)], jobs=1)
+    (parameter,) = found.to_json()["parameters"]
+    assert parameter["value"] == pytest.approx(80.0, rel=0.05)
+    assert 0 < parameter["std"] < 10.0
+    assert not parameter["at_bound"]
+    assert found.model.values["umbilical_stiffness.target.stiffness"] == parameter["value"]
+
+
+def test_a_corrected_number_becomes_part_of_the_set_up(tmp_path):
+    model = load_model(written(tmp_path, PLAIN + "[capture]\npin_radius = 0.008\n"))
+    assert {p.effect.name for p in library(model)} == {*APPLIED, "ring_radius", "mass"}  # what is given, is known
+    setup = setup_of(model).corrected({"ring_radius.capture.value": 0.125, "contact_friction.pin.coefficient": 0.3})
+    assert setup.parameters.ring_radius == 0.125
+    assert setup.parameters.cable_length == pytest.approx(np.hypot(0.1, 2 * np.pi * 0.125 / 3))
+    assert setup.parameters.friction == 0.0
+    assert isinstance(model.tree, SnareTree)
+    save_model(replace(model, tree=replace(model.tree, setup=setup)), tmp_path / "saved.toml", "")
+    assert setup_of(load_model(tmp_path / "saved.toml")).parameters == setup.parameters
+
+
+def test_no_motion_is_planned_for_a_capture(tmp_path, capsys):
+    model, train = written(tmp_path, PLAIN), swinging(tmp_path, "train.csv")
+    held = swinging(tmp_path, "held.csv", seed=2)
+    asked = ["diagnose", str(model), str(train), "--holdout", str(held), "--next-experiment", str(tmp_path / "n.csv")]
+    assert main(asked) == 2
+    assert "no motion is planned for a capture" in capsys.readouterr().err
+
+
+def test_a_sensor_reads_the_body_that_its_sign_says(tmp_path):
+    model = load_model(written(tmp_path, PLAIN))
+    push = np.where(np.arange(251) < 150, 0.0, 3.0)
+    path = swinging(tmp_path, "a.csv", {f"force.wrist.{a}": push for a in "xyz"})
+    (capture,) = load_captures(model, [path])
+    force = capture.measured.force["effector"]
+    agreeing = Track(capture.measured.position, capture.measured.quaternion, {"effector": force, "target": -force})
+    assert sensed_by(capture, agreeing) is capture
+    assert sensed_by(capture, None) is capture
+    opposed = replace(agreeing, force={"effector": -force, "target": force})
+    moved = sensed_by(capture, opposed)
+    assert moved.sensors == {"target": "wrist"}
+    assert "force on the target" in moved.notes[-1]
