@@ -78,7 +78,7 @@ def main() -> int:
     ]
     for figure in score(answers, found).figures.values():
         tell(f"{figure.name:24} {figure.value}")
-    knots, probability = curve(*zip(*names, strict=True))
+    knots, probability = curve([margin for margin, _ in names], [right for _, right in names])
     write_json(
         JSON,
         {

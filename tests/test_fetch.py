@@ -5,6 +5,7 @@ import hashlib
 import http.server
 import threading
 
+import pooch
 import pytest
 
 from snarelab.errors import InputError
@@ -20,7 +21,7 @@ def nowhere(tmp_path, monkeypatch):
     (tmp_path / "project").mkdir()
     monkeypatch.chdir(tmp_path / "project")
     monkeypatch.delenv("SNARELAB_RECORDINGS", raising=False)
-    monkeypatch.setattr(find.pooch, "os_cache", lambda project: tmp_path / "cache" / project)
+    monkeypatch.setattr(pooch, "os_cache", lambda project: tmp_path / "cache" / project)
     monkeypatch.setenv("NO_PROXY", "127.0.0.1")
     monkeypatch.setattr(find, "PUBLISHER", "http://127.0.0.1:9/")
     monkeypatch.setattr(find, "SHA256", {NAME: hashlib.sha256(CONTENT).hexdigest()})

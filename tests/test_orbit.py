@@ -12,10 +12,9 @@ from snarelab.models.floating.space_arm import FRICTION
 from snarelab.models.monolithic.assembly import makkar
 from snarelab.models.snare.model import Accuracy
 from snarelab.studies.orbit import setting as orbit
-from snarelab.studies.orbit.capture import step_control
 from snarelab.studies.orbit.ledger import energy_ledger, force_error, momentum_ledger, position_error
 from snarelab.studies.orbit.reference import reference
-from snarelab.studies.orbit.setting import Passive, capture_of, co_simulate, setting
+from snarelab.studies.orbit.setting import Passive, capture_of, co_simulate, setting, step_control
 
 FAST = dataclasses.replace(orbit.SNARE, ring_rate=10 * orbit.SNARE.ring_rate, ring_ramp=0.02)
 LENGTH = 0.85
