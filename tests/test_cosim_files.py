@@ -170,5 +170,5 @@ def test_python_of_the_page_runs():
 
 
 def test_system_file_of_the_page_loads(folder):
-    (shown,) = [block for block in blocks("") if "[participants.left]" in block]
+    (shown,) = [block for block in blocks("toml") if "[participants.left]" in block]
     assert load_setup(written(folder, shown.replace('"left.fmu"', '"left2.fmu"')), HERE).master().run(0.05).steps == 50

@@ -31,7 +31,11 @@ NOT_RUN = {
     r"python -m snarelab\.tolerance\.renew": "rewrites tests/tolerances.toml: test_capture_tolerances.py",
     r"snarelab cosim brake\.toml .*|snarelab export lagging_motor .*": "test_adding.py runs them with the page's file",
 }
-PARSED = {r"snarelab tolerance STUDY\.toml .*": "minutes of captures; test_tolerance_study.py runs a small study"}
+PARSED = {
+    r"snarelab tolerance STUDY\.toml .*": "minutes of captures; test_tolerance_study.py runs a small study",
+    r"snarelab (diagnose|identify) capture\.toml .*": "minutes of captures; test_snare_recordings.py runs short ones",
+    r"snarelab simulate new\.toml --out capture\.csv": "of the model that the diagnosis left; test_snare_recordings.py",
+}
 NOT_RUN_PYTHON = {
     "fmu.md": "importers that may not be there: tests/fmu_tools.py runs the same calls",
     "cluster.md": "needs a cluster",
