@@ -164,7 +164,7 @@ def local_cluster(jobs: int) -> Any:
 
     options: dict[str, Any] = {"dashboard_address": None, "scheduler_kwargs": {"dashboard_address": "127.0.0.1:0"}}
     with _ignored_interrupt():
-        return LocalCluster(n_workers=jobs, threads_per_worker=1, silence_logs=logging.ERROR, **options)
+        return LocalCluster(n_workers=jobs, threads_per_worker=1, silence_logs=logging.CRITICAL, **options)
 
 
 @contextmanager
