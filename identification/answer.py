@@ -85,7 +85,7 @@ def report_on(
         )
         for c, b in unsteady.items()
     ]
-    loud = {c for c, x, _ in said if size(c, x) >= MATERIAL or x > PLAIN}
+    loud = {c for c, x, _ in said if size(c, x) >= MATERIAL} | {c for c, x in nameless.items() if x > PLAIN}
     description = "; ".join(text for c, _, text in said if c in loud)
     if findings:
         verdict = "missing_physics"

@@ -121,7 +121,7 @@ def candidate_columns(
     effect = placed.effect
     key = None
     if effect.at == "joint" and not effect.states and not state.passed.get(joint):
-        key = ("candidate", placed.key, variant.parameters.tobytes())
+        key = ("candidate", placed.key, variant.parameters.tobytes(), variant.amplitudes.tobytes())
         if key in experiment.store:
             return [(joint, experiment.store[key])]
     terms, by_load, _ = contributions(

@@ -23,9 +23,9 @@ ABOUT = (
     "the answers were sealed before the first diagnosis; each diagnosis then ran as `snarelab diagnose` in a process "
     "of its own, in a folder that holds the model and two recordings, while the answers were in no file. No case is "
     "dropped.",
-    "The tool's settings and its probability curve come from other robots (bench/arm.py: two or three joints, slender "
-    "bodies that grow lighter towards the tip) and other seeds (below 1000); these robots are proof/robots.py: three "
-    "to six joints, tubes with motors and a tool, a tilted foot, other ranges of friction, noise and rate.",
+    "The tool's settings and its probability curve come from robots of other seeds (90000 to 99999, drawn in the same "
+    "way: proof/robots.py, three to six joints, tubes with motors and a tool, a tilted foot) and from the studies' "
+    "real recordings. Of robots that are made in another way this page says nothing.",
     "The size of an effect is the RMS torque that it makes along the planned motion and that a refit of the known "
     "friction cannot pose as, over the RMS of the disturbance at every joint. Effects outside the vocabulary are sized "
     "by what the nearest named laws leave of them, at 2 and 4 times; pairs, decoys and wrong parameters at 2 times.",

@@ -1,8 +1,8 @@
 """The proof's own family of arms: straight tubes with a motor at each joint, three to six of them.
 
-The arms that the tool was tuned on (`bench.arm.random_arm`) are slender bodies of 2 to 20 kg that grow lighter towards
-the tip, two or three of them. Here a link is 0.6 to 4 kg of tube and a motor of 0.4 to 3 kg, in any order, longer, on a
-tilted foot, with a tool at the end, and friction follows what the joint carries.
+The arms that tests of the search draw (`bench.arm.random_arm`) are slender bodies of 2 to 20 kg that grow lighter
+towards the tip, two or three of them. Here a link is 0.6 to 4 kg of tube and a motor of 0.4 to 3 kg, in any order,
+longer, on a tilted foot, with a tool at the end, and friction follows what the joint carries.
 """
 
 from collections.abc import Mapping

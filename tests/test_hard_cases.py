@@ -1,15 +1,25 @@
 """Arms of the proof's generator, from a seed for work on the tool, that a diagnosis once missed."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from proof.cases import ROUND, draw, planned_cases
 from proof.judge import judge
+from snarelab.identification.candidates import candidate_columns, variants
 from snarelab.identification.diagnose import diagnose
+from snarelab.identification.experiment import load_experiments, scales
 from snarelab.identification.screening import reliably_positive
+from snarelab.identification.search import assemble
+from snarelab.models.effects import get_effect
+from snarelab.models.model import Placed
 from snarelab.models.model_file import load_model
+from snarelab.models.rigid_body import RigidBody
 
 SEED = 90200
+BUNDLED = Path(__file__).resolve().parents[1] / "studies" / "bundled"
 
 
 def diagnosed(number, folder):
@@ -57,3 +67,16 @@ def test_a_block_that_dwarfs_the_others_is_no_reason_to_doubt_them():
     assert not reliably_positive(-gains)
     mixed = np.array([-15.6, -17.4, -4.7, 46.6, -29.6, 0.2, -21.1, 67.4, -391.0, 18.8, -28.6, 2.5, 32.4])
     assert not reliably_positive(mixed)
+
+
+def test_a_candidate_with_fewer_amplitudes_has_its_own_columns():
+    """They were those of all amplitudes where these had been worked out before, and the diagnosis ended in a fault."""
+    model = load_model(BUNDLED / "arm3.toml")
+    (experiment,) = load_experiments(model, [BUNDLED / "train.csv"], RigidBody(model.tree))
+    assembly = assemble(model, None, scales([experiment]))
+    state = assembly.evaluate(experiment, assembly.start)
+    whole = variants(assembly, Placed(get_effect("asymmetric_friction"), model.joints[0]))[0]
+    one = replace(whole, amplitudes=whole.amplitudes[:1], low=whole.low[:1], high=whole.high[:1])
+    (_, every), (_, single) = (candidate_columns(assembly, experiment, state, v)[0] for v in (whole, one))
+    assert every.shape[1] == 2
+    np.testing.assert_array_equal(single, every[:, :1])
