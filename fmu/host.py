@@ -25,7 +25,11 @@ class Host:
 
     def __init__(self, config: dict[str, Any]) -> None:
         """Import and construct; nothing is initialised."""
-        sys.path += [folder for folder in config["path"] if folder not in sys.path]
+        own, package = config["path"]
+        if package not in sys.path:  # the package that exported goes before another that is installed here
+            sys.path.insert(0, package)
+        if own not in sys.path:
+            sys.path.append(own)
         module = import_module(config["module"])
         self.numpy = import_module("numpy")
         self.step_error = import_module("snarelab.cosim.participant").StepError
