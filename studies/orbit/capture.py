@@ -171,9 +171,10 @@ def _sections(result: Result) -> list[Section]:
         Section(
             "The capture",
             [
-                "The ring's sizes are those of the ground study's second set, which meets the paper's first contact "
-                "there; nothing was set to meet a number of this case. Mass and size of base and target, the arm and "
-                "the friction in its joints are chosen: the paper gives 40 t and 10 t, and no more.",
+                "Two sets of the ring's sizes meet the paper's first contact in the ground study; this is the one "
+                "whose captures in orbit meet the paper, too: chosen by these numbers, so that agreement proves "
+                "nothing. Mass and size of base and target, the arm and the friction in its joints are chosen: the "
+                "paper gives 40 t and 10 t, and no more.",
             ],
             [displacement(c, result.single), forces(c, result.single), base_motion(c)],
         ),
