@@ -122,8 +122,8 @@ def _identify(given: argparse.Namespace) -> None:
 
 def _diagnose(given: argparse.Namespace) -> None:
     from .identification.diagnose import diagnose
-    from .identification.next_experiment import next_experiment
-    from .identification.report import write_report
+    from .identification.report.page import write_report
+    from .identification.search.next_experiment import next_experiment
     from .models.model_file import load_model
     from .models.model_write import save_model
     from .recordings import write_recording

@@ -29,11 +29,11 @@ from bench.arm import Arm, random_arm
 from bench.lugre import Bristles, LuGre
 from bench.motion import fourier_motion
 from bench.mujoco_plant import write_csv
-from snarelab.identification.assembly import Assembly
-from snarelab.identification.experiment import Experiment, load_experiments, scales
-from snarelab.identification.fit import fit
-from snarelab.identification.problem import split
-from snarelab.identification.starts import grid_starts
+from snarelab.identification.fitting.assembly import Assembly
+from snarelab.identification.fitting.experiment import Experiment, load_experiments, scales
+from snarelab.identification.fitting.fit import fit
+from snarelab.identification.fitting.problem import split
+from snarelab.identification.fitting.starts import grid_starts
 from snarelab.models.model_file import load_model
 from snarelab.models.rigid_body import RigidBody
 

@@ -24,7 +24,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from bench.snare_rods import Seen, Truth, moved, simulate
-from snarelab.identification.snare_diagnose import diagnose_captures
+from snarelab.identification.snare.diagnose import diagnose_captures
 from snarelab.models.model_file import load_model
 from snarelab.models.snare.parameters import SnareParameters
 from snarelab.models.snare.target import Target

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from snarelab.identification.candidates import candidate_columns, library, variants
 from snarelab.identification.identify import Identified, identify
+from snarelab.identification.search.candidates import candidate_columns, library, variants
 from snarelab.models.model_file import load_model
 
 ROOT = Path(__file__).resolve().parents[1]

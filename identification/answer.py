@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from ..models.floating.tree import channel, n_carriers
 from ..models.model import Model
-from .bursts import bursts
 from .diagnosis import Candidate, ChannelFit, Diagnosis, Estimate, Finding, Misfit, Moved, Rival, Step, Trace
-from .experiment import Experiment
-from .fit import Fit, channel_rms
-from .floating_terms import momentum_floor
-from .locate import locate
+from .fitting.experiment import Experiment
+from .fitting.fit import Fit, channel_rms
+from .fitting.floating_terms import momentum_floor
 from .reliability import probability as reliability
-from .search import Found, Taken
+from .search.bursts import bursts
+from .search.forward import Found, Taken
+from .search.locate import locate
 from .wording import evidence_sentence, experiment_sentence, percent, verdict_sentence
 
 Array = NDArray[np.float64]

@@ -17,17 +17,17 @@ from ..models.model import Model
 from ..models.rigid_body import RigidBody
 from ..models.snare.setup import SnareTree
 from .answer import report_on
-from .assembly import Assembly
-from .base_parameters import base_parameters
 from .diagnosis import Diagnosis, Step
-from .encoder_answer import with_links
-from .encoder_diagnosis import diagnose_links
-from .experiment import Experiment, demand_apart, demand_torque, load_experiments, scales
-from .fit import Fit, channel_rms, fit
+from .fitting.assembly import Assembly
+from .fitting.base_parameters import base_parameters
+from .fitting.experiment import Experiment, demand_apart, demand_torque, load_experiments, scales
+from .fitting.fit import Fit, channel_rms, fit
 from .identify import inertial_values, physical
-from .rest import bridged, fitted
-from .search import Found, Taken, carry, search, without
-from .snare_diagnose import diagnose_captures
+from .links.answer import with_links
+from .links.diagnose import diagnose_links
+from .search.forward import Found, Taken, carry, search, without
+from .search.rest import bridged, fitted
+from .snare.diagnose import diagnose_captures
 
 Array = NDArray[np.float64]
 

@@ -12,13 +12,13 @@ from ..models.inertia import Array
 from ..models.model import Model
 from ..models.rigid_body import RigidBody
 from ..models.snare.setup import SnareTree
-from .assembly import Assembly
-from .base_parameters import INERTIAL, BaseParameters, base_parameters
-from .consistent_inertia import ConsistentInertia, consistent_inertia
-from .experiment import Experiment, demand_apart, demand_torque, load_experiments, scales
-from .fit import Fit, channel_rms, fit
-from .friction_curve import friction_curves, identifiable
-from .snare_diagnose import IdentifiedCaptures, identify_captures
+from .fitting.assembly import Assembly
+from .fitting.base_parameters import INERTIAL, BaseParameters, base_parameters
+from .fitting.consistent_inertia import ConsistentInertia, consistent_inertia
+from .fitting.experiment import Experiment, demand_apart, demand_torque, load_experiments, scales
+from .fitting.fit import Fit, channel_rms, fit
+from .fitting.friction_curve import friction_curves, identifiable
+from .snare.identify import IdentifiedCaptures, identify_captures
 
 
 @dataclass(frozen=True)

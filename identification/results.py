@@ -11,9 +11,9 @@ from ..models.model import Model
 from ..models.model_write import save_model
 from ..report.html import folded, paragraph, table
 from .diagnosis import ChannelFit, Diagnosis, Finding, Step
-from .report import write_report
-from .report_findings import STATUS, missing
-from .report_words import number, percent, unit_words, with_std, words
+from .report.findings import STATUS, missing
+from .report.page import write_report
+from .report.words import number, percent, unit_words, with_std, words
 
 # Colours come from the notebook, so that a result reads on its light page and on its dark one.
 _STYLE = """<style>

@@ -10,11 +10,11 @@ from ..models.floating.tree import FloatingTree
 from ..models.model import Model
 from ..models.rigid_body import RigidBody
 from ..models.snare.setup import SnareTree
-from .assembly import Assembly
-from .base_parameters import INERTIAL
-from .experiment import load_experiments, scales
+from .fitting.assembly import Assembly
+from .fitting.base_parameters import INERTIAL
+from .fitting.experiment import load_experiments, scales
 from .simulate_floating import simulate_floating
-from .snare_diagnose import simulate_capture
+from .snare.simulate import simulate_capture
 
 
 def simulate(model: Model, motion: str | Path | None) -> xr.Dataset:

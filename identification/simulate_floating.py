@@ -22,9 +22,9 @@ from ..models.rig.kinematics import far_end
 from ..models.rigid_body import RigidBody
 from ..recordings import JointKind, read_recording
 from ..recordings.condition import Motion, condition
-from .assembly import Assembly
-from .experiment import Experiment, scales
-from .floating_terms import outside, told, wheel_impulse, with_twist
+from .fitting.assembly import Assembly
+from .fitting.experiment import Experiment, scales
+from .fitting.floating_terms import outside, told, wheel_impulse, with_twist
 
 Array = NDArray[np.float64]
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from ..models.model import Placed
 from .diagnosis import ChannelFit, Finding
-from .report_words import words
+from .report.words import words
 
 
 def percent(share: float) -> str:

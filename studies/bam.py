@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..identification.encoder_diagnosis import PROVED
+from ..identification.links.diagnose import PROVED
 from ..models.effects import effects
 from ..models.model import Placed
 from ..models.model_file import load_model

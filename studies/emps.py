@@ -16,7 +16,7 @@ from ..errors import InputError
 from ..identification.diagnose import Answer, diagnose
 from ..identification.diagnosis import Diagnosis
 from ..identification.identify import identify
-from ..identification.report import write_report
+from ..identification.report.page import write_report
 from ..models.model_file import load_model
 from ..models.model_write import save_model
 from ..recordings import find_recording

@@ -15,13 +15,13 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
-from ..identification.assembly import Assembly
 from ..identification.diagnose import Answer, diagnose
-from ..identification.encoder_diagnosis import diagnose_links
-from ..identification.encoder_pair import Pair, fit_pair, held_out, load_links, pair_of
-from ..identification.encoder_search import starts
-from ..identification.experiment import Experiment, load_experiments, scales
-from ..identification.report import write_report
+from ..identification.fitting.assembly import Assembly
+from ..identification.fitting.experiment import Experiment, load_experiments, scales
+from ..identification.links.diagnose import diagnose_links
+from ..identification.links.pair import Pair, fit_pair, held_out, load_links, pair_of
+from ..identification.links.search import starts
+from ..identification.report.page import write_report
 from ..models.effects import effects
 from ..models.model import Placed
 from ..models.model_file import load_model

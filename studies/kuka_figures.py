@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from ..identification.encoder_pair import Pair
-from ..identification.encoder_search import library
+from ..identification.links.pair import Pair
+from ..identification.links.search import library
 from ..models.model import Model
 from ..report.drawing import AFTER, BEFORE, GREY, drawing, line, margins, svg
 

@@ -7,9 +7,9 @@ from scipy.interpolate import CubicSpline
 
 from bench.arm import random_arm
 from snarelab.errors import InputError
-from snarelab.identification.assembly import Assembly
-from snarelab.identification.base_parameters import base_parameters
-from snarelab.identification.experiment import Experiment, scales
+from snarelab.identification.fitting.assembly import Assembly
+from snarelab.identification.fitting.base_parameters import base_parameters
+from snarelab.identification.fitting.experiment import Experiment, scales
 from snarelab.models.effects import get_effect
 from snarelab.models.model import Placed
 from snarelab.models.rigid_body import RigidBody

@@ -14,7 +14,7 @@ from pydrake.multibody.tree import (
 )
 from scipy.spatial.transform import Rotation
 
-from snarelab.identification.base_parameters import base_parameters
+from snarelab.identification.fitting.base_parameters import base_parameters
 from snarelab.models.inertia import from_central
 from snarelab.models.rigid_body import RigidBody
 from snarelab.models.tree import Joint, Link, Tree

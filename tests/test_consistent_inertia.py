@@ -6,8 +6,8 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from snarelab.errors import InputError
-from snarelab.identification.base_parameters import base_parameters
-from snarelab.identification.consistent_inertia import consistent_inertia
+from snarelab.identification.fitting.base_parameters import base_parameters
+from snarelab.identification.fitting.consistent_inertia import consistent_inertia
 from snarelab.models.inertia import from_central, from_pseudo_inertia, is_physical, pseudo_inertia
 from snarelab.models.rigid_body import RigidBody
 from snarelab.models.tree import Joint, Link, Tree

@@ -196,9 +196,9 @@ def test_readme_says_what_can_be_named():
 def test_thresholds_are_those_of_the_code():
     table = rows(text("method.md"), "| constant | value |")
     assert len(table) > 10
-    sources = [path for folder in ("recordings", "identification") for path in (ROOT / folder).glob("*.py")]
+    sources = [path for folder in ("recordings", "identification") for path in (ROOT / folder).rglob("*.py")]
     # The search over captures has thresholds of its own, under names that mean the same.
-    sources = [path for path in sources if not path.name.startswith("snare_")]
+    sources = [path for path in sources if path.parent.name != "snare"]
     code = "\n".join(path.read_text(encoding="utf-8") for path in sources)
     for name, value, _ in table:
         defined = re.findall(rf"^{name.strip('`')} = (.*)$", code, re.MULTILINE)

@@ -5,7 +5,7 @@ import pytest
 import scipy.optimize
 import scipy.stats
 
-from snarelab.identification.evidence import KNOWN, Channel, Evidence
+from snarelab.identification.search.evidence import KNOWN, Channel, Evidence
 
 N_PARAMETERS, N_BLOCKS = 5, 6
 FREE = (np.full(2, -np.inf), np.full(2, np.inf))

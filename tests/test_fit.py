@@ -5,13 +5,13 @@ import pytest
 import scipy.optimize
 
 from bench.arm import random_arm
-from snarelab.identification.assembly import Assembly
-from snarelab.identification.base_parameters import base_parameters
-from snarelab.identification.experiment import Experiment, scales
-from snarelab.identification.fit import channel_rms, fit
-from snarelab.identification.least_squares import Normal, Objective
-from snarelab.identification.problem import Problem, split
-from snarelab.identification.projection import minimise_projected
+from snarelab.identification.fitting.assembly import Assembly
+from snarelab.identification.fitting.base_parameters import base_parameters
+from snarelab.identification.fitting.experiment import Experiment, scales
+from snarelab.identification.fitting.fit import channel_rms, fit
+from snarelab.identification.fitting.least_squares import Normal, Objective
+from snarelab.identification.fitting.problem import Problem, split
+from snarelab.identification.fitting.projection import minimise_projected
 from snarelab.models.effects import get_effect
 from snarelab.models.model import Placed
 from snarelab.models.rigid_body import RigidBody

@@ -12,9 +12,9 @@ from scipy.spatial.transform import Rotation
 from bench.fmu_models import Slave, everywhere, write_model
 from snarelab.cli import main
 from snarelab.fmu.export import export, model_equations
-from snarelab.identification.assembly import Assembly
-from snarelab.identification.experiment import load_experiments, scales
-from snarelab.identification.floating_terms import base_signals
+from snarelab.identification.fitting.assembly import Assembly
+from snarelab.identification.fitting.experiment import load_experiments, scales
+from snarelab.identification.fitting.floating_terms import base_signals
 from snarelab.identification.simulate import simulate
 from snarelab.models.model_file import load_model
 from snarelab.models.rigid_body import RigidBody

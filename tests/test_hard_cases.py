@@ -8,11 +8,11 @@ import pytest
 
 from proof.cases import ROUND, draw, planned_cases
 from proof.judge import judge
-from snarelab.identification.candidates import candidate_columns, variants
 from snarelab.identification.diagnose import diagnose
-from snarelab.identification.experiment import load_experiments, scales
-from snarelab.identification.screening import reliably_positive
-from snarelab.identification.search import assemble
+from snarelab.identification.fitting.experiment import load_experiments, scales
+from snarelab.identification.search.candidates import candidate_columns, variants
+from snarelab.identification.search.forward import assemble
+from snarelab.identification.search.screening import reliably_positive
 from snarelab.models.effects import get_effect
 from snarelab.models.model import Placed
 from snarelab.models.model_file import load_model

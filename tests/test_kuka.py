@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 import snarelab.studies
-from snarelab.identification.base_parameters import base_parameters
-from snarelab.identification.encoder_diagnosis import diagnose_links
-from snarelab.identification.encoder_pair import load_links, pair_of
-from snarelab.identification.experiment import load_experiments, scales
-from snarelab.identification.fit import fit
-from snarelab.identification.search import assemble
+from snarelab.identification.fitting.base_parameters import base_parameters
+from snarelab.identification.fitting.experiment import load_experiments, scales
+from snarelab.identification.fitting.fit import fit
+from snarelab.identification.links.diagnose import diagnose_links
+from snarelab.identification.links.pair import load_links, pair_of
+from snarelab.identification.search.forward import assemble
 from snarelab.models.model_file import load_model
 from snarelab.models.rigid_body import RigidBody
 from snarelab.studies.kuka import CHECK, STIFFNESS, spring_alone, springs_of_measured_torque

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.optimize
 
-from snarelab.identification.least_squares import Normal, Objective, minimise
+from snarelab.identification.fitting.least_squares import Normal, Objective, minimise
 
 INF = np.inf
 reference: Any = scipy.optimize.least_squares

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from bench.arm import random_arm
-from snarelab.identification.assembly import Assembly
-from snarelab.identification.experiment import Experiment, scales
-from snarelab.identification.locate import MOST_WINDOWS, locate
+from snarelab.identification.fitting.assembly import Assembly
+from snarelab.identification.fitting.experiment import Experiment, scales
+from snarelab.identification.search.locate import MOST_WINDOWS, locate
 from snarelab.models.effects import get_effect
 from snarelab.models.model import Placed
 from snarelab.models.rigid_body import RigidBody

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from snarelab.identification.noise import LONGEST, whitener
+from snarelab.identification.search.noise import LONGEST, whitener
 
 N = 6000
 WHOLE = [slice(0, N)]

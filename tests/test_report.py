@@ -29,7 +29,7 @@ from snarelab.identification.diagnosis import (
     Step,
     Trace,
 )
-from snarelab.identification.report import write_report
+from snarelab.identification.report.page import write_report
 
 JOINTS = range(1, 7)
 RECORDING = {"train": "excitation_a.csv", "holdout": "pick_and_place.csv"}

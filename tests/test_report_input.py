@@ -26,7 +26,7 @@ from snarelab.identification.diagnosis import (
     Step,
     Trace,
 )
-from snarelab.identification.report import write_report
+from snarelab.identification.report.page import write_report
 
 HOSTILE = '<script>alert("1")</script> & $x_1$ \'臂'
 

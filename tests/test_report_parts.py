@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from snarelab.identification.report_curves import binned
-from snarelab.identification.report_words import chance, number, percent, spans, unit_words, with_std, words
+from snarelab.identification.report.curves import binned
+from snarelab.identification.report.words import chance, number, percent, spans, unit_words, with_std, words
 from snarelab.report.drawing import thinned
 
 

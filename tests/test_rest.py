@@ -10,9 +10,9 @@ import pytest
 from scipy.signal import butter, lfilter, sosfilt
 
 from snarelab.identification.diagnose import diagnose
-from snarelab.identification.experiment import Bridge
-from snarelab.identification.noise import Whitener
-from snarelab.identification.rest import without
+from snarelab.identification.fitting.experiment import Bridge
+from snarelab.identification.search.noise import Whitener
+from snarelab.identification.search.rest import without
 from snarelab.models.model_file import load_model
 
 MASS, LENGTH, GRAVITY = 4.0, 0.4, 9.81

@@ -10,9 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from bench.arm import random_arm
 from bench.drake_rig import rig_torque
-from snarelab.identification.assembly import Assembly
-from snarelab.identification.base_parameters import base_parameters
-from snarelab.identification.experiment import Experiment, scales
+from snarelab.identification.fitting.assembly import Assembly
+from snarelab.identification.fitting.base_parameters import base_parameters
+from snarelab.identification.fitting.experiment import Experiment, scales
 from snarelab.models.effects import get_effect
 from snarelab.models.inertia import to_central
 from snarelab.models.model import Placed, places

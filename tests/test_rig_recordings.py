@@ -7,10 +7,10 @@ import pytest
 import xarray as xr
 
 from bench.drake_rig import rig_torque
-from snarelab.identification.assembly import Assembly
 from snarelab.identification.diagnose import diagnose
-from snarelab.identification.experiment import load_experiments, scales
-from snarelab.identification.fit import channel_rms
+from snarelab.identification.fitting.assembly import Assembly
+from snarelab.identification.fitting.experiment import load_experiments, scales
+from snarelab.identification.fitting.fit import channel_rms
 from snarelab.identification.identify import identify
 from snarelab.identification.simulate import simulate
 from snarelab.models.model_file import load_model

@@ -8,11 +8,11 @@ import pytest
 
 from bench.arm import random_arm
 from bench.concealed_arm import run_case
-from snarelab.identification.assembly import Assembly
-from snarelab.identification.candidates import variants
-from snarelab.identification.evidence import Channel, Evidence
-from snarelab.identification.experiment import Scales
-from snarelab.identification.search import _choose
+from snarelab.identification.fitting.assembly import Assembly
+from snarelab.identification.fitting.experiment import Scales
+from snarelab.identification.search.candidates import variants
+from snarelab.identification.search.evidence import Channel, Evidence
+from snarelab.identification.search.forward import _choose
 from snarelab.models.effects import get_effect
 from snarelab.models.model import Placed
 from snarelab.models.urdf import load_urdf

@@ -9,11 +9,13 @@ import pytest
 
 from snarelab.cli import main
 from snarelab.errors import InputError
-from snarelab.identification.snare_diagnose import diagnose_captures, identify_captures, simulate_capture
-from snarelab.identification.snare_fit import HANDLES
-from snarelab.identification.snare_library import library
-from snarelab.identification.snare_recording import Track, load_captures, sensed_by
-from snarelab.identification.snare_runs import Job, simulated
+from snarelab.identification.snare.diagnose import diagnose_captures
+from snarelab.identification.snare.handles import HANDLES
+from snarelab.identification.snare.identify import identify_captures
+from snarelab.identification.snare.library import library
+from snarelab.identification.snare.recording import Track, load_captures, sensed_by
+from snarelab.identification.snare.runs import Job, simulated
+from snarelab.identification.snare.simulate import simulate_capture
 from snarelab.models.effects import effects
 from snarelab.models.model import places
 from snarelab.models.model_file import load_model

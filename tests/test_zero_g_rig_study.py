@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from snarelab.identification.assembly import Assembly
 from snarelab.identification.diagnosis import Candidate
-from snarelab.identification.experiment import load_experiments, scales
+from snarelab.identification.fitting.assembly import Assembly
+from snarelab.identification.fitting.experiment import load_experiments, scales
 from snarelab.models.effects import get_effect
 from snarelab.models.model import Placed
 from snarelab.models.model_file import load_model

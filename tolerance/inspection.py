@@ -6,7 +6,8 @@ chosen by its error: a fifth of the processor time of equal steps, and the pin's
 """
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -23,9 +24,11 @@ from ..cosim.orbit_capture import (
 from ..cosim.orbit_capture import (
     Capture as Motion,
 )
+from ..models.snare.history import SnareHistory
 from ..models.snare.parameters import SnareParameters
 from .capture import Axis, Capture, Outcome, source_version
 from .enclosure import runs_through
+from .ground import DURATION, WAIT
 from .ground import SOURCES as SNARE_SOURCES
 
 AHEAD = 0.12
@@ -46,14 +49,42 @@ AXES = (
     Axis("friction", "1", "Coulomb's, between cable and pin", 0.1, 0.0, 0.5),
     Axis("joint_friction", "N*m", "Coulomb level of each joint, its other friction in proportion", 10.0, 1.0, 100.0),
     Axis("joint_stiffness", "N*m/rad", "of a spring that holds each joint where it was", 0.0, 0.0, 1e4),
+    WAIT,
 )
 
 
-def run(values: Mapping[str, float]) -> Outcome:
-    """One case; raises InputError for a pin that starts inside a cable, StepError where a step breaks down.
+@dataclass(frozen=True)
+class Simulated:
+    """One capture, simulated.
 
-    Where the pin's foot gets into the mouth, the target would have met the ring, which is not modelled: no result.
+    Parameters
+    ----------
+    motion : Motion
+    snare : SnareParameters
+    frames : list of (float, array (3, n_nodes, 3))
+        Time [s] and the cables' nodes in the world [m], fifteen times a second.
+    tensions : list of float
+        Largest force of a cable on its ring at each communication point [N].
+    on_pin : array (n, 3)
+        Impulse of the cables on the pin since the start [N·s].
     """
+
+    motion: Motion
+    snare: SnareParameters
+    frames: list[tuple[float, np.ndarray]]
+    tensions: list[float]
+    on_pin: np.ndarray
+
+    def seen(self) -> tuple[np.ndarray, np.ndarray]:
+        """Rows of the motion at the frames (n_frames,), and the cables there in the end effector's frame."""
+        rows = np.searchsorted(self.motion.times, [time - 1e-9 for time, _ in self.frames])
+        tip = self.motion.tip[rows]
+        nodes = np.array([nodes for _, nodes in self.frames]) - tip[:, None, None, 0]
+        return rows, np.einsum("tcni,tij->tcnj", nodes, tip[:, 3:])
+
+
+def simulate(values: Mapping[str, float]) -> Simulated:
+    """The capture itself; raises InputError for a pin that starts inside a cable, StepError if a step breaks down."""
     turn = Rotation.from_euler("xyz", [values["roll"], values["pitch"], values["yaw"]])
     foot = [AHEAD + values["axial"], values["radial_y"], values["radial_z"]]
     start = arrival("inspection", foot, turn, values["speed"])
@@ -64,33 +95,66 @@ def run(values: Mapping[str, float]) -> Outcome:
         start,
         resistance(values["joint_friction"], values["joint_stiffness"]),
         snare,
+        duration=DURATION + values["wait"],
         own_step=OWN_STEP,
         control=step_control(start, TOLERANCE, LARGEST),
         frames=frames,
         tensions=tensions,
     )
     motion = capture_of(done, "inspection")
-    deepest = float(motion.relative[:, 0].min()) - snare.ring_distance
+    return Simulated(motion, snare, frames, tensions, columns(done.recording, "snare.impulse.pin"))
+
+
+def run(values: Mapping[str, float]) -> Outcome:
+    """One case; see `simulate`.
+
+    Where the pin's foot gets into the mouth, the target would have met the ring, which is not modelled: no result.
+    """
+    done = simulate(values)
+    motion = done.motion
+    deepest = float(motion.relative[:, 0].min()) - done.snare.ring_distance
     if deepest < 0:
         return Outcome.failed(f"the pin's foot came {-1e3 * deepest:.2g} mm into the mouth: the target met the ring")
-    on_pin = replace(motion, impulse=columns(done.recording, "snare.impulse.pin")).mean_force(_WINDOW)[1]
+    forces = replace(motion, impulse=done.on_pin).mean_force(_WINDOW)[1]
     return Outcome(
-        enclosed=_encloses(motion, frames, snare),
+        enclosed=_encloses(done),
         radial_error=float(np.abs(motion.relative[-1, 1:]).max()),
         first_contact=np.nan if motion.first_contact is None else motion.first_contact,
-        peak_force=float(np.linalg.norm(on_pin, axis=1).max()),
-        peak_tension=max(tensions),
+        peak_force=float(np.linalg.norm(forces, axis=1).max()),
+        peak_tension=max(done.tensions),
     )
 
 
-def _encloses(motion: Motion, frames: list[tuple[float, np.ndarray]], snare: SnareParameters) -> bool:
+def _encloses(done: Simulated) -> bool:
     """At the last picture of the cables, which is at most 1/15 s before the end."""
-    last = int(np.searchsorted(motion.times, frames[-1][0] - 1e-9))
-    first, cables = (
-        (nodes - motion.tip[row, 0]) @ motion.tip[row, 3:] for row, (_, nodes) in ((0, frames[0]), (last, frames[-1]))
-    )
-    axis = -motion.tip[last, 3:].T @ motion.pin[last, 3:, 0]
-    return runs_through(first, cables, motion.relative[last], axis, snare)
+    rows, cables = done.seen()
+    last = rows[-1]
+    axis = -done.motion.tip[last, 3:].T @ done.motion.pin[last, 3:, 0]
+    return runs_through(cables[0], cables[-1], done.motion.relative[last], axis, done.snare)
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """What a scene reads of a `SnareHistory`, in the end effector's frame; where cables touch is not known here."""
+
+    times: np.ndarray
+    target_position: np.ndarray
+    target_quaternion: np.ndarray
+    cables: np.ndarray
+    contact_points: tuple[np.ndarray, ...]
+
+
+def film(values: Mapping[str, float]) -> str:
+    """A page that plays the capture, as seen from the end effector."""
+    from ..report.snare_scene import snare_scene
+
+    done = simulate(values)
+    rows, cables = done.seen()
+    tip, pin = done.motion.tip[rows, 3:], done.motion.pin[rows, 3:]
+    turned = Rotation.from_matrix(tip.transpose(0, 2, 1) @ pin).as_quat(canonical=True)
+    none = tuple(np.zeros((0, 3)) for _ in rows)
+    seen = _Seen(done.motion.times[rows], done.motion.relative[rows], np.roll(turned, 1, axis=1), cables, none)
+    return snare_scene(cast(SnareHistory, seen), done.snare).html(start=done.motion.first_contact or 0.0)
 
 
 SOURCES = (
@@ -109,4 +173,4 @@ SOURCES = (
 )
 """What the outcome of a case follows from."""
 
-CAPTURE = Capture("inspection", AXES, run, source_version(*SOURCES))
+CAPTURE = Capture("inspection", AXES, run, source_version(*SOURCES), film)

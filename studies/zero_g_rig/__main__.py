@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ...identification.diagnose import diagnose
 from ...identification.diagnosis import Diagnosis
-from ...identification.report import write_report
+from ...identification.report.page import write_report
 from ...models.model_file import load_model
 from ...models.model_write import save_model
 from ...models.rig.rig import built_in_rig

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import subspace_angles
 
-from ...identification.assembly import Assembly
-from ...identification.experiment import Experiment
-from ...identification.fit import Fit
+from ...identification.fitting.assembly import Assembly
+from ...identification.fitting.experiment import Experiment
+from ...identification.fitting.fit import Fit
 from ...models.model import Placed
 
 Array = NDArray[np.float64]

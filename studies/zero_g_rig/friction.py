@@ -14,11 +14,11 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ...identification.assembly import Assembly
-from ...identification.experiment import Experiment, scales
-from ...identification.fit import Fit, fit
-from ...identification.problem import Problem
-from ...identification.starts import best_start
+from ...identification.fitting.assembly import Assembly
+from ...identification.fitting.experiment import Experiment, scales
+from ...identification.fitting.fit import Fit, fit
+from ...identification.fitting.problem import Problem
+from ...identification.fitting.starts import best_start
 from ...models.effects import get_effect
 from ...models.hidden_state import evaluate_law
 from ...models.model import Model, Placed

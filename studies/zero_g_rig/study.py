@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...identification.assembly import Assembly
-from ...identification.experiment import Experiment, load_experiments, scales
-from ...identification.fit import Fit
+from ...identification.fitting.assembly import Assembly
+from ...identification.fitting.experiment import Experiment, load_experiments, scales
+from ...identification.fitting.fit import Fit
 from ...models.model import Model
 from ...models.rigid_body import RigidBody
 from .friction import Curve, curves, jointly, tip_to_base

@@ -1,0 +1,260 @@
+"""Torque of a model with its effects, and its derivative by every parameter, along recorded motion.
+
+The torque of one joint's channel is built from the inside out:
+
+    rigid body (links' inertial parameters, base parameters, link effects)
+    + link displaced behind a flexible joint
+    + joint effects (friction, drive train, harness)
+    → sensor effects of the channel, in the order of the model.
+
+Letters: n samples, J joints, P free parameters. A derivative is a list of blocks, one channel and a few parameters
+each: friction of one joint never costs the other channels anything.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...models.effect import Parameter
+from ...models.model import Placed
+from ...models.rig.kinematics import sling_of
+from ...models.rig.rig import Rig
+from ...models.tree import Tree
+from .base_parameters import INERTIAL, BaseParameters
+from .effect_terms import contributions
+from .experiment import Experiment, Scales
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Slot:
+    """One free parameter: what it belongs to, its unit, bounds and start."""
+
+    effect: str
+    at: str
+    name: str
+    unit: str
+    low: float
+    high: float
+    start: float
+
+    @property
+    def key(self) -> str:
+        """``effect.at.name``, as model files store it."""
+        return f"{self.effect}.{self.at}.{self.name}"
+
+
+@dataclass(frozen=True)
+class Block:
+    """Derivative of one channel by some parameters: ``values`` (n, k), for theta[index].
+
+    ``key`` is set where the values never change, so that they are filtered into the analysis band only once.
+    """
+
+    channel: int
+    index: NDArray[np.int_]
+    values: Array
+    key: object = None
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """A model evaluated along one recording.
+
+    ``load`` (n, J) is the rigid-body torque, ``tau`` (n, J) the modelled readings; ``passed`` holds, for each channel
+    with sensor effects, what they do to columns of the torque.
+    """
+
+    load: Array
+    tau: Array
+    blocks: list[Block]
+    passed: dict[int, list[Callable[[Array], Array]]]
+
+
+class Assembly:
+    """Parameters of a model, in one order, and the torque they give.
+
+    Parameters
+    ----------
+    tree : Tree
+    placed : sequence of Placed
+        Effects and where they act.
+    base : BaseParameters or None
+        Identified base inertial parameters; None trusts the tree's.
+    scales : mapping of str to Scales
+        Of every joint, from the training recordings.
+    values : mapping of str to float
+        Known parameters by key, to start from.
+    """
+
+    def __init__(
+        self,
+        tree: Tree,
+        placed: Sequence[Placed],
+        base: BaseParameters | None,
+        scales: Mapping[str, Scales],
+        values: Mapping[str, float],
+    ) -> None:
+        """Lay out the parameters; raises InputError for a link effect beside identified inertia."""
+        # What a link-side encoder does is no torque's business.
+        placed = tuple(p for p in placed if not p.at.startswith("q_link."))
+        self.tree, self.placed, self.base, self.scales = tree, placed, base, scales
+        self._joints = [j.name for j in tree.joints]
+        self._links = [link.name for link in tree.links]
+        self.speed_scales = [values.get(f"speed_scale.{j}", scales[j].speed) for j in self._joints]
+        self.phi = np.array(
+            [
+                values.get(f"inertia.{link.name}.{name}", value)
+                for link in tree.links
+                for name, value in zip(INERTIAL, link.phi, strict=True)
+            ]
+        )
+        slots: list[Slot] = []
+        if base is not None:
+            for (link, name, _), unit, value in zip(base.names, base.units, base.matrix @ self.phi, strict=True):
+                slots.append(Slot("inertia", link, name, unit, -np.inf, np.inf, float(value)))
+        self._full: list[Array] = []
+        self._free: list[NDArray[np.bool_]] = []
+        self._index: list[NDArray[np.int_]] = []
+        for p in placed:
+            if base is not None and p.effect.at == "link":
+                raise InputError(
+                    f"effect {p.effect.name} at {p.at} with inertia = 'free': the identified inertia already holds it; "
+                    f"use inertia = 'fixed', or leave the effect out"
+                )
+            free = np.array([x.name not in p.hold for x in p.effect.parameters])
+            full = np.array([values.get(f"{p.key}.{x.name}", self.usual(p, x)) for x in p.effect.parameters])
+            self._index.append(len(slots) + np.arange(np.count_nonzero(free)))
+            for x, start, is_free in zip(p.effect.parameters, full, free, strict=True):
+                if is_free:
+                    low, high = self.bounds(p, x)
+                    unit = self.unit(p, x)
+                    slots.append(Slot(p.effect.name, p.at, x.name, unit, low, high, float(np.clip(start, low, high))))
+            self._full.append(full)
+            self._free.append(free)
+        self.slots = tuple(slots)
+        self.start = np.array([s.start for s in slots], float)
+        self.low = np.array([s.low for s in slots], float)
+        self.high = np.array([s.high for s in slots], float)
+
+    def joint_of(self, p: Placed) -> int:
+        """Index of the joint that an effect's place belongs to."""
+        if isinstance(self.tree, Rig) and p.effect.at == "sling":
+            return sling_of(self.tree, p.at).link
+        if p.effect.at in ("link", "boom", "base"):
+            return self._links.index(p.at)
+        return self._joints.index(p.at.removeprefix("tau.").removeprefix("q."))
+
+    def scale(self, p: Placed, parameter: Parameter) -> float:
+        """What a parameter's bounds and grid are multiples of at this place."""
+        return self.scales[self._joints[self.joint_of(p)]].of(parameter.relative_to)
+
+    def bounds(self, p: Placed, parameter: Parameter) -> tuple[float, float]:
+        """Physical bounds of a parameter at a place."""
+        scale = self.scale(p, parameter)
+        return parameter.low * scale, parameter.high * scale
+
+    def unit(self, p: Placed, parameter: Parameter) -> str:
+        """A parameter's unit with the joint's torque and position units written out."""
+        torque, position = ("N", "m") if self.tree.joints[self.joint_of(p)].kind == "prismatic" else ("N*m", "rad")
+        channel = position if p.at.startswith("q.") else torque
+        return "".join({"T": torque, "S": position, "U": channel}.get(c, c) for c in parameter.unit)
+
+    def usual(self, p: Placed, parameter: Parameter) -> float:
+        """Start of a parameter: middle of its grid, or the value at which the effect vanishes."""
+        if parameter.grid:
+            return parameter.grid[len(parameter.grid) // 2] * self.scale(p, parameter)
+        return parameter.zero * self.scale(p, parameter)
+
+    def values(self, theta: Array) -> dict[str, float]:
+        """Every effect parameter by key, and the speed scales that laws refer to, as a model file stores them."""
+        speeds = {f"speed_scale.{j}": float(v) for j, v in zip(self._joints, self.speed_scales, strict=True)}
+        return speeds | {
+            f"{p.key}.{x.name}": float(value)
+            for k, p in enumerate(self.placed)
+            for x, value in zip(p.effect.parameters, self.parameters(k, theta), strict=True)
+        }
+
+    def keep(self, placed: Sequence[Placed], theta: Array) -> "Assembly":
+        """The same model with only some of its effects, to start from where it is."""
+        kept = Assembly(self.tree, placed, self.base, self.scales, self.values(theta))
+        kept.phi = self.phi
+        return kept
+
+    def parameters(self, k: int, theta: Array) -> Array:
+        """All parameters of the k-th placed effect, in its law's order."""
+        full = self._full[k].copy()
+        full[self._free[k]] = theta[self._index[k]]
+        return full
+
+    def index_of(self, p: Placed) -> NDArray[np.int_]:
+        """Positions in theta of a placed effect's free parameters."""
+        return self._index[[x.key for x in self.placed].index(p.key)]
+
+    def torque(self, experiment: Experiment, theta: Array) -> Array:
+        """Modelled reading of every torque channel (n, J) [N·m or N]."""
+        return self.evaluate(experiment, theta).tau
+
+    def residual(self, experiment: Experiment, theta: Array) -> tuple[Array, list[Block]]:
+        """Measured minus modelled torque in the analysis band (n_band, J), and the model's derivative blocks there."""
+        state = self.evaluate(experiment, theta)
+        banded = []
+        for block in state.blocks:
+            columns = None if block.key is None else experiment.store.get(block.key)
+            if columns is None:
+                columns = experiment.to_band(block.values, block.channel)
+                if block.key is not None:
+                    experiment.store[block.key] = columns
+            banded.append(Block(block.channel, block.index, columns))
+        return experiment.measured - experiment.all_to_band(state.tau), banded
+
+    def evaluate(self, experiment: Experiment, theta: Array) -> Evaluation:
+        """Rigid-body torque, readings and derivative blocks at full rate."""
+        load, rigid = self._rigid(experiment, theta)
+        tau, blocks = load.copy("F"), list(rigid)
+        passed: dict[int, list[Callable[[Array], Array]]] = {}
+        # Sensors read what all the others add up to, so they come last.
+        for k, p in sorted(enumerate(self.placed), key=lambda item: item[1].effect.at == "sensor"):
+            if p.effect.at == "link":
+                continue
+            j = self.joint_of(p)
+            terms, by_load, sense = contributions(
+                experiment, self.tree, p, j, load[:, j], tau[:, j], self.speed_scales[j], self.parameters(k, theta)
+            )
+            if sense is not None:
+                passed.setdefault(j, []).append(sense)
+                blocks = [Block(j, b.index, sense(b.values)) if b.channel == j else b for b in blocks]
+            if by_load is not None:
+                blocks += [Block(j, b.index, by_load[:, None] * b.values) for b in rigid if b.channel == j]
+            for channel, values, columns in terms:
+                tau[:, channel] += values
+                blocks.append(Block(channel, self._index[k], columns[:, self._free[k]]))
+        return Evaluation(load, tau, blocks, passed)
+
+    def _rigid(self, experiment: Experiment, theta: Array) -> tuple[Array, list[Block]]:
+        """Rigid-body torque (n, J) and its derivative blocks."""
+        n_joints = len(self._joints)
+        if self.base is not None:
+            n_base = len(self.base.names)
+            columns = experiment.regressor[:, :, self.base.columns]
+            blocks = [Block(c, np.arange(n_base), columns[:, c], ("base", c)) for c in range(n_joints)]
+            return columns @ theta[:n_base] - experiment.carried, blocks
+        key = ("rigid", self.phi.tobytes())
+        if key not in experiment.store:
+            experiment.store[key] = np.asfortranarray(experiment.regressor @ self.phi - experiment.carried)
+        load, blocks = experiment.store[key].copy("F"), []  # a joint's samples side by side
+        for k, p in enumerate(self.placed):
+            if p.effect.at != "link":
+                continue
+            j = self.joint_of(p)
+            terms, _, _ = contributions(
+                experiment, self.tree, p, j, load[:, j], load[:, j], self.speed_scales[j], self.parameters(k, theta)
+            )
+            for channel, values, columns in terms:
+                load[:, channel] += values
+                blocks.append(Block(channel, self._index[k], columns[:, self._free[k]]))
+        return load, blocks

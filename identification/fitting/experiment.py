@@ -1,0 +1,234 @@
+"""A conditioned recording with everything the rigid body contributes worked out once."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...models.floating.tree import CARRIERS, FloatingTree
+from ...models.model import Model
+from ...models.rig.kinematics import sling_map
+from ...models.rig.rig import Rig
+from ...models.rigid_body import RigidBody
+from ...recordings import JointKind, read_recording
+from ...recordings.condition import Motion, condition
+from .floating_terms import as_carriers, twist_noise, wheel_impulse, with_twist
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Bridge:
+    """Straight lines across runs of samples: the samples ``at`` (k,) lie the share ``part`` of the way from the samples
+    ``before`` to the samples ``after``.
+
+    Linear, and the same for measured and modelled torque and every column, so that what they have in common stays.
+    """
+
+    at: NDArray[np.int_]
+    before: NDArray[np.int_]
+    after: NDArray[np.int_]
+    part: Array
+
+    def __call__(self, x: Array) -> Array:
+        """Samples (n, ...) with the runs bridged."""
+        y, part = np.array(x, order="F"), self.part.reshape(-1, *(1,) * (x.ndim - 1))
+        y[self.at] = (1 - part) * x[self.before] + part * x[self.after]
+        return y
+
+
+@dataclass(frozen=True, eq=False)
+class Experiment:
+    """Motion of one recording and the rigid body's share of its torque.
+
+    ``n`` samples, ``J`` joints, ``L`` links; ``tension`` holds what slings of a rig were measured to pull, each (n,)
+    [N]; ``impulse`` (n, 3) is the angular impulse that reaction wheels were told to give a floating base by then, in
+    its axes [N·m·s]; ``store`` keeps columns that do not change while a model is fitted.
+    """
+
+    motion: Motion
+    body: RigidBody
+    tension: Mapping[str, Array] = field(default_factory=dict)
+    impulse: Array | None = None
+    store: dict[object, Any] = field(default_factory=dict, repr=False)
+    bridged: tuple[Bridge, ...] = ()
+    """For each channel, runs of samples that are no data; none by default."""
+
+    def to_band(self, x: Array, channel: int) -> Array:
+        """Samples (n, ...) of a channel, bridged where they are no data, in the analysis band (n_band, ...)."""
+        return self.motion.to_band(self.bridged[channel](x) if self.bridged else x)
+
+    def all_to_band(self, x: Array) -> Array:
+        """Samples of all channels (n, J), bridged where they are no data, in the analysis band (n_band, J)."""
+        if not self.bridged:
+            return self.motion.to_band(x)
+        return self.motion.to_band(np.stack([b(own) for b, own in zip(self.bridged, x.T, strict=True)], 1))
+
+    def with_bridges(self, bridges: tuple[Bridge, ...]) -> "Experiment":
+        """The same recording with runs of samples that are no data; what the rigid body gave is not worked out anew."""
+        made = replace(self, store={}, bridged=bridges)
+        shared = ("regressor", "mass_matrix", "tangent", "carried", "elapsed")
+        made.__dict__.update({name: getattr(self, name) for name in shared})
+        return made
+
+    @cached_property
+    def regressor(self) -> Array:
+        """Torque per inertial parameter (n, J, 10 L)."""
+        return self.body.regressor(self.motion.q, self.motion.qd, self.motion.qdd)
+
+    @cached_property
+    def mass_matrix(self) -> Array:
+        """Joint-space inertia at the nominal parameters (n, J, J)."""
+        return self.body.mass_matrix(self.motion.q)
+
+    @cached_property
+    def tangent(self) -> tuple[Array, Array]:
+        """Derivative of the nominal torque by position and by rate, each (n, J, J); slings move with the arm."""
+        gravity = np.zeros(3) if isinstance(self.body.tree, Rig) else None
+        return self.body.tangent(self.motion.q, self.motion.qd, self.motion.qdd, gravity=gravity)
+
+    @cached_property
+    def carried(self) -> Array:
+        """Torque that a rig's slings take off the joints (n, J) [N·m or N]; zero on an arm without slings.
+
+        On a floating base: the force and moment that its own momentum asks for, which its channels have as measured.
+
+        In balance that is the weight of the arm as the model gives it, so that all which differs from the model's
+        masses shows under gravity. A measured tension adds what it exceeds the balance by.
+        """
+        rig, q = self.body.tree, self.motion.q
+        if isinstance(rig, FloatingTree):
+            own = np.zeros_like(q)
+            columns = slice(10 * (CARRIERS - 1), 10 * CARRIERS)
+            own[:, :CARRIERS] = self.regressor[:, :CARRIERS, columns] @ rig.links[CARRIERS - 1].phi
+            return own
+        if not isinstance(rig, Rig):
+            return np.zeros_like(q)
+        total = self.body.torque(q, np.zeros_like(q), np.zeros_like(q))
+        for sling in rig.slings:
+            if sling.name in self.tension:
+                excess = self.tension[sling.name] - sling.tension
+                total -= sling_map(rig, sling, q)[:, :, 2] * excess[:, None]
+        return total
+
+    @cached_property
+    def measured(self) -> Array:
+        """Measured torque in the analysis band (n_band, J)."""
+        return self.all_to_band(self.motion.tau)
+
+    @cached_property
+    def elapsed(self) -> Array:
+        """Time from the recording's start (n,) [s]."""
+        return self.motion.time - self.motion.time[0]
+
+
+@dataclass(frozen=True)
+class Scales:
+    """What a joint does in the training recordings: peak speed, travel, peak torque; bounds and grids refer to them."""
+
+    speed: float
+    travel: float
+    torque: float
+
+    def of(self, kind: str) -> float:
+        """The scale a parameter's ``relative_to`` names."""
+        return {
+            "": 1.0,
+            "speed": self.speed,
+            "travel": self.travel,
+            "torque": self.torque,
+            "rate": self.torque / self.travel,
+        }[kind]
+
+
+def load_experiments(
+    model: Model, paths: Sequence[str | Path], body: RigidBody, band: float | None = None
+) -> list[Experiment]:
+    """Read and condition recordings for a model; all in one analysis band, the narrowest that any of them carries.
+
+    Raises
+    ------
+    InputError
+        Whatever is wrong with a recording.
+    """
+    kinds: dict[str, JointKind] = {j.name: j.kind for j in model.tree.joints}
+    datasets = [read_recording(path, model.signals, kinds) for path in paths]
+    measured = [_tensions(d, model) for d in datasets]
+    tree = model.tree
+    if isinstance(tree, FloatingTree):
+        datasets = [with_twist(d, tree) for d in datasets]
+    datasets = [_without_gaps_in(t, d) for t, d in zip(measured, datasets, strict=True)]
+    wanted = band or model.bandwidth
+    motions = [condition(d, model.joints, wanted) for d in datasets]
+    narrowest = min(m.band for m in motions)
+    if any(m.band > 1.01 * narrowest for m in motions):
+        motions = [condition(d, model.joints, narrowest) for d in datasets]
+    if isinstance(tree, FloatingTree):
+        return [
+            _balanced(
+                Experiment(
+                    as_carriers(m, tree), body, impulse=wheel_impulse(d, m), store={"twist_noise": twist_noise(d, tree)}
+                )
+            )
+            for m, d in zip(motions, datasets, strict=True)
+        ]
+    return [
+        Experiment(m, body, {name: np.interp(m.time, d["time"].values, x) for name, x in t.items()})
+        for m, d, t in zip(motions, datasets, measured, strict=True)
+    ]
+
+
+def _balanced(experiment: Experiment) -> Experiment:
+    """With what the floating base's own momentum asks for on the measured side."""
+    motion = experiment.motion
+    return replace(experiment, motion=replace(motion, tau=motion.tau - experiment.carried))
+
+
+def _tensions(dataset: xr.Dataset, model: Model) -> dict[str, Array]:
+    """Recorded tension of the model's slings, by the sling's name, each (all rows,) [N]."""
+    slings = model.tree.slings if isinstance(model.tree, Rig) else ()
+    names = [s.name for s in slings if f"tension.{s.name}" in dataset]
+    return {name: np.asarray(dataset[f"tension.{name}"].values, float) for name in names}
+
+
+def _without_gaps_in(tensions: Mapping[str, Array], dataset: xr.Dataset) -> xr.Dataset:
+    """The recording with positions missing wherever a tension is: conditioning then leaves the sample out."""
+    if not tensions:
+        return dataset
+    good = np.isfinite(list(tensions.values())).all(axis=0)
+    names = [name for name in dataset.data_vars if str(name).startswith("q.")]
+    return dataset.assign({name: dataset[name].where(xr.DataArray(good, dims="time")) for name in names})
+
+
+def demand_apart(recordings: Sequence[str | Path], holdout: str | Path) -> None:
+    """Refuse a held-out recording that is fitted too (InputError)."""
+    if Path(holdout).resolve() in [Path(r).resolve() for r in recordings]:
+        raise InputError(f"{holdout}: the holdout is also a recording to fit; hold out one that the fit does not see")
+
+
+def demand_torque(experiments: Sequence[Experiment]) -> None:
+    """Refuse a torque channel that reads zero throughout: nothing can be fitted to it (InputError)."""
+    for e in experiments:
+        for joint, tau in zip(e.motion.joints, e.motion.tau.T, strict=True):
+            if not tau.any():
+                raise InputError(
+                    f"{e.motion.path}: 'tau.{joint}' is zero in every row; record the torque, or map its column under "
+                    f"[signals] in the model file"
+                )
+
+
+def scales(experiments: Sequence[Experiment]) -> Mapping[str, Scales]:
+    """Peak speed, travel and peak torque of every joint over all recordings; never zero."""
+    found = {}
+    for k, joint in enumerate(experiments[0].motion.joints):
+        q, qd, tau = (np.concatenate([getattr(e.motion, s)[:, k] for e in experiments]) for s in ("q", "qd", "tau"))
+        found[joint] = Scales(
+            max(float(np.max(np.abs(qd))), 1e-9), max(float(np.ptp(q)), 1e-9), max(float(np.max(np.abs(tau))), 1e-9)
+        )
+    return found

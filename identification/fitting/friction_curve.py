@@ -1,0 +1,89 @@
+"""Friction over speed, with its uncertainty: what the recordings carry where single parameters mean little.
+
+Parameters of a friction law trade off against one another, and none may be known while their curve is. The band comes
+from the parameters' joint covariance S through the law's derivative G (the delta method): var f = diag(G S G').
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...models.hidden_state import evaluate_law, reads
+from ...models.model import Placed
+from .experiment import Experiment
+from .fit import Fit
+
+Array = NDArray[np.float64]
+
+POINTS = 61
+"""Speeds at which a curve is drawn, evenly over the speeds travelled and dense near rest."""
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionCurve:
+    """Friction at one place over the speeds that the joint travelled.
+
+    Parameters
+    ----------
+    at : str
+        The joint.
+    kind : "joint" or "slide"
+        Torque at the joint, or force at each contact of the hang units' slides that it moves.
+    effects : tuple of str
+        Effects that add up to it.
+    speed : array (POINTS,)
+        [rad/s or m/s]
+    value, std : array (POINTS,)
+        Friction and its standard deviation [unit]; the band is two of them either side.
+    unit : str
+    """
+
+    at: str
+    kind: str
+    effects: tuple[str, ...]
+    speed: Array
+    value: Array
+    std: Array
+    unit: str
+
+
+def friction_curves(found: Fit, experiments: list[Experiment] | tuple[Experiment, ...]) -> list[FrictionCurve]:
+    """Curve of every place whose friction depends on speed alone, over the speeds of the recordings."""
+    assembly = found.assembly
+    places: dict[tuple[str, str], list[tuple[int, Placed]]] = {}
+    for k, p in enumerate(assembly.placed):
+        friction = p.effect.family == "joint friction" or p.effect.at == "slide"
+        if friction and not p.effect.states and set(reads(p.effect)) <= {"qd", "speed_scale"}:
+            places.setdefault((p.effect.at, p.at), []).append((k, p))
+    curves = []
+    for (kind, at), members in places.items():
+        joint = assembly.joint_of(members[0][1])
+        speed = _speeds(experiments, joint)
+        signals = {"qd": speed, "speed_scale": np.full(len(speed), assembly.speed_scales[joint])}
+        value, slope = np.zeros(len(speed)), np.zeros((len(speed), len(found.theta)))
+        for k, p in members:
+            law = evaluate_law(p.effect, signals, assembly.parameters(k, found.theta))
+            free = [x.name not in p.hold for x in p.effect.parameters]
+            value += law.values[:, 0]
+            slope[:, assembly.index_of(p)] += law.by_parameter[:, 0][:, free]
+        std = np.sqrt(np.maximum(np.einsum("np,pq,nq->n", slope, found.covariance, slope), 0.0))
+        prismatic = assembly.tree.joints[joint].kind == "prismatic"
+        unit = "N" if kind == "slide" or prismatic else "N*m"
+        curves.append(FrictionCurve(at, kind, tuple(p.effect.name for _, p in members), speed, value, std, unit))
+    return curves
+
+
+def identifiable(found: Fit) -> NDArray[np.bool_]:
+    """Whether the recordings carry a parameter (P,): a standard deviation below its value, and no shape at a bound."""
+    shapes = {f"{p.key}.{x.name}" for p in found.assembly.placed for x in p.effect.parameters if x.grid}
+    is_shape = np.array([s.key in shapes for s in found.assembly.slots], bool)
+    return (found.std <= np.abs(found.theta)) & ~(is_shape & found.at_bound)
+
+
+def _speeds(experiments: list[Experiment] | tuple[Experiment, ...], joint: int) -> Array:
+    """Speeds travelled, closer together near rest, where friction bends."""
+    speeds = np.concatenate([e.motion.qd[:, joint] for e in experiments])
+    even = np.linspace(-1.0, 1.0, POINTS)
+    way = np.sign(even) * even**2
+    return np.where(way < 0, -way * min(float(speeds.min()), 0.0), way * max(float(speeds.max()), 0.0))

@@ -1,0 +1,158 @@
+"""A fit cut into the smallest problems that share no parameter, each with channels and parameters of its own.
+
+Friction of one joint says nothing about friction of another while the inertia is trusted: seven small problems settle
+each at its own pace, and none waits for, or is evaluated for, the slowest.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...models.hidden_state import rows
+from ...models.model import Placed
+from ...models.rig.kinematics import reached_joints
+from ...models.rig.rig import Rig
+from .assembly import Assembly, Block
+from .experiment import Experiment
+from .least_squares import Normal, Objective, Solution
+from .projection import minimise_projected
+from .rig_terms import PLACES
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int_]
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Some channels, and the part of a model that they depend on.
+
+    Parameters
+    ----------
+    assembly : Assembly
+        With the effects that reach these channels only; P parameters.
+    experiments : tuple of Experiment
+    channels : array (C,) of int
+    index : array (P,) of int
+        Where its parameters stand in the whole model's.
+    """
+
+    assembly: Assembly
+    experiments: tuple[Experiment, ...]
+    channels: Index
+    index: Index
+
+    @cached_property
+    def grids(self) -> list[list[tuple[int, Array]]]:
+        """Of each placed effect with free shape parameters: their positions in theta and starting values."""
+        found = []
+        for p in self.assembly.placed:
+            position = {self.assembly.slots[i].name: int(i) for i in self.assembly.index_of(p)}
+            own = [(position[x.name], x) for x in p.effect.parameters if x.grid and x.name in position]
+            if own:
+                found.append([(i, np.array(x.grid) * self.assembly.scale(p, x)) for i, x in own])
+        return found
+
+    @cached_property
+    def shapes(self) -> NDArray[np.bool_]:
+        """Whether the torque is nonlinear in a parameter (P,)."""
+        mask = np.zeros(len(self.index), bool)
+        mask[[i for grids in self.grids for i, _ in grids]] = True
+        return mask
+
+    def minimise(self, theta: Array, sigma: Array, tolerance: float = 1e-8) -> Solution:
+        """Best parameters from one start, channels weighted by 1 / sigma (C,)."""
+        return minimise_projected(self.objective(sigma), theta, self.shapes, tolerance=tolerance)
+
+    def objective(self, sigma: Array) -> Objective:
+        """What is minimised, channels weighted by 1 / sigma (C,)."""
+        return Objective(lambda x: self.normal(x, sigma), self.assembly.low, self.assembly.high)
+
+    def channel_fits(self, experiment: Experiment, theta: Array) -> Iterator[tuple[Array, Index, Array]]:
+        """Of each channel in band: residual (n_band,), parameters it depends on (k,), its derivative (n_band, k)."""
+        state = self.assembly.evaluate(experiment, theta)
+        for channel in self.channels:
+            banded = []
+            for b in state.blocks:
+                if b.channel != channel or not len(b.index):
+                    continue
+                columns = None if b.key is None else experiment.store.get(b.key)
+                if columns is None:
+                    columns = experiment.to_band(b.values, channel)
+                    if b.key is not None:
+                        experiment.store[b.key] = columns
+                banded.append(Block(b.channel, b.index, columns))
+            index, columns = gather(banded, channel)
+            residual = experiment.measured[:, channel] - experiment.to_band(state.tau[:, channel], channel)
+            yield residual, index, columns.reshape(len(residual), len(index))
+
+    def normal(self, theta: Array, sigma: Array) -> Normal:
+        """Cost, gradient and normal matrix, channels weighted by 1 / sigma (C,); inf where torque is not finite."""
+        size = len(theta)
+        cost, gradient, matrix = 0.0, np.zeros(size), np.zeros((size, size))
+        # A trial far out may overflow: that is an answer, not a fault.
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            for experiment in self.experiments:
+                for (residual, index, columns), s in zip(self.channel_fits(experiment, theta), sigma, strict=True):
+                    cost += 0.5 * float(residual @ residual) / s**2
+                    if len(index):
+                        gradient[index] -= columns.T @ residual / s**2
+                        matrix[np.ix_(index, index)] += columns.T @ columns / s**2
+        finite = np.isfinite(cost) and np.isfinite(gradient).all() and np.isfinite(matrix).all()
+        return Normal(cost if finite else np.inf, gradient, matrix)
+
+    def rms(self, theta: Array) -> Array:
+        """RMS residual of each of its channels in the analysis band (C,)."""
+        residuals = [
+            (e.measured - e.all_to_band(self.assembly.torque(e, theta)))[:, self.channels] for e in self.experiments
+        ]
+        return np.sqrt(np.mean(np.concatenate(residuals) ** 2, axis=0))
+
+
+def gather(blocks: Sequence[Block], channel: int) -> tuple[Index, Array]:
+    """Parameters that a channel depends on (k,) and its derivative by them (n, k), one column for each."""
+    own = [b for b in blocks if b.channel == channel and len(b.index)]
+    if not own:
+        return np.zeros(0, int), np.zeros((0, 0))
+    index = np.concatenate([b.index for b in own])
+    columns = np.concatenate([b.values for b in own], axis=1)
+    unique, inverse = np.unique(index, return_inverse=True)
+    if len(unique) == len(index):
+        return index, columns
+    return unique, columns @ np.eye(len(unique))[inverse]
+
+
+def reached(assembly: Assembly, p: Placed) -> tuple[int, ...]:
+    """Channels that a placed effect can change."""
+    tree = assembly.tree
+    if isinstance(tree, Rig) and p.effect.at in PLACES:
+        return reached_joints(tree, p.effect.at, p.at, rows(p.effect))
+    if p.effect.at == "base":
+        return rows(p.effect)
+    everywhere = p.effect.at == "link" or p.effect.acts_on == "position"
+    return tuple(range(tree.n_joints)) if everywhere else (assembly.joint_of(p),)
+
+
+def split(assembly: Assembly, experiments: Sequence[Experiment], theta: Array) -> list[Problem]:
+    """Cut a model's fit into problems that share no parameter; channels without any parameter are left out."""
+    blocks = assembly.evaluate(experiments[0], theta).blocks
+    label = np.arange(len(assembly.tree.joints))
+    owner: dict[int, int] = {}
+    for b in blocks:
+        for i in b.index:
+            label[label == label[b.channel]] = label[owner.setdefault(int(i), b.channel)]
+    problems = []
+    for value in dict.fromkeys(label[sorted(set(owner.values()))]):
+        channels = np.flatnonzero(label == value)
+        index = np.array(sorted(i for i, c in owner.items() if label[c] == value))
+        part = assembly if len(index) == len(theta) else _part(assembly, channels, theta)
+        problems.append(Problem(part, tuple(experiments), channels, index))
+    return problems
+
+
+def _part(assembly: Assembly, channels: Index, theta: Array) -> Assembly:
+    """The model with only what reaches some channels."""
+    placed = [p for p in assembly.placed if not set(reached(assembly, p)).isdisjoint(channels)]
+    return assembly.keep(placed, theta)

@@ -1,0 +1,1 @@
+"""Drives with an encoder on either side: what lies between motor and link."""

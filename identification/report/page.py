@@ -1,0 +1,34 @@
+"""The diagnosis as one self-contained HTML page for test engineers: verdict first, then the grounds for it."""
+
+from datetime import date
+from pathlib import Path
+
+from ...errors import InputError
+from ...files import written_whole
+from ...report.html import page
+from ..diagnosis import Diagnosis
+from .findings import STATUS, missing, verdict, where
+from .fit import notes, parameters, screened, shape, step_by_step, unseen
+
+
+def write_report(diagnosis: Diagnosis, path: str | Path) -> None:
+    """Write a diagnosis as one HTML file that needs nothing else: no script, and no request to anywhere.
+
+    The file appears whole or not at all. Raises InputError where it cannot be written.
+    """
+    path = Path(path)
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: the folder {path.parent} does not exist; make it, or choose another")
+    document = _document(diagnosis, date.today())
+    with written_whole(path) as part:
+        part.write_text(document, encoding="utf-8")
+
+
+def _document(diagnosis: Diagnosis, day: date) -> str:
+    parts = (missing, where, unseen, step_by_step, shape, screened, parameters, notes)
+    return page(
+        f"{diagnosis.model}: {STATUS[diagnosis.verdict]}",
+        verdict(diagnosis, day),
+        [part(diagnosis) for part in parts],
+        f"Written by snarelab. All residuals are measurement minus model, in the band 0 to {diagnosis.band:g} Hz.",
+    )

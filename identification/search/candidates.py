@@ -1,0 +1,213 @@
+"""Which effects could be missing, at which places, and the columns each would add to the torque."""
+
+from dataclasses import dataclass, replace
+from itertools import combinations, product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...models.effect import Parameter
+from ...models.effects import effects
+from ...models.floating.tree import n_carriers
+from ...models.model import Model, Placed, places
+from ...models.rig.rig import Rig
+from ..fitting.assembly import Assembly, Evaluation
+from ..fitting.effect_terms import contributions
+from ..fitting.experiment import Experiment
+
+Array = NDArray[np.float64]
+
+MOST_VARIANTS = 36
+"""Grid points of one effect at one place; a finer grid is thinned evenly."""
+
+
+MOST_COMBINED = 4
+"""Most columns of a link effect of which every combination is tried."""
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One effect at one place with its shape parameters set.
+
+    ``amplitudes`` are the parameters the law is linear in, whose columns are tried, between ``low`` and ``high``; where
+    there is none (a delay, a spring), the law's whole contribution is the one column. The place of a mass on a link has
+    its slope tried beside the mass, which makes (mass, mass * x, mass * y, mass * z) amplitudes.
+    """
+
+    placed: Placed
+    parameters: Array
+    amplitudes: NDArray[np.int_]
+    low: Array
+    high: Array
+
+    def subsets(self) -> list[NDArray[np.int_]]:
+        """Positions of the columns to try together: all and single ones; of a vector's few components, every set."""
+        n = max(len(self.amplitudes), 1)
+        parameters = [self.placed.effect.parameters[i] for i in self.amplitudes]
+        alone = {k for k, p in enumerate(parameters) if p.alone and not p.grid}
+        if not alone:
+            return [np.arange(n)]
+        counts = range(1, n + 1) if self.placed.effect.at == "link" and n <= MOST_COMBINED else sorted({1, n})
+        return [np.array(some) for k in counts for some in combinations(range(n), k) if alone & set(some)]
+
+    def start(self, amplitudes: Array) -> Array:
+        """All parameters of the effect (p,) for amplitudes found."""
+        full = self.parameters.copy()
+        if len(self.amplitudes):
+            full[self.amplitudes] = amplitudes
+            slopes = [i for i in self.amplitudes if self.placed.effect.parameters[i].grid]
+            masses = [i for i in self.amplitudes if not self.placed.effect.parameters[i].grid]
+            full[slopes] /= np.max(full[masses], initial=0.0) or 1.0
+        return full
+
+
+def library(model: Model) -> list[Placed]:
+    """Every effect at every place that the model does not have yet and its kind of inertia leaves room for."""
+    have = {p.key for p in model.effects}
+    if f"slide_friction.{model.joints[0]}" in have:
+        # The first joint's slides act on it alone, so that the same law at the joint is the same column.
+        makkar = effects()["makkar_friction"]
+        have |= {f"{name}.{model.joints[0]}" for name in (makkar.name, *makkar.contains)}
+    found = []
+    for effect in effects().values():
+        if effect.at == "link" and model.inertia == "free":
+            continue  # the identified inertia already holds whatever a link effect could add
+        spots = places(effect, model.tree)
+        if effect.name == "sensor_delay":
+            # A torque channel is late or, where the encoder is late, early: one of the two.
+            arm = model.joints[n_carriers(model.tree) :]
+            other = {f"tau.{j}": f"q.{j}" for j in arm} | {f"q.{j}": f"tau.{j}" for j in arm}
+            spots = tuple(at for at in other if f"{effect.name}.{other[at]}" not in have)
+        found += [Placed(effect, at) for at in spots if f"{effect.name}.{at}" not in have]
+    return found
+
+
+def variants(assembly: Assembly, placed: Placed) -> list[Variant]:
+    """The grid over an effect's shape parameters at a place, amplitudes at zero."""
+    axes, amplitudes = [], []
+    for i, p in enumerate(placed.effect.parameters):
+        scale = assembly.scale(placed, p)
+        axes.append([g * scale for g in p.grid] or [p.zero * scale])
+        if _is_linear(p):
+            amplitudes.append(i)
+    masses = [i for i in amplitudes if not placed.effect.parameters[i].grid]
+    if len(masses) < len(amplitudes):  # slopes are taken at one kilogram
+        axes = [[1.0] if i in masses else axis for i, axis in enumerate(axes)]
+    index = np.array(amplitudes, int)
+    bounds = [assembly.bounds(placed, placed.effect.parameters[i]) for i in index] or [(0.0, np.inf)]
+    low, high = (np.array(x, float) for x in zip(*bounds, strict=True))
+    grid = list(product(*axes))
+    step = -(-len(grid) // MOST_VARIANTS)
+    found = [Variant(placed, np.array(g, float), index, low, high) for g in grid[::step]]
+    if 1 < len(masses) < len(amplitudes):
+        # A mass for each axis: one that moves along a single axis has slopes of its own.
+        others = [[], *([i for i in masses if i != alone] for alone in masses)]
+        found = [replace(v, parameters=_with_zeros(v.parameters, where)) for v in found for where in others]
+    return found
+
+
+def _with_zeros(parameters: Array, where: list[int]) -> Array:
+    changed = parameters.copy()
+    changed[where] = 0.0
+    return changed
+
+
+def candidate_columns(
+    assembly: Assembly, experiment: Experiment, state: Evaluation, variant: Variant
+) -> list[tuple[int, Array]]:
+    """What a variant adds to each channel it reaches, in the analysis band: (channel, (n_band, k))."""
+    placed = variant.placed
+    joint = assembly.joint_of(placed)
+    effect = placed.effect
+    key = None
+    if effect.at == "joint" and not effect.states and not state.passed.get(joint):
+        key = ("candidate", placed.key, variant.parameters.tobytes(), variant.amplitudes.tobytes())
+        if key in experiment.store:
+            return [(joint, experiment.store[key])]
+    terms, by_load, _ = contributions(
+        experiment,
+        assembly.tree,
+        placed,
+        joint,
+        state.load[:, joint],
+        state.tau[:, joint],
+        assembly.speed_scales[joint],
+        variant.parameters,
+    )
+    found = []
+    for channel, values, columns in terms:
+        own = columns[:, variant.amplitudes] if len(variant.amplitudes) else values[:, None]
+        if effect.at != "sensor":
+            for passed in state.passed.get(channel, ()):
+                own = passed(own)
+        found.append((channel, experiment.to_band(own, channel)))
+    if key is not None and by_load is None:
+        experiment.store[key] = found[0][1]
+    return found
+
+
+def free_parameters(assembly: Assembly, experiment: Experiment, state: Evaluation, variant: Variant) -> tuple[str, ...]:
+    """Names of the parameters that matter once the variant's amplitudes in ``low`` are switched on.
+
+    A shape that only acts through an amplitude left at zero has no derivative, and is not counted.
+    """
+    placed = variant.placed
+    joint = assembly.joint_of(placed)
+    parameters = variant.parameters.copy()
+    parameters[variant.amplitudes] = 1.0
+    terms, _, _ = contributions(
+        experiment,
+        assembly.tree,
+        placed,
+        joint,
+        state.load[:, joint],
+        state.tau[:, joint],
+        assembly.speed_scales[joint],
+        parameters,
+    )
+    moves = np.sum([np.sum(columns**2, axis=0) for _, _, columns in terms], axis=0) > 0
+    amplitudes = {p.name for p in placed.effect.parameters if _is_linear(p) and len(variant.amplitudes)}
+    on = {placed.effect.parameters[i].name for i in variant.amplitudes}
+    return tuple(
+        p.name
+        for p, moving in zip(placed.effect.parameters, moves, strict=True)
+        if moving and (p.name in on or p.name not in amplitudes)
+    )
+
+
+def _is_linear(parameter: Parameter) -> bool:
+    """Whether a column stands for the parameter: an amplitude, or a mass's place, whose grid is its origin alone."""
+    return not parameter.grid or parameter.grid == (0.0,)
+
+
+def smooth_columns(experiment: Experiment, state: Evaluation, joint: int, pieces: int = 8) -> Array:
+    """Smooth nameless curves on one channel (n_band, k): over position, speed, load and time, as hat functions."""
+    motion = experiment.motion
+    coordinates = (motion.q[:, joint], motion.qd[:, joint], state.load[:, joint], experiment.elapsed)
+    return motion.to_band(np.concatenate([_hats(x, pieces) for x in coordinates], axis=1))
+
+
+def nameless_columns(experiment: Experiment, state: Evaluation, joint: int) -> dict[str, Array]:
+    """Curves that no effect has a name for, on one channel, by the words for what they run over (n_band, k)."""
+    motion, found = experiment.motion, {}
+    found["position, speed, load and time"] = smooth_columns(experiment, state, joint)
+    slow, speed = _hats(experiment.elapsed, 8), motion.qd[:, joint, None]
+    found["speed, changing with time,"] = experiment.to_band(slow * speed, joint)
+    if isinstance(experiment.body.tree, Rig) or n_carriers(experiment.body.tree) or not np.ptp(motion.q[:, joint]):
+        return found  # on a suspension or a floating base every joint moves what carries the others
+    forth = 0.5 + 0.5 * np.tanh(speed / (1e-2 * np.max(np.abs(speed))))
+    found["direction, changing with time,"] = experiment.to_band(slow * (2 * forth - 1), joint)
+    local = _hats(motion.q[:, joint], 24)
+    either = np.concatenate([forth * local, (1 - forth) * local], axis=1)
+    found["position, apart for either direction,"] = experiment.to_band(either, joint)
+    for c, other in enumerate(motion.joints):
+        if c != joint and np.ptp(motion.q[:, c]):
+            curves = np.concatenate([_hats(motion.q[:, c], 8), _hats(motion.qd[:, c], 8)], axis=1)
+            found[f"position and speed of {other}"] = experiment.to_band(curves, joint)
+    return found
+
+
+def _hats(x: Array, pieces: int) -> Array:
+    """Piecewise linear basis (n, k) over a coordinate, knots at its range's even steps."""
+    at = np.linspace(np.min(x), np.max(x), pieces) if np.ptp(x) > 0 else np.zeros(0)
+    return np.stack([np.interp(x, at, row) for row in np.eye(len(at))], axis=1) if len(at) else np.zeros((len(x), 0))

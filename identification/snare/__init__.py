@@ -1,0 +1,1 @@
+"""Capture recordings: effects of the snare by simulation in the loop."""

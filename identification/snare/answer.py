@@ -1,0 +1,284 @@
+"""What a search found in captures, in words and numbers: the `Diagnosis` that JSON, report and tests share."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from ...models.model import Model
+from ...models.snare.setup import APPLIED, SnareTree
+from ..diagnosis import (
+    Candidate,
+    ChannelFit,
+    Diagnosis,
+    Estimate,
+    Finding,
+    Limit,
+    Misfit,
+    Moved,
+    Rival,
+    Step,
+    Trace,
+)
+from ..reliability import probability as reliability
+from ..report.words import words
+from ..wording import experiment_sentence, percent
+from .channels import channel_errors, channels, modelled
+from .comparison import QUARTER, SLOW, variances
+from .fit import Fit, spread
+from .handles import bounds, handle_of, key_of
+from .library import absent
+from .locate import locate_capture
+from .recording import Capture
+from .search import Named, Searched
+
+BAND = 1 / (2 * QUARTER)
+"""[Hz] What means over a quarter of a second hold."""
+LEFT_OVER = 0.25
+"""A model without anything to name that leaves this share of the motion is told to miss something, ..."""
+VISIBLE = 1e-3
+"""... if that is 1 mm, too [m]."""
+LIKELY = 0.005
+"""A rival that is less probable is not listed, where the recordings tell it apart."""
+
+
+def report_on(
+    model: Model, found: Searched, train: Sequence[Capture], locked: Sequence[Capture], seconds: float, runs: int
+) -> Diagnosis:
+    """Put everything into words and numbers.
+
+    Parameters
+    ----------
+    model : Model
+        As it was.
+    found : Searched
+    train, locked : sequences of Capture
+    seconds, runs : float, int
+        What the search took [s], and the simulations in it.
+    """
+    fits = _fits(found, train, locked)
+    findings = tuple(_finding(n, found, train, locked) for n in found.named if n.trial.placed.effect.name in APPLIED)
+    corrected = [
+        f"{p.effect.name} = {found.last.values[key_of(p)]:.4g} {p.effect.parameters[0].unit}"
+        for p in found.last.placed
+        if p.effect.name not in APPLIED
+    ]
+    description = "" if findings else _unexplained(fits)
+    verdict = "missing_physics" if findings else "unknown_effect" if description else "adequate"
+    notes = [f"{Path(c.path).name}: {note}" for c in (*train, *locked) for note in c.notes]
+    notes += [
+        f"{p.effect.name} at {p.at} passed on the captures fitted but made the held-out one no better: not named"
+        for p in found.rejected
+    ]
+    notes += [
+        "positions and forces are compared as means over 0.25 s, and the force's chatter by its size: "
+        "how cables chatter on the pin depends on everything",
+        f"{runs} captures were simulated in {seconds:.0f} s",
+    ]
+    keys = {n.trial.placed.key for n in found.named}
+    candidates = tuple(
+        Candidate(t.placed.effect.name, t.placed.at, float(t.explained), float(t.score), t.placed.key in keys)
+        for t in sorted(found.opening, key=lambda t: -t.explained)
+        if np.isfinite(t.score)
+    )
+    return Diagnosis(
+        verdict,
+        _sentence(findings, fits, description) + _corrected(corrected),
+        description,
+        model.name,
+        findings,
+        locate_capture(found, train),
+        fits,
+        _steps(found, train, locked),
+        candidates,
+        _moved(model, found, train),
+        _traces(found, train, locked),
+        _limits(model, found, train),
+        tuple(notes),
+        BAND,
+    )
+
+
+def estimates(captures: Sequence[Capture], found: Fit) -> dict[str, dict[str, Estimate]]:
+    """Parameters by the effect's key and their own name."""
+    low, high = bounds(found.placed)
+    std = spread(captures, found)
+    made: dict[str, dict[str, Estimate]] = {}
+    for p, x, s, a, b in zip(found.placed, found.x, std, low, high, strict=True):
+        (parameter,) = p.effect.parameters
+        bound = bool(min(x - a, b - x) < 1e-6 * handle_of(p).step)
+        made[p.key] = {parameter.name: Estimate(found.values[key_of(p)], float(s), parameter.unit, bound)}
+    return made
+
+
+def _finding(named: Named, found: Searched, train: Sequence[Capture], locked: Sequence[Capture]) -> Finding:
+    placed = named.trial.placed
+    right = reliability(named.margin)
+    rivals = tuple(
+        Rival(
+            r.placed.effect.name,
+            r.placed.at,
+            r.probability * right,
+            r.separable,
+            experiment_sentence(placed, r.placed),
+        )
+        for r in named.rivals
+        if r.probability >= LIKELY or not r.separable
+    )
+    pairs = zip(channel_errors(locked, named.held_before), channel_errors(locked, named.held_after), strict=True)
+    before, after = max(pairs, key=lambda e: e[0].relative - e[1].relative)
+    what = placed.effect.sentence
+    evidence = (
+        f"{what[:1].upper()}{what[1:]}: it explains {percent(named.trial.explained)} of what the model so far left "
+        f"over; taking it out again raises the error of {before.channel} on the held-out capture from "
+        f"{_size(after.rms, after.unit)} to {_size(before.rms, before.unit)}."
+    )
+    values = estimates(train, found.last)[placed.key]
+    return Finding(placed.effect.name, placed.at, named.margin, named.margin * right, values, evidence, rivals)
+
+
+def _size(value: float, unit: str) -> str:
+    return f"{1e3 * value:.3g} mm" if unit == "m" else f"{value:.3g} {unit}"
+
+
+def _fits(found: Searched, train: Sequence[Capture], locked: Sequence[Capture]) -> tuple[ChannelFit, ...]:
+    fitted = _misfits(train, found.first, found.last)
+    held = _misfits(locked, found.held_first, found.held_last)
+    made = []
+    for name, (unit, misfit) in fitted.items():
+        if name not in held:
+            continue
+        body = next((b for b, s in train[0].sensors.items() if name.startswith(f"force.{s}.")), "position")
+        noise = train[0].noise[body] / SLOW**0.5
+        made.append(ChannelFit(name, unit, misfit, held[name][1], float(noise)))
+    return tuple(made)
+
+
+def _misfits(captures: Sequence[Capture], before: Fit, after: Fit) -> dict[str, tuple[str, Misfit]]:
+    """Unit and misfits by channel."""
+    pairs = zip(channel_errors(captures, before), channel_errors(captures, after), strict=True)
+    return {a.channel: (a.unit, Misfit(a.rms, b.rms, a.relative, b.relative)) for a, b in pairs}
+
+
+def _unexplained(fits: Sequence[ChannelFit]) -> str:
+    """Motion that is left without a name, in words; empty where it is too little."""
+    positions = [f for f in fits if f.unit == "m"]
+    largest = max(f.holdout.rms_before / max(f.holdout.relative_before, 1e-12) for f in positions)
+    found = [
+        f"{_size(f.train.rms_after, 'm')} of {f.channel}"
+        for f in positions
+        if f.train.rms_after > max(LEFT_OVER * largest, VISIBLE) and f.holdout.rms_after > VISIBLE
+    ]
+    if not found:
+        return ""
+    return f"{' and '.join(found)} are left that no effect of a capture explains: check the set-up's sizes and masses"
+
+
+def _sentence(findings: Sequence[Finding], fits: Sequence[ChannelFit], description: str) -> str:
+    worst = max(fits, key=lambda f: f.holdout.relative_before - f.holdout.relative_after)
+    if findings:
+        named = [f"{words(f.name)} at {f.at}" for f in findings]
+        listed = named[0] if len(named) == 1 else f"{', '.join(named[:-1])} and {named[-1]}"
+        return (
+            f"The model leaves out {listed}. With that added, the error of {worst.channel} on the capture that the fit "
+            f"never saw falls from {_size(worst.holdout.rms_before, worst.unit)} to "
+            f"{_size(worst.holdout.rms_after, worst.unit)}."
+        )
+    if description:
+        return f"Something is missing that no effect of the vocabulary explains: {description}."
+    worst = max((f for f in fits if f.unit == "m"), key=lambda f: f.holdout.rms_before)
+    return (
+        "The model is adequate: nothing is left out that these captures can show. On the capture that the fit never "
+        f"saw, the error of {worst.channel} is {_size(worst.holdout.rms_before, worst.unit)}."
+    )
+
+
+def _corrected(numbers: Sequence[str]) -> str:
+    if not numbers:
+        return ""
+    return f" Numbers of the set-up that the model file does not give are better taken as {', '.join(numbers)}."
+
+
+def _relative(captures: Sequence[Capture], found: Fit) -> float:
+    """RMS over motion and force of what is left, each relative to all of its kind."""
+    shares = []
+    errors = channel_errors(captures, found)
+    for unit in {e.unit for e in errors}:
+        left = sum(e.rms**2 for e in errors if e.unit == unit)
+        whole = sum(e.reference**2 for e in errors if e.unit == unit)
+        shares.append(left / max(whole, 1e-300))
+    return float(np.sqrt(np.mean(shares)))
+
+
+def _steps(found: Searched, train: Sequence[Capture], locked: Sequence[Capture]) -> tuple[Step, ...]:
+    lines = [Step("model as given", _relative(train, found.first), _relative(locked, found.held_first))]
+    for n in found.named:
+        label = f"+ {n.trial.placed.effect.name} at {n.trial.placed.at}"
+        lines.append(Step(label, _relative(train, n.trial.fit), _relative(locked, n.held_after)))
+    return tuple(lines)
+
+
+def _moved(model: Model, found: Searched, train: Sequence[Capture]) -> tuple[Moved, ...]:
+    after = estimates(train, found.last)
+    made = []
+    for n in found.named:
+        p = n.trial.placed
+        if p.effect.name not in APPLIED:
+            (now,) = after[p.key].values()
+            usual = handle_of(p).value(absent(model, p))
+            made.append(Moved(f"capture.{p.effect.name}", now.unit, usual, now.value, now.std))
+    for p, x in zip(found.first.placed, found.first.x, strict=True):
+        (now,) = after[p.key].values()
+        made.append(Moved(key_of(p), now.unit, handle_of(p).value(float(x)), now.value, now.std))
+    return tuple(made)
+
+
+def _traces(found: Searched, train: Sequence[Capture], locked: Sequence[Capture]) -> tuple[Trace, ...]:
+    made = []
+    sets: tuple[tuple[Literal["train", "holdout"], Sequence[Capture], Fit, Fit], ...] = (
+        ("train", train, found.first, found.last),
+        ("holdout", locked, found.held_first, found.held_last),
+    )
+    for role, captures, before, after in sets:
+        for c, old, new in zip(captures, before.tracks, after.tracks, strict=True):
+            for channel, a, b in zip(channels(c), modelled(c, old), modelled(c, new), strict=True):
+                known = np.isfinite(channel.measured) & np.isfinite(channel.place)
+                speed = np.gradient(channel.place, channel.times)
+                columns = (x[known] for x in (channel.times, channel.place, speed, channel.measured, a, b))
+                made.append(Trace(Path(c.path).name, role, channel.name, channel.unit, *columns))
+    return tuple(made)
+
+
+def _limits(model: Model, found: Searched, train: Sequence[Capture]) -> tuple[Limit, ...]:
+    """Smallest value of each effect that would have been seen: what it changes grows in proportion to its handle."""
+    named = {n.trial.placed.key for n in found.named}
+    by = variances(train, found.last.residuals)
+    made = []
+    for t in found.opening:
+        if t.placed.key in named or t.placed.effect.name not in APPLIED or not t.fit.residuals:
+            continue
+        handle = handle_of(t.placed)
+        start = absent(model, t.placed)
+        moved = float(t.fit.x[-1]) - start
+        # What it changes, its handle moved so far; what was there stands where it is best with it.
+        pairs = zip(found.first.residuals, t.fit.residuals, strict=True)
+        energy = sum(0.5 * float(np.sum((a[k] - b[k]) ** 2)) / by[k] for a, b in pairs for k in a)
+        if abs(moved) < 1e-9 or energy <= 0:
+            continue
+        x = start + moved * float(np.sqrt(found.bar / energy))
+        if handle.low <= x <= handle.high:
+            effect, value = t.placed.effect, float(handle.value(x))
+            (parameter,) = effect.parameters
+            made.append(Limit(effect.name, t.placed.at, parameter.name, value, parameter.unit))
+    return tuple(made)
+
+
+def with_found(model: Model, found: Fit) -> Model:
+    """The model with what was found: effects, their values, and numbers of the set-up."""
+    assert isinstance(model.tree, SnareTree)
+    placed = tuple(p for p in found.placed if p.effect.name in APPLIED)
+    values = {key_of(p): found.values[key_of(p)] for p in placed}
+    tree = replace(model.tree, setup=model.tree.setup.corrected(found.values))
+    return replace(model, tree=tree, effects=placed, values={**model.values, **values})

@@ -1,0 +1,81 @@
+"""Every parameter of a capture's effects from recordings, with its standard deviation."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...models.model import Model
+from .answer import estimates, with_found
+from .channels import channel_errors
+from .fit import Fit, evaluate, fit, normal, with_slopes
+from .recording import Capture
+from .search import start_at
+from .sets import sets_of
+
+STEPS = 8
+"""Most steps of the fit."""
+
+
+@dataclass(frozen=True)
+class IdentifiedCaptures:
+    """A fit of captures, the model with its values, and the recordings."""
+
+    model: Model
+    fit: Fit
+    train: tuple[Capture, ...]
+    holdout: tuple[Capture, ...]
+    held: Fit | None
+
+    def to_json(self) -> dict[str, Any]:
+        """The published form."""
+        made = estimates(self.train, self.fit)
+        parameters = [
+            {
+                "effect": p.effect.name,
+                "at": p.at,
+                "name": name,
+                "value": e.value,
+                "std": e.std if np.isfinite(e.std) else None,
+                "unit": e.unit,
+                "at_bound": e.at_bound,
+                "identifiable": bool(np.isfinite(e.std)),
+            }
+            for p in self.fit.placed
+            for name, e in made[p.key].items()
+        ]
+        fits: dict[str, Any] = {}
+        for role, captures, found in (("train", self.train, self.fit), ("holdout", self.holdout, self.held)):
+            if found is not None:
+                for error in channel_errors(captures, found):
+                    entry = fits.setdefault(error.channel, {})
+                    entry[role] = {"rms": error.rms, "relative": error.relative}
+                    entry["unit"] = error.unit
+        matrix = normal(self.train, self.fit)[1] if len(self.fit.x) else np.eye(1)
+        notes = [f"{Path(c.path).name}: {note}" for c in (*self.train, *self.holdout) for note in c.notes]
+        return {
+            "model": self.model.name,
+            "parameters": parameters,
+            "fit": fits,
+            "condition": float(min(np.linalg.cond(matrix), 1e300)),
+            "notes": notes,
+        }
+
+
+def identify_captures(
+    model: Model,
+    recordings: Sequence[str | Path],
+    holdout: Sequence[str | Path] = (),
+    *,
+    progress: Callable[[str], None] = lambda _: None,
+    jobs: int | None = None,
+) -> IdentifiedCaptures:
+    """Fit every parameter of a capture's effects; arguments and errors as `diagnose_captures`."""
+    progress("reading the recordings")
+    with sets_of(model, recordings, holdout, jobs) as (train, locked):
+        progress("fitting the effects' parameters with the simulation in the loop")
+        found = with_slopes(train, fit(train, start_at(model, train), STEPS))
+        held = evaluate(locked, found.placed, [found.x])[0] if holdout else None
+    return IdentifiedCaptures(with_found(model, found), found, tuple(train.captures), tuple(locked.captures), held)

@@ -1,0 +1,179 @@
+"""Motor and link encoder of arms that MuJoCo moved: what makes the two differ is named, and nothing else is.
+
+Delays, scales and zeros are put on the link's encoder with splines and plain arithmetic, springs and play are MuJoCo's:
+none of it is snarelab's own law.
+"""
+
+import json
+import zipfile
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+
+from bench.arm import random_arm
+from bench.lugre import LuGre
+from bench.motion import fourier_motion, point_to_point_motion
+from bench.mujoco_plant import Plant, simulate, write_csv
+from bench.parts import Elasticity
+from snarelab.cli import main
+from snarelab.identification.diagnose import diagnose
+from snarelab.identification.fitting.experiment import load_experiments, scales
+from snarelab.identification.fitting.fit import fit
+from snarelab.identification.links.diagnose import diagnose_links
+from snarelab.identification.search.forward import assemble
+from snarelab.models.model_file import load_model
+from snarelab.models.rigid_body import RigidBody
+
+JOINTS = ("joint1", "joint2")
+NOISE = 1e-5
+"""[rad] Of the link's encoder, RMS."""
+
+
+def record(folder, seed=5, **concealed):
+    """Two motions of a random two-joint arm with friction and both encoders, and its model file."""
+    rng = np.random.default_rng(seed)
+    arm = random_arm(rng, 2)
+    plant = Plant(
+        arm,
+        friction={"joint1": LuGre(level=8.0, viscous=6.0), "joint2": LuGre(level=5.0, viscous=4.0)},
+        encoder_noise=dict.fromkeys(JOINTS, 1e-6),
+        tau_noise=dict.fromkeys(JOINTS, 0.1),
+        **concealed,
+    )
+    (folder / "arm.urdf").write_text(arm.urdf())
+    (folder / "arm.toml").write_text(
+        'name = "arm"\nurdf = "arm.urdf"\neffects = ["viscous_friction", "coulomb_friction", "presliding_hysteresis"]\n'
+    )
+    motions = [fourier_motion(arm, rng, 9.0), fourier_motion(arm, rng, 9.0), point_to_point_motion(arm, rng, 8.0)]
+    settings = {"timestep": 5e-4, "settle": 0.5, "link_encoder": True}
+    return [simulate(plant, m, t, 200.0, rng, **settings) for m, t in zip(motions, (9, 9, 8), strict=True)]
+
+
+def write(folder, recordings, seed=0, change=lambda time, link: link, at="joint2"):
+    """Write recordings with noise on the link encoders, one of them changed."""
+    rng = np.random.default_rng(seed)
+    paths = []
+    for number, recording in enumerate(recordings):
+        made = dict(recording)
+        made[f"q_link.{at}"] = change(made["time"], made[f"q_link.{at}"])
+        for joint in JOINTS:
+            made[f"q_link.{joint}"] = made[f"q_link.{joint}"] + NOISE * rng.standard_normal(len(made["time"]))
+        paths.append(folder / f"{number}.csv")
+        write_csv(paths[-1], made)
+    return paths
+
+
+def links_of(folder, paths):
+    """The encoders' diagnosis beside a fit of the torques, without the torques' search."""
+    model = load_model(folder / "arm.toml")
+    body = RigidBody(model.tree)
+    train = load_experiments(model, paths[:2], body)
+    found = fit(assemble(model, None, scales(train)), train)
+    links, _ = diagnose_links(
+        model, paths[:2], paths[2], body, found.assembly, found.theta, scales(train), train[0].motion.band
+    )
+    return {link.pair.joint: link for link in links}
+
+
+def named(link):
+    names = [p.named.trial.placed.key for p in link.proofs]
+    return names + [f"sensor_bias.q_link.{link.pair.joint}"] * (link.offset is not None)
+
+
+def parameters(link, name):
+    (placed,) = [p for p in link.steps[-1].placed if p.effect.name == name]
+    values = link.steps[-1].theta[link.steps[-1].parameters(placed)]
+    return dict(zip((p.name for p in placed.effect.parameters), values, strict=True))
+
+
+@pytest.fixture(scope="module")
+def rigid(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("rigid")
+    return folder, record(folder)
+
+
+def test_alike_encoders_are_left_alone(rigid, tmp_path):
+    folder, recordings = rigid
+    for seed in range(2):
+        links = links_of(folder, write(tmp_path, recordings, seed))
+        assert [named(link) for link in links.values()] == [[], []]
+        for link in links.values():
+            assert np.sqrt(np.mean(link.held[-1].residual ** 2)) < NOISE
+            assert link.nameless < 0.1
+
+
+@pytest.mark.parametrize(
+    ("change", "key", "parameter", "value", "within"),
+    [
+        (lambda t, q: CubicSpline(t, q)(t - 0.003), "sensor_delay.q_link.joint2", "delay", 0.003, 0.02),
+        (lambda t, q: CubicSpline(t, q)(t + 0.002), "sensor_delay.q.joint2", "delay", 0.002, 0.03),
+        (lambda t, q: 1.001 * q, "sensor_gain.q_link.joint2", "error", 0.001, 0.02),
+        (lambda t, q: q + 2e-5 * t, "sensor_drift.q_link.joint2", "rate", 2e-5, 0.05),
+    ],
+    ids=["late", "early", "scale", "drift"],
+)
+def test_a_sensor_fault_is_named_with_its_size(rigid, tmp_path, change, key, parameter, value, within):
+    folder, recordings = rigid
+    links = links_of(folder, write(tmp_path, recordings, change=change))
+    assert named(links["joint1"]) == []
+    assert named(links["joint2"]) == [key]
+    assert parameters(links["joint2"], key.partition(".")[0])[parameter] == pytest.approx(value, rel=within)
+
+
+def test_a_zero_is_a_bias_only_where_it_stays(rigid, tmp_path):
+    folder, recordings = rigid
+    links = links_of(folder, write(tmp_path, recordings, change=lambda t, q: q - 0.002))
+    assert named(links["joint2"]) == ["sensor_bias.q_link.joint2"]
+    offset = links["joint2"].offset
+    assert offset is not None
+    assert offset.value == pytest.approx(-0.002, rel=0.01)
+    zeros = iter((0.002, 0.0015, -0.001))  # referenced anew before the last
+    assert named(links_of(folder, write(tmp_path, recordings, change=lambda t, q: q + next(zeros)))["joint2"]) == []
+
+
+@pytest.mark.parametrize("gap", [0.0, 8e-4])
+def test_a_spring_is_told_from_a_delay_and_from_play(tmp_path, gap):
+    spring = Elasticity(4e4, 40.0, gap)
+    recordings = record(tmp_path, elasticity={"joint2": spring}, armature={"joint2": 1.0})
+    links = links_of(tmp_path, write(tmp_path, recordings))
+    assert named(links["joint1"]) == []
+    first = named(links["joint2"])[0]
+    assert first in ("joint_elasticity.joint2", "backlash.joint2")
+    if gap:
+        assert parameters(links["joint2"], "backlash")["gap"] == pytest.approx(gap, rel=0.1)
+    else:
+        assert parameters(links["joint2"], "joint_elasticity")["stiffness"] == pytest.approx(4e4, rel=0.1)
+
+
+def test_whole_answer_and_saved_model(rigid, tmp_path):
+    folder, recordings = rigid
+    paths = write(tmp_path, recordings, change=lambda t, q: CubicSpline(t, q)(t - 0.003) + 0.002)
+    out, saved = tmp_path / "out.json", folder / "new.toml"
+    wanted = ["--json", str(out), "--report", str(tmp_path / "out.html"), "--save-model", str(saved)]
+    files = [str(p) for p in paths]
+    assert main(["diagnose", str(folder / "arm.toml"), *files[:2], "--holdout", files[2], *wanted]) == 0
+    found = json.loads(out.read_text())
+    assert found["verdict"] == "missing_physics"
+    assert [(e["name"], e["at"]) for e in found["effects"]] == [
+        ("sensor_delay", "q_link.joint2"),
+        ("sensor_bias", "q_link.joint2"),
+    ]
+    assert "3 ms" in found["sentence"]
+    assert found["fit"]["q_link.joint2"]["unit"] == "rad"
+    after = found["fit"]["q_link.joint2"]["holdout"]
+    assert after["rms_after"] < 0.05 * after["rms_before"]
+    assert found["location"][0]["channel"] == "q_link.joint2"
+    assert sum(p["share"] for p in found["location"]) <= 1 + 1e-9
+    limits = {(x["name"], x["at"]): x["value"] for x in found["limits"]}
+    assert 0 < limits["sensor_delay", "q_link.joint1"] < 1e-4
+    assert "q_link.joint2" in (tmp_path / "out.html").read_text()
+    # The saved model holds delay and zero: nothing is left to say, and the torques are fitted as before.
+    again = diagnose(load_model(saved), paths[:2], paths[2]).diagnosis
+    assert again.verdict == "adequate"
+    assert again.effects == ()
+    assert main(["identify", str(saved), files[0], "--json", str(tmp_path / "identified.json")]) == 0
+    # An FMU of it reads the late encoder beside the true position.
+    assert main(["export", str(saved), "--fmi", "3", "--out", str(tmp_path / "arm.fmu")]) == 0
+    with zipfile.ZipFile(tmp_path / "arm.fmu") as fmu:
+        assert b'"sensor.q_link.joint2"' in fmu.read("modelDescription.xml")
