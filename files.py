@@ -44,9 +44,9 @@ def content(path: Path, largest: int = LARGEST_TEXT) -> bytes:
         if path.stat().st_size > largest:
             raise InputError(f"{path}: has {path.stat().st_size} bytes; give a file of {largest} at most")
         return path.read_bytes()
+    except InputError:
+        raise
     except (OSError, ValueError) as error:  # a path with a null byte is a ValueError
-        if isinstance(error, InputError):
-            raise
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: cannot be read ({reason}); check the file's permissions") from None
 

@@ -1,14 +1,15 @@
-"""Tolerance studies: two workers against one, what the engine itself costs, and adaptive cases against Sobol ones.
+"""Tolerance studies: two workers against one, what captures and the engine cost, and adaptive cases against Sobol ones.
 
 ``python bench/tolerance.py [RESULT.json] [--cases N]``.
 
 1. The ground captures of one Sobol study (N cases, the same ones), run to the end by one worker and by two on two
-   cores, each warmed up first; by the clock, so the machine has to be quiet.
-2. The engine's own time a case, over that of a ground capture: an adaptive study in five axes whose captures cost
+   cores, each warmed up first; by the clock, so the machine has to be quiet: its load before and after is printed.
+2. What a capture costs: the median processor time of several, in one process and one thread.
+3. The engine's own time a case, over that of a ground capture: an adaptive study in five axes whose captures cost
    nothing. It holds scheduling, recording on disk, and the choice of the next cases.
-3. Cases to the same width of the boundary, four times. The classifier is real but cheap: whether the pin, as it
+4. Cases to the same width of the boundary, four times. The classifier is real but cheap: whether the pin, as it
    arrives, reaches through the open snare without touching, from the shapes of settled cables and rings. No physics
-   moves in it.
+   moves in it. ``bench/tolerance_adaptive.py`` does it on captures.
 """
 
 import argparse
@@ -41,7 +42,7 @@ from snarelab.tolerance.results import Results
 from snarelab.tolerance.run import local_cluster, run_case, run_study
 from snarelab.tolerance.study import Study, load_study
 
-SPEEDUP_GOAL, OVERHEAD_GOAL, SHARE_GOAL = 1.8, 0.05, 0.25
+SPEEDUP_GOAL, OVERHEAD_GOAL, SHARE_GOAL, HOURLY_GOAL = 1.8, 0.05, 0.25, 1200
 WIDTH, SEEDS, MOST = 0.08, (1, 2, 3, 4), 160
 GROUND = Path(snarelab.__file__).parent / "tolerance" / "ground.toml"
 SNARE = SnareParameters()
@@ -66,13 +67,16 @@ def clock(study: Study, jobs: int, warm: Any) -> float:
 
 
 def case_seconds(study: Study, cases: int) -> tuple[float, float]:
-    """Mean time of a capture over Sobol cases of the study, by the clock and by the processor [s]."""
+    """Median time of a capture over Sobol cases of the study, by the clock and by the processor [s]."""
     points = study.scaled(qmc.Sobol(len(study.ranges), rng=study.seed).random(8))[:cases]
     run_case(study.capture, study.values(points[0]))  # compiled, and read in, outside the timing
-    marks = time.perf_counter(), time.process_time()
+    spent = []
     for point in points:
+        marks = time.perf_counter(), time.process_time()
         run_case(study.capture, study.values(point))
-    return (time.perf_counter() - marks[0]) / len(points), (time.process_time() - marks[1]) / len(points)
+        spent.append((time.perf_counter() - marks[0], time.process_time() - marks[1]))
+    clock, processor = np.median(spent, axis=0)
+    return float(clock), float(processor)
 
 
 def clearance(values: Any) -> Outcome:
@@ -142,15 +146,17 @@ def main() -> int:
 
     ground = replace(load_study(GROUND), sampling="sobol", cases=options.cases, batch=options.cases, box={})
     nominal = ground.values(ground.scaled(np.full((1, len(ground.ranges)), 0.5))[0])
+    load = os.getloadavg()[0]
     one, two = clock(ground, 1, nominal), clock(ground, 2, nominal)
+    loads = load, os.getloadavg()[0]
     print(f"{options.cases} ground captures: one worker {one:.1f} s, two {two:.1f} s: {one / two:.2f} x "
-          f"(goal {SPEEDUP_GOAL:g})", flush=True)  # fmt: skip
+          f"(goal {SPEEDUP_GOAL:g}); load {loads[0]:.1f} before, {loads[1]:.1f} after", flush=True)  # fmt: skip
 
     seconds, processor = case_seconds(load_study(GROUND), min(options.cases, 8))
     inspection = case_seconds(load_study(GROUND.with_name("inspection.toml")), min(options.cases, 4))[1]
     for name, cost in (("ground", processor), ("inspection", inspection)):
-        print(f"{name} capture: {cost:.2f} s of a core, {3600 / cost:.0f} an hour; 10 000 take {cost / 0.36:.1f} "
-              "core hours", flush=True)  # fmt: skip
+        print(f"{name} capture: {cost:.2f} s of a core, {3600 / cost:.0f} an hour (goal on the ground {HOURLY_GOAL}); "
+              f"10 000 take {cost / 0.36:.1f} core hours", flush=True)  # fmt: skip
     adaptive = replace(load_study(GROUND), capture=Capture("instant", CAPTURE.axes, instant), box={}, width=1e-6)
     own = clock(adaptive, 1, nominal) / adaptive.cases
     print(f"the engine: {1e3 * own:.0f} ms a case, {100 * own / seconds:.1f} % of a ground capture's {seconds:.2f} s, "
@@ -168,7 +174,8 @@ def main() -> int:
 
     result = {
         "bench": "tolerance", "machine": platform.machine(), "cases": options.cases, "one_worker": one,
-        "two_workers": two, "speedup": one / two, "goal_speedup": SPEEDUP_GOAL, "ground_capture_cpu_seconds": processor,
+        "two_workers": two, "speedup": one / two, "goal_speedup": SPEEDUP_GOAL, "load": loads,
+        "ground_capture_cpu_seconds": processor,
         "inspection_capture_cpu_seconds": inspection,
         "engine_seconds_a_case": own, "overhead": own / seconds, "goal_overhead": OVERHEAD_GOAL, "width": WIDTH,
         "adaptive": [asdict(found) for found, _ in pairs], "sobol": [asdict(plain) for _, plain in pairs],

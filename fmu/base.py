@@ -31,11 +31,11 @@ class Base:
     size : 0 or 6
         Degrees of freedom.
     pose, twist : casadi.SX (7,), (6,)
-        Position and quaternion (w, x, y, z) in the world; velocity and spin.
+        Position [m] and quaternion (w, x, y, z) in the world; velocity and spin [m/s, rad/s].
     turn : casadi.SX (3, 3)
         Base to world.
     given : casadi.SX (6,)
-        Force and moment about the origin from outside and from wheels.
+        Force and moment about the origin from outside and from wheels [N, N·m].
     """
 
     def __init__(self, arm: FloatingArm, ledger: Ledger, laws: PlacedLaws) -> None:
@@ -68,7 +68,7 @@ class Base:
         return by_base(point).T @ ca.vertcat(self.turn.T @ force, self.turn.T @ moment)
 
     def wrench(self, acceleration: ca.SX) -> ca.SX:
-        """What effects give the base (6,), at an acceleration (6,) of it as an observer at rest sees it."""
+        """What effects give the base (size,), at an acceleration (size,) of it as an observer at rest sees it."""
         total = ca.SX(self.size, 1)
         for p in self._placed:
             total += self._laws.law(p, self._signals(acceleration) | self._hidden[p.key])

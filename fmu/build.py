@@ -11,6 +11,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from ..errors import InputError
+from ..files import written_whole
 from ..models.c_library import find_compiler
 from .c_files import source_files
 from .description import About, build_description, model_description
@@ -77,7 +78,6 @@ def pack(
     if version == 3:
         content["sources/buildDescription.xml"] = build_description(about)
     image = "model.png" if version == 2 else "terminalsAndIcons/icon.png"
-    part = path.with_name(path.name + ".part")
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         for name, text in sources.items():
@@ -85,19 +85,16 @@ def pack(
         library = folder / f"{about.identifier}{library_suffix()}"
         compile_library(folder / about.compiled_from, library, libraries)
         binary = library.read_bytes()
-    try:
-        with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
-            for name, text in content.items():
-                archive.writestr(name, text)
-            archive.writestr(image, icon())
-            if version == 3:
-                archive.writestr("terminalsAndIcons/terminalsAndIcons.xml", _TERMINALS)
-            archive.writestr(f"binaries/{binary_folder(version)}/{library.name}", binary)
-        part.replace(path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}; choose a folder that exists") from None
-    finally:
-        part.unlink(missing_ok=True)
+    with (
+        written_whole(path, "choose a folder that exists") as part,
+        zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive,
+    ):
+        for name, text in content.items():
+            archive.writestr(name, text)
+        archive.writestr(image, icon())
+        if version == 3:
+            archive.writestr("terminalsAndIcons/terminalsAndIcons.xml", _TERMINALS)
+        archive.writestr(f"binaries/{binary_folder(version)}/{library.name}", binary)
     return path
 
 

@@ -10,13 +10,17 @@ from ..models.rig.rig import Rig
 from ..models.rigid_body import symbolic_torque
 from ..models.tree import Tree
 from .base import Base
+from .base_motion import carried_turning
 from .equations import Ledger
 from .symbolic import quaternion_of
 
 
 @dataclass(frozen=True, eq=False)
 class Rigid:
-    """Inertia M, terms c, and the tip at a state; the first rows are a floating base's."""
+    """Inertia M (N, N), terms c (N,) [N·m; N at a slide], and the tip, at a state.
+
+    N counts the tree's joints, of which the first six carry a floating base.
+    """
 
     inertia: ca.SX
     terms: ca.SX
@@ -43,22 +47,21 @@ def rigid(
     phi : casadi.SX
         Inertial parameters of all the tree's links.
     q, qd : casadi.SX (J,)
+        Of the arm's joints [rad, rad/s; m, m/s].
     base : Base or None
         Where the base is and what acts on it; None: at rest at the world's origin.
     at_tip : casadi.SX (6,) or None
-        Force and moment from outside on the tip, in the world frame.
+        Force and moment from outside on the tip, in the world frame [N, N·m].
     """
     size = tree.n_joints
     n_base = size - q.numel()
     turn = ca.SX.eye(3) if base is None else base.turn
     twist = ca.SX(6, 1) if base is None else base.twist
-    x, y, z = ca.vertsplit(twist[3:])
-    # Rates of the carrying joints are the angular velocity, but each axis is turned by the joints before it.
-    still = ca.vertcat(ca.SX(3, 1), -y * z, x * z, -x * y)[:n_base]
+    steady = ca.vertcat(ca.SX(3, 1), carried_turning(twist[3:]))[:n_base]
     position, none = ca.vertcat(ca.SX(n_base, 1), q), ca.SX(size, 1)
-    velocity, rates = ca.vertcat(twist[:n_base], qd), ca.vertcat(still, ca.SX(q.numel(), 1))
+    velocity, second = ca.vertcat(twist[:n_base], qd), ca.vertcat(steady, ca.SX(q.numel(), 1))
     gravity = turn.T @ ca.SX(ca.DM(tree.gravity))
-    terms = symbolic_torque(tree, position, velocity, rates, gravity, phi)
+    terms = symbolic_torque(tree, position, velocity, second, gravity, phi)
     acceleration = ca.SX.sym("a", size)
     inertia = ca.jacobian(symbolic_torque(tree, position, none, acceleration, ca.SX(3, 1), phi), acceleration)
     end = tip(arm, q)

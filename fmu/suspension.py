@@ -16,7 +16,7 @@ PLACES = ("sling", "slide", "boom")
 
 
 def rig_signals(rig: Rig, p: Placed, q: ca.SX, qd: ca.SX) -> dict[str, ca.SX]:
-    """What a law at a sling or a boom reads of the arm; one at a slide reads its joint's signals."""
+    """What a law at a sling or a boom reads of the arm at q, qd (J,); one at a slide reads its joint's signals."""
     if p.effect.at == "sling":
         sling = sling_of(rig, p.at)
         velocity = _point(rig, sling.link, sling.point, q)[0][:3, :] @ qd
@@ -27,7 +27,7 @@ def rig_signals(rig: Rig, p: Placed, q: ca.SX, qd: ca.SX) -> dict[str, ca.SX]:
 
 
 def rig_reach(rig: Rig, p: Placed, q: ca.SX) -> ca.SX:
-    """Torque that every drive must add (J,) per number (m,) that the law gives: a matrix (J, m)."""
+    """Torque that every drive must add, per number that the law gives: a matrix (J, m)."""
     if p.effect.at == "sling":
         sling = sling_of(rig, p.at)
         return -_point(rig, sling.link, sling.point, q)[0].T
@@ -43,7 +43,7 @@ def rig_reach(rig: Rig, p: Placed, q: ca.SX) -> ca.SX:
 
 
 def _boom(rig: Rig, at: str, q: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Reach (J, 2) and spread (2,) of a boom."""
+    """Reach (J, 2) and spread (2,) of a boom, as `snarelab.models.rig.kinematics.boom_map` has them."""
     link = [k.name for k in rig.links].index(at)
     end = far_end(rig, link)
     _, tip, rotation = _point(rig, link, end, q)

@@ -27,6 +27,7 @@ from .links.answer import with_links
 from .links.diagnose import diagnose_links
 from .search.forward import Found, Taken, carry, search, without
 from .search.rest import bridged, fitted
+from .search.screening import MOST
 from .snare.diagnose import diagnose_captures
 
 Array = NDArray[np.float64]
@@ -146,22 +147,28 @@ def _attempt(
             rms, _ = channel_rms(assembly, locked, fits[-1].theta)
             rms_moving, _ = channel_rms(assembly, moving, fits[-1].theta)
             # A joint at rest holds what it is given: there, only laws for what happens at rest can be missed.
-            pairs = [(with_all_moving, rms_moving)]
-            if t.judged.placed.effect.at_rest or t.judged.placed.effect.exceeds_at_rest:
-                pairs.append((with_all, rms))
-            energies = [[float(np.sum((x[c] / final.sigma[c]) ** 2)) for x in pair] for pair in pairs]
-            rises.append(max(after / before - 1 for before, after in energies))
+            effect = t.judged.placed.effect
+            pairs = [(with_all_moving, rms_moving, CONFIRM)]
+            if effect.at_rest or effect.exceeds_at_rest:
+                # What was named for leaving little near rest must still do so, now that the others are there.
+                pairs.append((with_all, rms, MOST / (1 - MOST) if effect.remembers else CONFIRM))
+            rises.append(max((_energy(b, c, final) / _energy(a, c, final) - 1) / bar for a, b, bar in pairs))
             worst = c[int(np.argmax(rms[c] / measured[c] - with_all[c] / measured[c]))]
             trials[t.judged.placed.key] = (
                 float(with_all[worst] / measured[worst]),
                 float(rms[worst] / measured[worst]),
             )
         weakest = int(np.argmin(rises))
-        if rises[weakest] > CONFIRM:
+        if rises[weakest] > 1:
             break
         rejected.append(confirmed.pop(weakest))
         final = fits[weakest]
     return _Attempt(found, tuple(confirmed), tuple(rejected), trials, final)
+
+
+def _energy(rms: Array, channels: Sequence[int], found: Fit) -> float:
+    """Of channels, weighted as the fit weights them."""
+    return float(np.sum((rms[channels] / found.sigma[channels]) ** 2))
 
 
 def _steps(

@@ -171,7 +171,7 @@ def simulate(model: ModelLike, motion: RecordingLike | None = None) -> xr.Datase
     ['tau.joint1', 'tau.joint2', 'tau.joint3']
     """
     with _as_files([] if motion is None else [motion]) as paths:
-        return simulating.simulate(_model(model), *paths or [None])
+        return simulating.simulate(_model(model), paths[0] if paths else None)
 
 
 def _model(model: ModelLike) -> Model:

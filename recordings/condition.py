@@ -39,6 +39,10 @@ MINIMUM_RUN = 16
 """Fewest samples in the analysis band that a run between gaps must leave; a noise model remembers up to 12."""
 
 
+FEWEST = 64
+"""Samples in the longest run from which on its spectrum tells the encoders' noise."""
+
+
 GROUP = 16
 """Kept samples that are filtered together."""
 
@@ -71,6 +75,9 @@ class Motion:
         Every how many samples `to_band` keeps one.
     notes : tuple of str
         What was done to the recording, in words.
+    encoder_noise : array (n_joints,)
+        Standard deviation of the acceleration in the analysis band that white noise of the encoders, steps included,
+        makes [rad/s² or m/s²].
     """
 
     path: str
@@ -86,6 +93,7 @@ class Motion:
     segments: tuple[slice, ...]
     thinning: int
     notes: tuple[str, ...]
+    encoder_noise: Array
 
     def to_band(self, x: Array) -> Array:
         """Low-pass and thin an array (n_samples, ...) segment by segment: (n_band, ...)."""
@@ -139,9 +147,11 @@ def condition(dataset: xr.Dataset, joints: Sequence[str], band: float | None = N
     notes += uniform_note
     rate = 1.0 / period
     limit = "as asked"
+    positions = max([p[1] for p in pieces], key=len, default=np.zeros((0, len(joints))))
+    white = _white_level(positions, period)
     if band is None:
         edge = min(BAND_CAP, rate / 2.5)
-        band, limit = _band_from_noise([p[1] for p in pieces], period, edge)
+        band, limit = _band_from_noise(positions, white, period, edge)
     elif not 0 < band <= rate / 2.5:
         raise InputError(
             f"{path}: bandwidth {band:g} Hz cannot be carried at {rate:.4g} samples a second; "
@@ -185,6 +195,7 @@ def condition(dataset: xr.Dataset, joints: Sequence[str], band: float | None = N
         tuple(segments),
         thinning,
         tuple(notes),
+        np.sqrt(white * rate / 2 * np.sum(np.convolve(kernels[2], _taps(thinning)) ** 2)),
     )
 
 
@@ -231,22 +242,31 @@ def _uniform_pieces(
     return pieces, period, notes
 
 
-def _band_from_noise(pieces: Sequence[Array], period: float, edge: float) -> tuple[float, str]:
-    """Widest band <= edge in which derived acceleration noise is below NOISE_SHARE of its signal, on moving joints."""
-    rate = 1.0 / period
-    longest = max(pieces, key=len, default=np.zeros((0, 0)))
-    n = len(longest)
-    if n < 64:
-        return edge, "few samples: the widest band"
+def _power(position: Array, period: float) -> tuple[Array, Array]:
+    """Frequencies [Hz], and one-sided power spectral density of a run without its trend (n_f, n_joints)."""
+    n = len(position)
     window = np.hanning(n)[:, None]
     trend = np.linspace(0, 1, n)[:, None]
-    detrended = longest - longest[0] - trend * (longest[-1] - longest[0])
-    power = np.abs(np.fft.rfft(detrended * window, axis=0)) ** 2 / (rate * np.sum(window**2)) * 2
-    f = np.fft.rfftfreq(n, period)
-    # Encoder noise: the white level of the upper quarter of the spectrum, where no arm moves.
-    white = np.median(power[f > 0.375 * rate], axis=0) / np.log(2)
+    detrended = position - position[0] - trend * (position[-1] - position[0])
+    power = np.abs(np.fft.rfft(detrended * window, axis=0)) ** 2 * period / np.sum(window**2) * 2
+    return np.asarray(np.fft.rfftfreq(n, period), float), power
+
+
+def _white_level(position: Array, period: float) -> Array:
+    """Encoder noise (n_joints,) [per Hz]: the level of the upper quarter of the spectrum, where no arm moves."""
+    if len(position) < FEWEST:
+        return np.zeros(position.shape[1])
+    f, power = _power(position, period)
+    return np.median(power[f > 0.375 / period], axis=0) / np.log(2)
+
+
+def _band_from_noise(position: Array, white: Array, period: float, edge: float) -> tuple[float, str]:
+    """Widest band <= edge in which derived acceleration noise is below NOISE_SHARE of its signal, on moving joints."""
+    if len(position) < FEWEST:
+        return edge, "few samples: the widest band"
+    f, power = _power(position, period)
     signal = np.maximum(power - white, 0) * (2 * np.pi * f[:, None]) ** 4
-    moving = np.ptp(longest, axis=0) > 20 * np.sqrt(white * rate / 2)
+    moving = np.ptp(position, axis=0) > 20 * np.sqrt(white / period / 2)
     if not moving.any():
         return edge, "no joint moves: the widest band"
     for band in np.geomspace(edge, edge / 20, 40):
@@ -321,10 +341,16 @@ def _thin(x: Array, thinning: int) -> Array:
 @functools.cache
 def _group_taps(thinning: int) -> Array:
     """The low-pass of `GROUP` kept samples in a row (n_taps, GROUP): one matrix product filters them all."""
+    h = _taps(thinning)
+    taps = np.zeros(((GROUP - 1) * thinning + len(h), GROUP))
+    for i, column in enumerate(taps.T):
+        column[i * thinning : i * thinning + len(h)] = h
+    return taps
+
+
+def _taps(thinning: int) -> Array:
+    """The low-pass before thinning: its impulse response, which sums to one."""
     half = _thin_half(thinning)
     k = np.arange(-half, half + 1)
     h = np.sinc(k / thinning) * kaiser(2 * half + 1, 6.0)
-    taps = np.zeros(((GROUP - 1) * thinning + len(h), GROUP))
-    for i, column in enumerate(taps.T):
-        column[i * thinning : i * thinning + len(h)] = h / h.sum()
-    return taps
+    return h / h.sum()

@@ -26,6 +26,7 @@ _READERS: Mapping[str, Callable[[Path], Columns]] = {
 }
 _BAGS = (".db3", ".mcap")
 _LISTED_GAPS = 20
+_TIME_UNITS = ("ns", "us", "ms", "min")
 
 
 def read_recording(
@@ -147,9 +148,10 @@ def _left_out(columns: Columns, used: Mapping[str, str], gains: set[str]) -> lis
 def _time(columns: Columns, signals: Mapping[str, Signal], headers: Mapping[str, str]) -> tuple[str, np.ndarray]:
     """Header of the time column, and the time itself [s], checked to increase."""
     if "time" not in headers:
+        column = nearest("time", columns.names)
         raise InputError(
             f"{columns.path}: there is no column 'time' among {_some(columns.names)}; rename one, or map it: "
-            f'[signals] "time" = {{ column = "{nearest("time", columns.names)}", unit = "s" }}'
+            f'[signals] "time" = {{ column = "{column}", unit = "{_time_unit(column)}" }}'
         )
     header, values = columns.column(headers["time"], "time")
     if len(values) < 2:
@@ -170,6 +172,13 @@ def _time(columns: Columns, signals: Mapping[str, Signal], headers: Mapping[str,
             f"{columns.row(int(bad[0]) + 1)}: {after!r} s after {before!r} s; sort or cut the recording"
         )
     return header, values
+
+
+def _time_unit(header: str) -> str:
+    """The unit that a time's header says, in brackets or as ``t_ms`` does; seconds where it says none."""
+    name, unit = split_header(header)
+    ending = unit or name.rpartition("_")[2]
+    return ending if ending in _TIME_UNITS else "s"
 
 
 def _unit(columns: Columns, header: str, signal: Signal | None) -> pint.Unit | None:

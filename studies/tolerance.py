@@ -65,11 +65,9 @@ def _quantities(name: str, content: dict[str, Any]) -> list[Quantity]:
 
 
 def _quantity(name: str, unit: str, interval: dict[str, float | None]) -> Quantity:
-    """The envelope's ends are ordered by probability, which is not always by size."""
     if interval["value"] is None:
         raise InputError(f"tolerance: {name} is unknown: the nominal capture fails; look at the study's criterion")
-    ends = sorted(x for x in (interval["low"], interval["high"]) if x is not None)
-    return Quantity(name, unit, interval["value"], "reference", None, ends[0], ends[-1])
+    return Quantity(name, unit, interval["value"], "reference", None, interval["low"], interval["high"])
 
 
 def _page(sentences: str, quantities: list[Quantity], found: list[tuple[dict[str, Any], str]]) -> str:
@@ -83,8 +81,8 @@ def _page(sentences: str, quantities: list[Quantity], found: list[tuple[dict[str
         for q in quantities
     ]
     numbers = markup_table(
-        "Intervals of probabilities are exact at 95 % (Clopper and Pearson); those of an envelope run from where "
-        "success is 95 % likely to where it is 5 %.",
+        "Intervals of probabilities are exact at 95 % (Clopper and Pearson); those of an envelope run from the last "
+        "capture outwards that succeeded to the first that did not.",
         ["quantity", "ours", "interval", "unit"],
         rows,
         numeric=(1, 2),

@@ -24,3 +24,13 @@ def emps() -> Path:
         if (folder / "emps" / "DATA_EMPS.mat").is_file():
             return folder / "emps"
     pytest.skip("EMPS recordings not found: set SNARELAB_RECORDINGS to the folder that holds emps/DATA_EMPS.mat")
+
+
+@pytest.fixture
+def arm_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The current folder, with an arm's model and recordings as a user has them."""
+    from arm_commands import write_arm_folder  # found by the paths above
+
+    write_arm_folder(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path

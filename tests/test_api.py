@@ -7,12 +7,12 @@ import json
 import subprocess
 import sys
 import time
-from html.parser import HTMLParser
 from pathlib import Path
 
 import pandas as pd
 import pytest
 import xarray as xr
+from pages import Page
 
 import snarelab
 from snarelab.cli import main
@@ -21,34 +21,10 @@ from snarelab.identification import from_python
 BUNDLED = Path(__file__).resolve().parents[1] / "studies" / "bundled"
 
 
-class Tags(HTMLParser):
-    """Open tags must be closed, in order; anything that would load from elsewhere is kept."""
-
-    def __init__(self, markup):
-        super().__init__()
-        self.open, self.fetched, self.text = [], [], []
-        self.feed(markup)
-
-    def handle_starttag(self, tag, attrs):
-        if tag not in ("img", "br"):
-            self.open.append(tag)
-        self.fetched += [
-            value for name, value in attrs if name in ("src", "href") and not f"{value}".startswith("data:")
-        ]
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def handle_data(self, data):
-        if self.open[-1] != "style":
-            self.text.append(data)
-
-
 def shown(result):
-    tags = Tags(result._repr_html_())
-    assert not tags.open
-    assert not tags.fetched
-    return " ".join(tags.text)
+    page = Page(result._repr_html_())
+    assert page.loaded() == []
+    return page.text
 
 
 @pytest.fixture(scope="module")
@@ -146,7 +122,7 @@ def test_public_names_are_typed_documented_and_listed():
                 assert parameter.annotation is not inspect.Parameter.empty
                 assert f"    {parameter.name} : " in (value.__doc__ or ""), f"{name}: {parameter.name} not described"
     with pytest.raises(AttributeError, match="no attribute 'diagnosis'; it has"):
-        snarelab.diagnosis  # noqa: B018  # pyright: ignore[reportAttributeAccessIssue]
+        snarelab.diagnosis  # noqa: B018
 
 
 @pytest.mark.parametrize("code", ["import snarelab", "import sys; from snarelab.cli import main; main(['--help'])"])

@@ -40,7 +40,9 @@ def motion(kinds, n=1200, segments=None, thinning=3, first=0):
     temperature = np.full_like(q, 20.0)
     band = 1 / (2 * thinning * PERIOD)
     parts = segments or (slice(0, n),)
-    return Motion("run.csv", JOINTS[: len(kinds)], PERIOD, band, t, q, qd, qdd, tau, temperature, parts, thinning, ())
+    return Motion(
+        "run.csv", JOINTS[: len(kinds)], PERIOD, band, t, q, qd, qdd, tau, temperature, parts, thinning, (), 0 * q[0]
+    )
 
 
 @pytest.fixture(scope="module")

@@ -5,46 +5,23 @@ import re
 import runpy
 import shutil
 import tomllib
-from pathlib import Path
 
 import pytest
+from diagnoses import spelt
+from documentation import CHANGELOG, DOCS, PAGES, README, ROOT, blocks, read
 
 from snarelab.cli import main
-from snarelab.identification.diagnosis import (
-    Candidate,
-    ChannelFit,
-    Diagnosis,
-    Estimate,
-    Finding,
-    Limit,
-    Location,
-    Misfit,
-    Moved,
-    Rival,
-    Step,
-)
 from snarelab.models.effects import FAMILIES, effects
 from snarelab.models.model_file import load_model
 from snarelab.tolerance.study import load_study
 
-ROOT = Path(__file__).resolve().parents[1]
-README, DOCS = ROOT / "README.md", ROOT / "docs"
-PAGES = [README, ROOT / "CHANGELOG.md", *sorted(DOCS.glob("*.md"))]
+ALL = [*PAGES, CHANGELOG]
 BUNDLED = ROOT / "studies" / "bundled"
-
-
-def text(name):
-    return (DOCS / name).read_text(encoding="utf-8")
-
-
-def blocks(language, pages=PAGES):
-    pattern = re.compile(rf"^```{language}\n(.*?)^```", re.MULTILINE | re.DOTALL)
-    return [(page.name, block) for page in pages for block in pattern.findall(page.read_text(encoding="utf-8"))]
 
 
 def anchors(page):
     """What GitHub makes of a page's headings."""
-    headings = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    headings = re.findall(r"^#+ (.*)$", read(page), re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
@@ -57,13 +34,13 @@ def rows(markdown, head):
 def test_pages_from_the_code_are_what_the_code_gives(monkeypatch):
     monkeypatch.syspath_prepend(DOCS)  # the scripts import each other by name, as they do when they are run
     for path, given in runpy.run_path(str(DOCS / "make_pages.py"))["pages"]().items():
-        assert path.read_text(encoding="utf-8") == given, f"{path.name} is stale: run python docs/make_pages.py"
+        assert read(path) == given, f"{path.name} is stale: run python docs/make_pages.py"
 
 
 def test_what_looks_alike_is_what_the_columns_give():
     """Shares move a little with the rounding of a fit; pairs near the bar of 80 % may come and go."""
     script = runpy.run_path(str(DOCS / "make_confusions.py"))
-    written = json.loads((DOCS / "confusions.json").read_text(encoding="utf-8"))
+    written = json.loads(read(DOCS / "confusions.json"))
     measured = script["alike"]()
     for one, others in written.items():
         for other in {*others, *measured[one]} & set(written):
@@ -74,14 +51,14 @@ def test_what_looks_alike_is_what_the_columns_give():
 
 def test_page_of_effects_shows_every_parameter():
     for effect in effects().values():
-        (row,) = [line for line in text("effects.md").splitlines() if line.startswith(f"| `{effect.name}`<br>")]
+        (row,) = [line for line in read(DOCS / "effects.md").splitlines() if line.startswith(f"| `{effect.name}`<br>")]
         assert all(f"`{parameter.name}` [" in row for parameter in effect.parameters)
         assert effect.source in row
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", ALL, ids=lambda page: page.name)
 def test_every_relative_link_leads_somewhere(page):
-    for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text(encoding="utf-8")):
+    for target in re.findall(r"\]\(([^)\s]+)\)", read(page)):
         if target.startswith("https://"):
             continue
         path, _, anchor = target.partition("#")
@@ -91,12 +68,12 @@ def test_every_relative_link_leads_somewhere(page):
 
 
 def test_every_make_target_mentioned_exists():
-    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    makefile = read(ROOT / "Makefile")
     studies = re.findall(r"^STUDIES := (.*)$", makefile, re.MULTILINE)[0].split()
     known = {*re.findall(r"^([a-z]+):", makefile, re.MULTILINE), *(f"study-{name}" for name in studies)}
     mentioned = set()
-    for page in PAGES:
-        code = re.findall(r"`([^`\n]+)`|^(make .*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    for page in ALL:
+        code = re.findall(r"`([^`\n]+)`|^(make .*)$", read(page), re.MULTILINE)
         for line in (a or b for a, b in code):
             if line.startswith("make "):
                 mentioned |= {word for word in line.partition("#")[0].split()[1:] if "=" not in word}
@@ -104,8 +81,11 @@ def test_every_make_target_mentioned_exists():
     assert {"demo", "test", "study-emps"} <= mentioned
 
 
-@pytest.mark.parametrize(("page", "block"), blocks("toml"))
-def test_every_model_shown_loads(page, block, tmp_path):
+MODELS = [pytest.param(b, id=f"{page.name}-{k}") for page in ALL for k, (_, b) in enumerate(blocks(page, "toml"))]
+
+
+@pytest.mark.parametrize("block", MODELS)
+def test_every_model_shown_loads(block, tmp_path):
     given = tomllib.loads(block)
     if "participants" in given:  # a system for `snarelab cosim`: test_adding.py and test_cosim_files.py run such
         return
@@ -137,30 +117,8 @@ def described(page):
 
 
 def test_every_field_of_a_diagnosis_is_described():
-    misfit = Misfit(1.0, 0.5, 0.1, 0.05)
-    rival = Rival("sensor_bias", "tau.joint1", 0.1, True, "turn the load round")
-    diagnosis = Diagnosis(
-        "missing_physics",
-        "a sentence",
-        "",
-        "arm3",
-        (
-            Finding(
-                "viscous_friction", "joint1", 1.0, 0.9, {"x_coefficient": Estimate(1.0, 0.1, "1")}, "it is", (rival,)
-            ),
-        ),
-        (Location("tau.joint1", 1.0, ((0.0, 1.0),), "throughout"),),
-        (ChannelFit("x_channel", "N*m", misfit, misfit, 0.1),),
-        (Step("model as given", 0.1, 0.1),),
-        (Candidate("viscous_friction", "joint1", 0.5, 10.0, True),),
-        (Moved("inertia.link1.mass", "kg", 1.0, 2.0, 0.1),),
-        (),
-        (Limit("viscous_friction", "joint1", "coefficient", 0.1, "N*m*s/rad"),),
-        ("a note",),
-        40.0,
-    )
-    page = text("results.md")
-    found = keys(diagnosis.to_json())
+    page = read(DOCS / "results.md")
+    found = keys(spelt("x_name").to_json())
     assert len(found) > 35
     missing = found - described(page[page.index("## Diagnosis (JSON)") :])
     assert not missing, f"docs/results.md does not describe {missing}"
@@ -176,7 +134,7 @@ def test_every_field_of_an_identification_is_described(tmp_path):
     links = found["inertia"]["links"]
     # Lists in place of what is keyed by names of channels and links.
     found |= {"fit": [*found["fit"].values()], "inertia": found["inertia"] | {"links": [*links.values()]}}
-    page = text("results.md")
+    page = read(DOCS / "results.md")
     section = page[page.index("## Identification (JSON)") : page.index("## Diagnosis (JSON)")]
     inertial = set(next(iter(links.values())))
     assert all(f"`{name}`" in section for name in inertial)
@@ -185,7 +143,7 @@ def test_every_field_of_an_identification_is_described(tmp_path):
 
 
 def test_readme_says_what_can_be_named():
-    table = rows(README.read_text(encoding="utf-8").replace("<!-- end of effects -->", ""), "| family | can be named |")
+    table = rows(read(README).replace("<!-- end of effects -->", ""), "| family | can be named |")
     assert [row[0] for row in table] == list(FAMILIES)
     assert {name for row in table for name in re.findall(r"`(\w+)`", row[1])} == set(effects())
     for family, now, *planned in table:
@@ -194,12 +152,12 @@ def test_readme_says_what_can_be_named():
 
 
 def test_thresholds_are_those_of_the_code():
-    table = rows(text("method.md"), "| constant | value |")
+    table = rows(read(DOCS / "method.md"), "| constant | value |")
     assert len(table) > 10
     sources = [path for folder in ("recordings", "identification") for path in (ROOT / folder).rglob("*.py")]
     # The search over captures has thresholds of its own, under names that mean the same.
     sources = [path for path in sources if path.parent.name != "snare"]
-    code = "\n".join(path.read_text(encoding="utf-8") for path in sources)
+    code = "\n".join(read(path) for path in sources)
     for name, value, _ in table:
         defined = re.findall(rf"^{name.strip('`')} = (.*)$", code, re.MULTILINE)
         assert list(map(float, defined)) == [float(value)], f"{name} in docs/method.md, {defined} in the code"
@@ -207,4 +165,4 @@ def test_thresholds_are_those_of_the_code():
 
 def test_results_shown_on_two_pages_are_the_same():
     head = "| model | error, fitted |"
-    assert rows(README.read_text(encoding="utf-8"), head) == rows(text("study-emps.md"), head)
+    assert rows(read(README), head) == rows(read(DOCS / "study-emps.md"), head)

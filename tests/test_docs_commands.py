@@ -14,13 +14,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from documentation import DOCS, PAGES, ROOT, blocks, read
 
 import snarelab
 import snarelab.identification.diagnose as diagnosing
 from snarelab.cli import _parser, main
 
-ROOT = Path(__file__).resolve().parents[1]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 SNARELAB = (".venv/bin/snarelab", "snarelab")
 
 NOT_RUN = {
@@ -55,9 +54,8 @@ ARM = """<robot name="arm"><link name="base"/>
 
 def commands(page):
     """Command lines of a page's shell blocks, comments and prompts taken off, in order."""
-    text = page.read_text(encoding="utf-8")
     lines = []
-    for language, block in re.findall(r"^```(sh|console)\n(.*?)^```", text, re.MULTILINE | re.DOTALL):
+    for language, block in blocks(page, "sh", "console"):
         whole = block.replace("\\\n", " ")
         typed = [line.removeprefix("$ ") for line in whole.splitlines() if language == "sh" or line.startswith("$ ")]
         lines += [re.sub(r"\s+#.*", "", line).strip() for line in typed]
@@ -167,7 +165,7 @@ def test_every_command_runs(pages, bench, capsys):
         os.chdir(bench)
         printed = try_out(page, bench, capsys)
         if page.name in TOGETHER:
-            check_shown(page.read_text(encoding="utf-8"), "".join(printed))
+            check_shown(read(page), "".join(printed))
 
 
 def try_out(page, bench, capsys):
@@ -176,9 +174,9 @@ def try_out(page, bench, capsys):
     if page.name == "own-robot.md":
         own = bench / "build" / "own"
         own.mkdir(parents=True)
-        text = page.read_text(encoding="utf-8")
-        for block, name in re.findall(r"^```toml\n(# (\S+\.toml)\n.*?)^```", text, re.MULTILINE | re.DOTALL):
-            (own / name).write_text(block, encoding="utf-8")
+        for _, block in blocks(page, "toml"):
+            if named := re.match(r"# (\S+\.toml)\n", block):
+                (own / named[1]).write_text(block, encoding="utf-8")
     for line in commands(page):
         if excused(line, NOT_RUN):
             continue
@@ -208,9 +206,8 @@ def check_shown(text, said):
 def examples():
     for page in PAGES:
         if page.name not in NOT_RUN_PYTHON:
-            text = page.read_text(encoding="utf-8")
-            found = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
-            yield from (pytest.param(code, id=f"{page.name}-{k}") for k, code in enumerate(found))
+            for k, (_, code) in enumerate(blocks(page, "python")):
+                yield pytest.param(code, id=f"{page.name}-{k}")
 
 
 @pytest.mark.parametrize("code", list(examples()))
@@ -220,10 +217,9 @@ def test_every_python_example_runs(code, bench, capsys):
 
 @pytest.mark.parametrize("page", sorted(NOT_RUN_PYTHON))
 def test_examples_that_are_not_run_are_python_and_import_what_there_is(page):
-    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
-    found = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    found = blocks(DOCS / page, "python")
     assert found, f"{page}: has no example any more; take it off NOT_RUN_PYTHON"
-    for code in found:
+    for _, code in found:
         for node in ast.walk(ast.parse(code, page)):
             if isinstance(node, ast.ImportFrom) and f"{node.module}".startswith("snarelab"):
                 module = importlib.import_module(f"{node.module}")
@@ -239,7 +235,7 @@ def test_every_excuse_is_needed():
 def test_every_python_file_mentioned_exists():
     """``python bench/fmu.py`` in a sentence, ``python -m snarelab.fmu.shipped``: the file or module is there."""
     for page in PAGES:
-        for inside in re.findall(r"`python ([^`]+)`", page.read_text(encoding="utf-8")):
+        for inside in re.findall(r"`python ([^`]+)`", read(page)):
             words = inside.split()
             where = Path(words[1].removeprefix("snarelab.").replace(".", "/")) if words[0] == "-m" else Path(words[0])
             places = [ROOT / where, ROOT / where.with_suffix(".py"), ROOT / where / "__main__.py"]

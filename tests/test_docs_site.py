@@ -6,13 +6,11 @@ import subprocess
 import sys
 import tomllib
 from html.parser import HTMLParser
-from pathlib import Path
 from urllib.parse import unquote
 
 import pytest
+from documentation import DOCS, ROOT, read
 
-ROOT = Path(__file__).resolve().parents[1]
-DOCS = ROOT / "docs"
 IMPORTED_AS = {"drake": "pydrake", "scikit-learn": "sklearn", "pin": "pinocchio"}
 PACKAGE = ("cosim", "fmu", "identification", "models", "recordings", "report", "studies", "tolerance")
 
@@ -23,7 +21,7 @@ class Page(HTMLParser):
     def __init__(self, path):
         super().__init__()
         self.links, self.loaded, self.anchors = [], [], set()
-        self.feed(path.read_text(encoding="utf-8"))
+        self.feed(read(path))
 
     def handle_starttag(self, tag, attrs):
         given = dict(attrs)
@@ -78,16 +76,16 @@ def test_nothing_is_fetched_from_elsewhere(site):
         for source in page.loaded:
             assert not re.match(r"(https?:)?//", source), f"{name} loads {source}"
     for style in folder.rglob("*.css"):
-        assert not re.search(r"(url\(|@import)\s*['\"]?(https?:)?//", style.read_text(encoding="utf-8")), style.name
+        assert not re.search(r"(url\(|@import)\s*['\"]?(https?:)?//", read(style)), style.name
     for script in folder.rglob("*.js"):
-        text = script.read_text(encoding="utf-8")
+        text = read(script)
         assert not re.search(r"(fetch|importScripts|\.src\s*=)\s*\(?\s*['\"`](https?:)?//", text), script.name
 
 
 def test_broken_links_fail_the_build(tmp_path):
     """What the build is trusted with, tried on a page of two links."""
     pytest.importorskip("sphinx", reason="no Sphinx: pip install '.[dev]'")
-    shown = (DOCS / "conf.py").read_text(encoding="utf-8")
+    shown = read(DOCS / "conf.py")
     (tmp_path / "conf.py").write_text(shown, encoding="utf-8")
     (tmp_path / "_static").mkdir()
     broken = ("#b", "no.md", "no.md#a", "../no.toml")
@@ -100,13 +98,13 @@ def test_broken_links_fail_the_build(tmp_path):
 
 
 def requirements(group):
-    given = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    given = tomllib.loads(read(ROOT / "pyproject.toml"))["project"]
     listed = given["dependencies"] if group == "run" else given["optional-dependencies"]["dev"]
     return {re.split(r"[<>=\[; ]", line)[0] for line in listed}
 
 
 def test_every_dependency_has_its_reason():
-    page = (DOCS / "developing.md").read_text(encoding="utf-8")
+    page = read(DOCS / "developing.md")
     run, develop = page.split("### To develop")
     for group, text in (("run", run.split("### To run")[1]), ("dev", develop)):
         listed = {
@@ -116,7 +114,7 @@ def test_every_dependency_has_its_reason():
 
 
 def test_every_dependency_to_run_is_imported():
-    code = "\n".join(path.read_text(encoding="utf-8") for folder in PACKAGE for path in (ROOT / folder).rglob("*.py"))
+    code = "\n".join(read(path) for folder in PACKAGE for path in (ROOT / folder).rglob("*.py"))
     imported = set(re.findall(r"^\s*(?:import|from) (\w+)", code, re.MULTILINE))
     imported |= {"distributed"} if "from dask.distributed import" in code else set()
     unused = {name for name in requirements("run") if IMPORTED_AS.get(name, name.replace("-", "_")) not in imported}

@@ -44,7 +44,9 @@ def recording(body, friction, still=()):
     tau = body.torque(q, qd, qdd) + friction(qd)
     temperature = np.full_like(q, 20.0)
     band = 1 / (2 * THINNING * PERIOD)
-    motion = Motion("run.csv", JOINTS, PERIOD, band, t, q, qd, qdd, tau, temperature, (slice(0, N),), THINNING, ())
+    motion = Motion(
+        "run.csv", JOINTS, PERIOD, band, t, q, qd, qdd, tau, temperature, (slice(0, N),), THINNING, (), 0 * q[0]
+    )
     return Experiment(motion, body)
 
 

@@ -37,7 +37,9 @@ def experiment(body, qd, q=None, tau: float | np.ndarray = 10.0, segments=None):
     torque = np.broadcast_to(tau, qd.shape) * np.sqrt(2) * np.sin(7 * TIME)[:, None]
     none = np.full_like(qd, np.nan)
     parts = segments or (slice(0, N),)
-    recorded = Motion("run.csv", ("joint1", "joint2"), PERIOD, 100 / 3, TIME, q, qd, 0 * qd, torque, none, parts, 3, ())
+    recorded = Motion(
+        "run.csv", ("joint1", "joint2"), PERIOD, 100 / 3, TIME, q, qd, 0 * qd, torque, none, parts, 3, (), 0 * q[0]
+    )
     return Experiment(recorded, body)
 
 

@@ -66,6 +66,27 @@ def test_no_time(tmp_path):
     refused(csv(tmp_path, "t,Time,q.joint1\n0,0,1\n1,1,1\n"), "no column 'time'", 'column = "Time"', "[signals]")
 
 
+@pytest.mark.parametrize(
+    ("header", "unit"),
+    [
+        ("t_ms", "ms"),
+        ("time_us", "us"),
+        ("stamp_ns", "ns"),
+        ("t_min", "min"),
+        ("t [ms]", "ms"),
+        ("t", "s"),
+        ("t_0", "s"),
+    ],
+)
+def test_no_time_but_a_column_whose_name_says_its_unit(tmp_path, header, unit):
+    said = f'"time" = {{ column = "{header}", unit = "{unit}" }}'
+    path = csv(tmp_path, f"{header},q.joint1\n0,1\n1,1\n")
+    refused(path, "no column 'time'", said)
+    signals = {"time": Signal(header, unit), "q.joint1": Signal("q.joint1")}  # what is suggested, is read
+    seconds = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}[unit]
+    np.testing.assert_allclose(read_recording(path, signals)["time"], [0.0, seconds], rtol=1e-12)
+
+
 def test_no_signal(tmp_path):
     refused(csv(tmp_path, "time,a,b\n0,1,2\n1,2,3\n"), "none of its 3 columns is a signal", "a, b")
 

@@ -39,7 +39,9 @@ def motion(tree, n=400, seed=0):
             qdd[:, j] -= size * w**2 * np.sin(w * t + phase)
     names = tuple(j.name for j in tree.joints)
     whole = (slice(0, n),)
-    return Motion("run.csv", names, PERIOD, 50.0, t, q, qd, qdd, np.ones_like(q), np.full_like(q, 20.0), whole, 1, ())
+    return Motion(
+        "run.csv", names, PERIOD, 50.0, t, q, qd, qdd, np.ones_like(q), np.full_like(q, 20.0), whole, 1, (), 0 * q[0]
+    )
 
 
 def makkar(parameters, v):

@@ -161,6 +161,17 @@ def test_a_recording_that_cannot_be_used_is_named(tmp_path, change, words):
     assert "b.csv" in str(caught.value)
 
 
+def test_captures_are_told_by_forces_on_the_same_bodies(tmp_path):
+    model = load_model(written(tmp_path, PLAIN + 'effects = ["umbilical_stiffness"]\n'))
+    train, other = swinging(tmp_path, "train.csv"), swinging(tmp_path, "other.csv", seed=2)
+    force = {f"force.wrist.{a}": np.zeros(251) for a in "xyz"}
+    held = swinging(tmp_path, "held.csv", force, seed=3)
+    with pytest.raises(InputError, match=r"held\.csv: its force sensors are not those of .*train\.csv"):
+        diagnose_captures(model, [train, other], held, jobs=1)
+    with pytest.raises(InputError, match=r"held\.csv: its force sensors are not those of .*train\.csv"):
+        identify_captures(model, [train, held, other], jobs=1)
+
+
 def test_simulate_writes_a_recording_that_is_read_back(tmp_path, capsys):
     text = PLAIN + 'effects = ["contact_friction"]\n'
     model = written(tmp_path, text)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from snarelab.models.snare.parameters import SnareParameters
+from snarelab.tolerance import ground
 from snarelab.tolerance.enclosure import encloses, radial_error
 from snarelab.tolerance.ground import CAPTURE, run
 
@@ -57,3 +58,9 @@ def test_the_papers_capture_succeeds_and_a_miss_is_one():
     missed = run({**NOMINAL, "radial_y": 0.16})
     assert not missed.enclosed
     assert np.isnan(missed.first_contact)
+
+
+def test_the_end_is_the_papers_and_judged_after_the_wait(monkeypatch):
+    assert pytest.approx(P.ring_travel / P.ring_rate) == ground.DURATION
+    monkeypatch.setattr(ground, "DURATION", 0.1)
+    assert ground.simulate({**NOMINAL, "wait": 0.06}).times[-1] == pytest.approx(0.16, abs=1e-12)

@@ -12,12 +12,18 @@ import snarelab
 from snarelab.cosim.orbit_capture import SNARE, arrival, capture_of, co_simulate, resistance, step_control
 from snarelab.models.floating.space_arm import FRICTION
 from snarelab.studies.orbit.setting import setting
+from snarelab.tolerance import inspection
 from snarelab.tolerance.run import box_points
 from snarelab.tolerance.study import load_study
 
 TILT = np.deg2rad(2.0)
 TURN = Rotation.from_euler("xyz", [TILT, TILT, TILT])
 FOOT = np.array([0.12, 0.02, 0.02])
+ARRIVED = {
+    **{axis.name: axis.nominal for axis in inspection.AXES},
+    **dict.fromkeys(("radial_y", "radial_z"), 0.02),
+    **dict.fromkeys(("roll", "pitch", "yaw"), TILT),
+}
 INSPECTION = Path(snarelab.__file__).parent / "tolerance" / "inspection.toml"
 
 
@@ -79,3 +85,24 @@ def test_cases_of_the_box_stand_at_its_ends():
         else:
             assert len(np.unique(points[:, i])) == study.box_cases
     np.testing.assert_allclose(np.unique(np.abs(points[:, 0])), 0.02)
+
+
+def test_a_capture_plays_as_seen_from_the_end_effector(monkeypatch):
+    monkeypatch.setattr(inspection, "DURATION", 0.3)
+    done = inspection.simulate({**ARRIVED, "speed": 0.01, "joint_friction": 100.0})
+    rows, cables = done.seen()
+    assert np.linalg.norm(done.motion.tip[rows[-1], 0] - done.motion.tip[0, 0]) > 1e-3  # the base takes it along
+    p = done.snare
+    for end, along in ((0, 0.0), (-1, p.ring_distance)):
+        np.testing.assert_allclose(cables[:, :, end, 0], along, atol=1e-5)  # the gap of the coupling: 30 µm
+        np.testing.assert_allclose(np.hypot(*cables[:, :, end, 1:].T), p.ring_radius, atol=1e-5)
+    np.testing.assert_allclose(done.motion.relative[0], FOOT, atol=1e-12)
+    page = inspection.film(ARRIVED)
+    assert "<script" in page
+    assert 'type="range"' in page
+
+
+def test_the_end_is_judged_after_the_wait(monkeypatch):
+    monkeypatch.setattr(inspection, "DURATION", 0.1)
+    done = inspection.simulate({**ARRIVED, "wait": 0.05})
+    assert done.motion.times[-1] == pytest.approx(0.15, abs=1e-12)

@@ -11,25 +11,24 @@ from .. import __version__
 from ..report.html import figure, page, paragraph, table
 from .gallery import Miss, play_misses
 from .pictures import envelope_bars, probability_maps, sensitivity_bars, width_curve
+from .rays import ANGLES, RADIAL, STAGE, ends, envelope, shortest
 from .results import Results
 from .run import space_boundary
 from .study import LARGEST, Study
-from .summary import Interval, envelopes, nominal_point, sensitivities, success_probability, worst_reach
-
-RADIAL = ("radial_y", "radial_z")
-ANGLES = ("roll", "pitch", "yaw")
+from .summary import Interval, sensitivities, success_probability
 
 
 def summarise(study: Study, results: Results) -> dict[str, Any]:
     """Write ``result.json``, ``cases.parquet`` and ``report.html`` into the results folder; returns the numbers.
 
     Keys: ``cases``, ``failed`` (cases without a result), ``width``, ``probability`` over the ranges and
-    ``probability_box``, ``envelope`` an axis, ``envelope_radial`` [m] and ``envelope_angle`` [rad] over the worst
-    direction, ``sensitivity``, ``misses`` (file, kind, text), ``sentence``.
+    ``probability_box``, ``envelope`` an axis, ``envelope_radial`` [m] and ``envelope_angle`` [rad] in the worst of the
+    directions that were tried (see `rays`), ``sensitivity``, ``misses`` (file, kind, text), ``sentence``.
     """
     space = results.table("space")
     boundary = space_boundary(study, results)
-    ends, indices = envelopes(study, boundary), sensitivities(study, boundary)
+    found, indices = ends(study, results.table(STAGE)), sensitivities(study, boundary)
+    limits = envelope(study, found)
     content: dict[str, Any] = {
         "study": study.name,
         "capture": study.capture.name,
@@ -37,13 +36,13 @@ def summarise(study: Study, results: Results) -> dict[str, Any]:
         "failed": len(_failures(results)),
         "width": boundary.width(),
         "probability": vars(success_probability(space)) if study.sampling != "adaptive" else None,
-        "envelope": {n: {"down": _plain(d), "up": _plain(u)} for n, (d, u) in ends.items()},
+        "envelope": {n: {"down": _plain(d), "up": _plain(u)} for n, (d, u) in limits.items()},
         "sensitivity": indices.reset_index().to_dict("records"),
     }
     for key, axes in (("envelope_radial", RADIAL), ("envelope_angle", ANGLES)):
-        varied = tuple(a for a in axes if a in study.ranges)
-        if varied:
-            content[key] = _plain(worst_reach(study, boundary, varied))
+        worst = shortest(found, axes)
+        if worst:
+            content[key] = _plain(worst)
     if study.box:
         content["probability_box"] = vars(success_probability(results.table("box")))
     content["sentence"] = _sentence(study, content)
@@ -51,7 +50,7 @@ def summarise(study: Study, results: Results) -> dict[str, Any]:
     content["misses"] = [vars(m) for m in misses]
     results.write_table()
     results.write("result.json", content)
-    results.write("report.html", _page(study, results, content, ends, indices, misses))
+    results.write("report.html", _page(study, results, content, limits, indices, misses))
     return content
 
 
@@ -61,26 +60,23 @@ def _sentence(study: Study, content: dict[str, Any]) -> str:
         p = content["probability_box"]
         low, high = 100 * p["low"], 100 * p["high"]
         words.append(f"inside the box {100 * p['value']:.0f} % succeed (95 % interval {low:.1f} to {high:.1f} %)")
-    for key, axes, factor, unit, what in (
-        ("envelope_radial", RADIAL, 1e3, "mm", "radial error in the worst direction"),
-        ("envelope_angle", ANGLES, 180 / np.pi, "deg", "tilt in the worst direction"),
+    for key, factor, unit, what in (
+        ("envelope_radial", 1e3, "mm", "offset alone"),
+        ("envelope_angle", 180 / np.pi, "deg", "tilt alone"),
     ):
         e = content.get(key)
         if e and e["value"] is not None:
-            end = "at least" if e["value"] > 0.999 * _searched(study, axes) else "up to"
-            words.append(f"{what} {end} {factor * e['value']:.1f} {unit}")
+            low, high = factor * e["low"], factor * e["high"]
+            end = f"at least {low:.1f} {unit}" if low == high else f"up to {low:.1f} to {high:.1f} {unit}"
+            words.append(f"{what}, in the worst direction tried, {end}")
     worst = max(content["sensitivity"], key=lambda s: s["total"])
     words.append(f"{worst['axis']} matters most")
     return "; ".join(words) + "."
 
 
-def _searched(study: Study, axes: tuple[str, ...]) -> float:
-    """How far the ranges reach from nominal on the shortest side of those axes that are varied."""
-    centre = dict(zip(study.ranges, nominal_point(study), strict=True))
-    return min(abs(limit - centre[name]) for name in axes if name in centre for limit in study.ranges[name])
-
-
-def _page(study: Study, results: Results, content: dict[str, Any], ends: dict, indices: Any, misses: list[Miss]) -> str:
+def _page(
+    study: Study, results: Results, content: dict[str, Any], limits: dict, indices: Any, misses: list[Miss]
+) -> str:
     space = results.table("space")
     rows = [
         [
@@ -91,10 +87,11 @@ def _page(study: Study, results: Results, content: dict[str, Any], ends: dict, i
             f"{u.low:.4g} to {u.high:.4g}",
             study.capture.axis(name).unit,
         ]
-        for name, (d, u) in ends.items()
+        for name, (d, u) in limits.items()
     ]
-    envelope = table(
-        "How far each axis may go from nominal, the others at nominal. Interval: 95 % to 5 % probability of success.",
+    numbers = table(
+        "How far each axis may go, the others at nominal. Interval: the last capture outwards that succeeded and the "
+        "first that did not; the range's limit where all did.",
         ["axis", "down to", "interval", "up to", "interval", "unit"],
         rows,
         numeric=(1, 2, 3, 4),
@@ -107,9 +104,9 @@ def _page(study: Study, results: Results, content: dict[str, Any], ends: dict, i
             "envelope",
             "Envelope",
             figure(
-                envelope_bars(study, ends), "Envelope of each axis", "Bars: success; black: the interval of each end."
+                envelope_bars(study, limits), "Envelope of each axis", "Bars: success; black: the interval of each end."
             )
-            + envelope,
+            + numbers,
         ),
         (
             "maps",

@@ -14,6 +14,7 @@ from scipy.stats import qmc
 from ..errors import InputError
 from .boundary import Boundary, fit_boundary
 from .capture import Capture, Outcome
+from .rays import COARSE, STAGE, next_cases, rays
 from .results import Results
 from .study import LARGEST, Study
 from .summary import nominal_point, to_unit
@@ -47,6 +48,8 @@ def run_study(
         run = _Runner(study, results, client, say)
         if study.box:
             run.stage("box", box_points(study), study.box_cases)
+        while wanted := next_cases(study, results.table(STAGE)):
+            run.cases(STAGE, wanted)
         if study.sampling == "latin_hypercube":
             cube = qmc.LatinHypercube(len(study.ranges), rng=study.seed).random(study.cases)
             run.stage("space", study.scaled(cube), study.cases)
@@ -90,20 +93,25 @@ class _Runner:
     def __init__(self, study: Study, results: Results, client: Any, say: Say) -> None:
         self._study, self._results, self._client, self._say = study, results, client, say
         self._begun, self._ran = time.monotonic(), 0
+        self._most_on_rays = 1 + len(rays(study)) * (COARSE + int(np.log2(COARSE)))
 
     def stage(self, stage: str, points: np.ndarray, count: int, first: int = 0) -> None:
         """Run cases ``first`` to ``first + count`` of a stage; points of the varied axes, shape (count, n_ranges)."""
+        size = self._study.batch
+        for start in range(0, count, size):
+            self.cases(stage, {first + n: points[n] for n in range(start, min(start + size, count))})
+
+    def cases(self, stage: str, points: Mapping[int, np.ndarray]) -> None:
+        """Run cases together, by their numbers, at points of the varied axes (n_ranges,)."""
         study, results = self._study, self._results
-        most = study.cases + (study.box_cases if study.box else 0)
-        for start in range(0, count, study.batch):
-            numbers = range(first + start, first + min(start + study.batch, count))
-            wanted = {n: study.values(points[n - first]) for n in numbers if not results.done(stage, n)}
-            for number, outcome in self._outcomes(wanted):
-                results.add(stage, number, wanted[number], outcome)
-                self._ran += 1
-                rate = self._ran / (time.monotonic() - self._begun)
-                self._say(f"{len(results)} of at most {most} cases recorded, {3600 * rate:.0f} an hour")
-            results.merge(stage, numbers)
+        most = study.cases + (study.box_cases if study.box else 0) + self._most_on_rays
+        wanted = {n: study.values(point) for n, point in points.items() if not results.done(stage, n)}
+        for number, outcome in self._outcomes(wanted):
+            results.add(stage, number, wanted[number], outcome)
+            self._ran += 1
+            rate = self._ran / (time.monotonic() - self._begun)
+            self._say(f"{len(results)} of at most {most} cases recorded, {3600 * rate:.0f} an hour")
+        results.merge(stage, list(points))
 
     def _outcomes(self, wanted: Mapping[int, Mapping[str, float]]) -> Iterator[tuple[int, Outcome]]:
         """Outcomes as they come; a case whose worker was killed is tried again by itself, for it may be innocent."""

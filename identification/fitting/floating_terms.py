@@ -119,7 +119,8 @@ def as_carriers(motion: Motion, tree: FloatingTree) -> Motion:
     qd[:, :3], qd[:, 3:CARRIERS] = velocity, spin
     qdd[:, :3] = rate[:, :3] + np.cross(spin, velocity)
     qdd[:, 3:CARRIERS] = rate[:, 3:] - np.stack([y * z, -x * z, x * y], 1)
-    return replace(motion, q=q, qd=qd, qdd=qdd, tau=tau)
+    noise = np.where(np.arange(q.shape[1]) < CARRIERS, 0.0, motion.encoder_noise)  # `momentum_floor` has the twist's
+    return replace(motion, q=q, qd=qd, qdd=qdd, tau=tau, encoder_noise=noise)
 
 
 def twist_noise(dataset: xr.Dataset, tree: FloatingTree) -> Array:

@@ -9,7 +9,7 @@ A candidate is judged on whitened samples with the whole baseline fitted again b
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -123,8 +123,11 @@ def search(
         chosen = _choose(result, passing)
         if not chosen:
             break
+        replaced = {t.judged.placed.key for t in taken for j in chosen if _replaces(j.placed, t.judged.placed)}
+        taken = [t for t in taken if t.judged.placed.key not in replaced]
         taken += [_weigh(result, j, passing, seed) for j in chosen]
         start = {key: value for j in chosen for key, value in j.start().items()}
+        model = replace(model, effects=tuple(p for p in model.effects if p.key not in replaced))
         model = model.with_effects([j.placed for j in chosen], start)
         progress("refitting with " + ", ".join(f"{j.placed.effect.name} at {j.placed.at}" for j in chosen))
         assembly = assemble(model, base, scales)
@@ -150,14 +153,7 @@ def without(found: Fit, placed: Placed) -> Assembly:
 
 def _passing(result: Screening, joints: Sequence[str]) -> list[Judged]:
     """Candidates that pass every test, best first; what acts at a joint finds its channel among ``joints``."""
-    passing = []
-    for j in result.judged:
-        # What a disturbance drives is let into the motion up to a share, and looks like a late sensor.
-        late = j.placed.effect.at == "sensor" and bool(j.placed.effect.states)
-        if j.score <= result.threshold[j.channels] or j.explained < (DRIVEN if late else WORTH):
-            continue
-        if reliably_positive(j.case.fresh_gains()):
-            passing.append(j)
+    passing = [j for j in result.judged if _passes(result, j)]
     for j in [j for j in passing if _near_rest(result, j)]:
         # Scores on different samples do not compare: those that beat it on its own go first.
         others = [o for o in passing if o is not j and set(o.channels) == set(j.channels)]
@@ -171,9 +167,21 @@ def _passing(result: Screening, joints: Sequence[str]) -> list[Judged]:
     return _untied(result, [*first, *alone])
 
 
+def _passes(result: Screening, j: Judged) -> bool:
+    """Does a candidate pass every test?"""
+    # What a disturbance drives is let into the motion up to a share, and looks like a late sensor.
+    late = j.placed.effect.at == "sensor" and bool(j.placed.effect.states)
+    if j.score <= result.threshold[j.channels] or j.explained < (DRIVEN if late else WORTH):
+        return False
+    return reliably_positive(j.case.fresh_gains())
+
+
 def _as_measured(result: Screening, j: Judged) -> bool:
-    """Was a drive's spring or play judged along the motion as measured?"""
-    return j.case.evidence is result.measured.evidence and j.placed.effect.acts_on == "position"
+    """Does a drive's spring or play pass along the motion as measured, and not along what was asked for?"""
+    if j.case.evidence is not result.measured.evidence or j.placed.effect.acts_on != "position":
+        return False
+    asked = result.asked.get(j.placed.key)
+    return asked is None or not _passes(result, asked)
 
 
 def _untied(result: Screening, passing: list[Judged]) -> list[Judged]:
@@ -205,6 +213,11 @@ def _same_samples(result: Screening, j: Judged, other: Judged) -> Judged:
 def _near_rest(result: Screening, j: Judged) -> bool:
     """Was it judged on samples near rest, too?"""
     return j.case.evidence is result.near_rest.evidence
+
+
+def _replaces(new: Placed, old: Placed) -> bool:
+    """Is an effect all that another one is, and more? Levels of friction add up instead."""
+    return new.at == old.at and old.effect.name in new.effect.contains and new.effect.family != "joint friction"
 
 
 def _choose(result: Screening, passing: Sequence[Judged]) -> list[Judged]:

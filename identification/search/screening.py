@@ -14,6 +14,7 @@ from ..fitting.experiment import Experiment
 from ..fitting.fit import Fit
 from ..fitting.problem import gather
 from .candidates import Variant, candidate_columns, free_parameters, library, nameless_columns, smooth_columns, variants
+from .encoder_noise import encoder_torque
 from .evidence import Channel, Evidence
 from .judged import Case, Judged, Parts, Samples
 from .rest import bridged, friction_less, in_motion
@@ -55,6 +56,8 @@ class Screening:
     measured: Samples
     """Samples in motion beside a baseline from the motion as measured, on which some of the candidates were judged."""
     judged: tuple[Judged, ...]
+    asked: Mapping[str, Judged]
+    """Of drives judged along the motion as measured: the same along the motion that was asked for."""
     threshold: Mapping[tuple[int, ...], float]
     nameless: Mapping[int, float]
     over: Mapping[int, str]
@@ -106,9 +109,19 @@ def screen(
     held = {c: [friction_less(e, c) for e in experiments] for c in range(len(model.joints))}
     residuals, baseline = _left(found, experiments, experiments)
     near_rest = _samples(found, baseline, residuals, noise, None, held, seed)
+    noisy = np.mean([encoder_torque(found, e) ** 2 for e in experiments], axis=0)
+    energy = [float(np.mean((c.residual * s) ** 2)) for c, s in zip(close.raw.channels, found.sigma, strict=True)]
+    heard = noisy / np.maximum(energy, 1e-300)
     log_size = np.log(samples.evidence.size)
     judged: list[Judged] = []
+    asked: dict[str, Judged] = {}
     null: dict[tuple[int, ...], Array] = {(c,): np.zeros(NULLS) for c in range(len(model.joints))}
+
+    def beyond_noise(j: Judged, some: Samples, source: Sequence[Experiment], states: Sequence[Evaluation]) -> float:
+        """Share of its joint's own residual that a drive explains, less what the encoders' noise accounts for."""
+        own = assembly.joint_of(j.placed)
+        return some.explained(j.variant, {own: _columns(found, source, states, j.variant)[own]}) - heard[own]
+
     for options in pool:
 
         def price(variant: Variant) -> float:
@@ -118,30 +131,32 @@ def screen(
             return _columns(found, experiments, exact, variant)
 
         effect = options[0][0].placed.effect
-        found_so = [_judge(close if effect.at_rest else samples, noise, options, price, null, everywhere)]
+        plain = _judge(close if effect.at_rest else samples, noise, options, price, null, everywhere)
+        others: list[Judged | None] = []
         measured = [(v, everywhere(v)) for v, _ in options] if effect.exceeds_at_rest or effect.remembers else []
         if effect.acts_on == "position":
+            if plain is not None and beyond_noise(plain, samples, planned, states) < WORTH:
+                plain = None
 
             def driven(some: Sequence[Variant]) -> Judged | None:
                 measured = [(v, _columns(found, moving, exact, v)) for v in some]
                 return _judge(close, noise, measured, price, None, everywhere)
 
             j = _tuned(driven([v for v, _ in options]), driven)
-            if j is not None:
-                own = assembly.joint_of(j.placed)
-                share = close.explained(j.variant, {own: _columns(found, moving, exact, j.variant)[own]})
-                found_so += [j] if share > DRIVEN_MOST else []
+            if j is not None and beyond_noise(j, close, moving, exact) > DRIVEN_MOST:
+                if plain is not None:
+                    asked[plain.placed.key] = plain
+                others.append(j)
         if effect.exceeds_at_rest:
-            found_so.append(_judge(near_rest, noise, measured, price, None, everywhere))
+            others.append(_judge(near_rest, noise, measured, price, None, everywhere))
         if effect.remembers:
             j = _judge(near_rest.alone(), noise, measured, price, None, everywhere)
-            found_so += [j] if j is not None and j.explained > MOST else []
-        j = found_so[0]
-        if effect.at_rest and j is not None and j.case.share() > WORTH:
+            others += [j] if j is not None and j.explained > MOST else []
+        if effect.at_rest and plain is not None and plain.case.share() > WORTH:
             # What is plain in motion may be worth its name for what it does near rest.
-            whole = near_rest.alone().explained(j.variant, everywhere(j.variant))
-            found_so[0] = replace(j, explained=max(j.explained, whole))
-        better = max((j for j in found_so if j is not None), key=lambda j: j.score, default=None)
+            whole = near_rest.alone().explained(plain.variant, everywhere(plain.variant))
+            plain = replace(plain, explained=max(plain.explained, whole))
+        better = max((j for j in (plain, *others) if j is not None), key=lambda j: j.score, default=None)
         if better is not None:
             free = free_parameters(assembly, instruments[0], states[0], better.variant)
             hold = tuple(p.name for p in better.placed.effect.parameters if p.name not in free)
@@ -166,7 +181,9 @@ def screen(
                 if share > nameless.get(c, 0.0):
                     nameless[c], over[c] = share, words
     judged.sort(key=lambda j: -j.score)
-    return Screening(samples.evidence, near_rest, close, tuple(judged), threshold, nameless, over, tuple(limits), noise)
+    return Screening(
+        samples.evidence, near_rest, close, tuple(judged), asked, threshold, nameless, over, tuple(limits), noise
+    )
 
 
 def _left(
