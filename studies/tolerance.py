@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..report.html import page
+from ..report.html import page, paragraph
 from ..report.html import table as markup_table
 from ..tolerance.report import summarise
 from ..tolerance.results import Results
@@ -38,7 +38,7 @@ def main() -> int:
         found.append((content, results.folder.name))
         print(f"  {content['sentence']}", flush=True)
     sentences = " ".join(content["sentence"] for content, _ in found)
-    (folder / "report.html").write_text(_page(sentences, quantities, found), encoding="utf-8")
+    (folder / "report.html").write_text(_page(quantities, found), encoding="utf-8")
     write_result("tolerance", quantities, time.monotonic() - begun, {"found": sentences})
     print(f"{table(quantities)}\n\n{sentences}\nReport: {(folder / 'report.html').resolve()}")
     return 0
@@ -70,7 +70,7 @@ def _quantity(name: str, unit: str, interval: dict[str, float | None]) -> Quanti
     return Quantity(name, unit, interval["value"], "reference", None, interval["low"], interval["high"])
 
 
-def _page(sentences: str, quantities: list[Quantity], found: list[tuple[dict[str, Any], str]]) -> str:
+def _page(quantities: list[Quantity], found: list[tuple[dict[str, Any], str]]) -> str:
     links = "".join(
         f'<li><a href="{folder}/report.html">{content["study"]}</a>: maps, envelope, sensitivities'
         f"{', typical misses to play' if content['misses'] else ''}.</li>"
@@ -88,7 +88,7 @@ def _page(sentences: str, quantities: list[Quantity], found: list[tuple[dict[str
         numeric=(1, 2),
     )
     parts = [("numbers", "In numbers", numbers), ("studies", "The two studies", f"<ul>{links}</ul>")]
-    header = f"<h1>{sentences}</h1>"
+    header = "<h1>How far off may the arm arrive?</h1>" + "".join(paragraph(c["sentence"]) for c, _ in found)
     return page("Capture tolerances", header, parts, "Written by snarelab: make study-tolerance.")
 
 

@@ -235,15 +235,43 @@ def test_torque_of_plain_effects_is_the_sum_by_hand(arm, experiment):
     np.testing.assert_allclose(tau[:, 2], load[:, 2], atol=1e-9)
 
 
-@pytest.mark.parametrize(("channel", "sign"), [("tau", -1), ("q", 1)])
-def test_a_delay_shifts_the_channel(arm, experiment, channel, sign):
-    """A late torque sensor shows the torque of a moment ago; a late encoder is behind the torque, so that is early."""
-    assembly = build(arm, experiment, placed(("sensor_delay", f"{channel}.joint2")))
+def test_a_late_torque_sensor_shows_the_torque_of_a_moment_ago(arm, experiment):
+    assembly = build(arm, experiment, placed(("sensor_delay", "tau.joint2")))
     m, delay = experiment.motion, 4 * PERIOD
     tau = assembly.torque(experiment, np.array([delay]))[:, 1]
     load = experiment.body.torque(m.q, m.qd, m.qdd, arm[0].phi)[:, 1]
     middle = np.arange(50, len(load) - 50)
-    np.testing.assert_allclose(tau[middle], load[middle + 4 * sign], atol=1e-3 * np.ptp(load))
+    np.testing.assert_allclose(tau[middle], load[middle - 4], atol=1e-3 * np.ptp(load))
+
+
+def test_a_late_encoder_is_behind_the_torque_of_every_joint(arm, experiment):
+    """The torque of all joints is that of the motion with this joint a moment ahead, and so is its own friction."""
+    effects = placed(("viscous_friction", "joint2"), ("sensor_delay", "q.joint2"))
+    assembly = build(arm, experiment, effects)
+    m, late = experiment.motion, 2
+    tau = assembly.torque(experiment, np.array([2.5, late * PERIOD]))
+    ahead = [x.copy() for x in (m.q, m.qd, m.qdd)]
+    for x in ahead:
+        x[:-late, 1] = x[late:, 1]
+    load = experiment.body.torque(*ahead, arm[0].phi)
+    load[:, 1] += 2.5 * ahead[1][:, 1]
+    still = experiment.body.torque(m.q, m.qd, m.qdd, arm[0].phi)
+    still[:, 1] += 2.5 * m.qd[:, 1]
+    middle = slice(50, len(load) - 50)
+    for channel in range(3):
+        # First order in what the joint moved meanwhile.
+        change, missed = (np.std((x - load)[middle, channel]) for x in (still, tau))
+        assert missed < 0.1 * change, (channel, missed, change)
+
+
+def test_a_late_encoder_with_the_inertia_free_makes_its_channel_early(arm, experiment):
+    base = base_parameters(arm[1])
+    assembly = build(arm, experiment, placed(("sensor_delay", "q.joint2")), base)
+    tau = assembly.torque(experiment, np.append(base.matrix @ arm[0].phi, 4 * PERIOD))[:, 1]
+    m = experiment.motion
+    load = experiment.body.torque(m.q, m.qd, m.qdd, arm[0].phi)[:, 1]
+    middle = np.arange(50, len(load) - 50)
+    np.testing.assert_allclose(tau[middle], load[middle + 4], atol=1e-3 * np.ptp(load))
 
 
 def test_a_flexible_joint_is_the_rigid_body_moved_by_the_twist(arm, experiment):

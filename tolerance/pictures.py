@@ -35,6 +35,7 @@ def probability_maps(study: Study, boundary: Boundary, table: pd.DataFrame) -> b
             axes.plot(table[x][won], table[y][won], ".", color=AFTER, markersize=2)
             axes.plot(table[x][~won], table[y][~won], "x", color=BEFORE, markersize=2.5, markeredgewidth=0.5)
             axes.set(xlabel=_label(study, x), ylabel=_label(study, y))
+            axes.locator_params(axis="x", nbins=5)
             axes.grid(False)
         return svg(figure)
 
@@ -50,7 +51,8 @@ def envelope_bars(study: Study, ends: Mapping[str, tuple[Interval, Interval]]) -
             for end in (down, up):
                 axes.plot([end.low / scale, end.high / scale], [row, row], color="#1C2329", linewidth=1.5)
         axes.set_yticks(
-            range(len(ends)), [f"{n}: {d.value:.3g} to {u.value:.3g} {_unit(study, n)}" for n, (d, u) in ends.items()]
+            range(len(ends)),
+            [f"{n}: {d.value:.3g} to {u.value:.3g} {_unit(study, n)}".rstrip() for n, (d, u) in ends.items()],
         )
         axes.invert_yaxis()
         axes.set(xlim=(-1.05, 1.05), xlabel="share of the largest value that was searched")
@@ -88,8 +90,9 @@ def width_curve(counts: np.ndarray, widths: np.ndarray, wanted: float) -> bytes:
 
 
 def _label(study: Study, name: str) -> str:
-    return f"{name} [{_unit(study, name)}]"
+    unit = _unit(study, name)
+    return f"{name} [{unit}]" if unit else name
 
 
 def _unit(study: Study, name: str) -> str:
-    return study.capture.axis(name).unit
+    return study.capture.axis(name).unit.removeprefix("1")

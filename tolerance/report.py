@@ -17,6 +17,9 @@ from .run import space_boundary
 from .study import LARGEST, Study
 from .summary import Interval, sensitivities, success_probability
 
+_OTHERS = ("box", STAGE)
+"""Cases that the maps are fitted to beside those over the whole range; those along single axes choose no others."""
+
 
 def summarise(study: Study, results: Results) -> dict[str, Any]:
     """Write ``result.json``, ``cases.parquet`` and ``report.html`` into the results folder; returns the numbers.
@@ -26,7 +29,7 @@ def summarise(study: Study, results: Results) -> dict[str, Any]:
     directions that were tried (see `rays`), ``sensitivity``, ``misses`` (file, kind, text), ``sentence``.
     """
     space = results.table("space")
-    boundary = space_boundary(study, results)
+    boundary = space_boundary(study, results, others=_OTHERS)
     found, indices = ends(study, results.table(STAGE)), sensitivities(study, boundary)
     limits = envelope(study, found)
     content: dict[str, Any] = {
@@ -59,7 +62,8 @@ def _sentence(study: Study, content: dict[str, Any]) -> str:
     if "probability_box" in content:
         p = content["probability_box"]
         low, high = 100 * p["low"], 100 * p["high"]
-        words.append(f"inside the box {100 * p['value']:.0f} % succeed (95 % interval {low:.1f} to {high:.1f} %)")
+        where = "at the ends of" if study.box_ends else "inside"
+        words.append(f"{where} the box {100 * p['value']:.0f} % succeed (95 % interval {low:.1f} to {high:.1f} %)")
     for key, factor, unit, what in (
         ("envelope_radial", 1e3, "mm", "offset alone"),
         ("envelope_angle", 180 / np.pi, "deg", "tilt alone"),
@@ -67,10 +71,13 @@ def _sentence(study: Study, content: dict[str, Any]) -> str:
         e = content.get(key)
         if e and e["value"] is not None:
             low, high = factor * e["low"], factor * e["high"]
-            end = f"at least {low:.1f} {unit}" if low == high else f"up to {low:.1f} to {high:.1f} {unit}"
-            words.append(f"{what}, in the worst direction tried, {end}")
-    worst = max(content["sensitivity"], key=lambda s: s["total"])
-    words.append(f"{worst['axis']} matters most")
+            if low == high:
+                words.append(f"{what} may be {low:.1f} {unit} at least")
+            else:
+                words.append(f"{what} may be {low:.1f} to {high:.1f} {unit} in the worst direction tried")
+    first, *others = sorted(content["sensitivity"], key=lambda s: -s["total"])
+    most = [first["axis"], *(s["axis"] for s in others if s["total_high"] > first["total_low"])]
+    words.append(f"{', '.join(most)} matter{'s' if len(most) == 1 else ''} most")
     return "; ".join(words) + "."
 
 
@@ -82,23 +89,23 @@ def _page(
         [
             name,
             f"{d.value:.4g}",
-            f"{d.high:.4g} to {d.low:.4g}",
+            _between(d.high, d.low),
             f"{u.value:.4g}",
-            f"{u.low:.4g} to {u.high:.4g}",
+            _between(u.low, u.high),
             study.capture.axis(name).unit,
         ]
         for name, (d, u) in limits.items()
     ]
     numbers = table(
         "How far each axis may go, the others at nominal. Interval: the last capture outwards that succeeded and the "
-        "first that did not; the range's limit where all did.",
+        "first that did not, or has no result.",
         ["axis", "down to", "interval", "up to", "interval", "unit"],
         rows,
         numeric=(1, 2, 3, 4),
     )
     counts, widths = _widths(study, results)
     reasons = "; ".join(f"{n} x {why}" for why, n in Counter(_failures(results)).items()) or "none"
-    boundary = space_boundary(study, results)
+    boundary = space_boundary(study, results, others=_OTHERS)
     sections = [
         (
             "envelope",
@@ -144,6 +151,10 @@ def _page(
     return page(f"{study.name}: capture tolerance", header, sections, f"Written by snarelab {__version__}.")
 
 
+def _between(low: float, high: float) -> str:
+    return "all succeeded" if low == high else f"{low:.4g} to {high:.4g}"
+
+
 def _gallery(misses: list[Miss]) -> str:
     items = "".join(
         f'<li><a href="{escape(m.file)}">{escape(m.kind.capitalize())}</a>: {escape(m.text)}.</li>' for m in misses
@@ -159,7 +170,7 @@ def _failures(results: Results) -> list[str]:
 def _widths(study: Study, results: Results) -> tuple[np.ndarray, np.ndarray]:
     total = min(len(results.table("space")), LARGEST)
     counts = np.unique(np.append(np.arange(study.batch, total, max(study.batch, total // 8)), total))
-    return counts, np.array([space_boundary(study, results, int(n)).width() for n in counts])
+    return counts, np.array([space_boundary(study, results, int(n), _OTHERS).width() for n in counts])
 
 
 def _plain(interval: Interval) -> dict[str, float | None]:

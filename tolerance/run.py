@@ -56,7 +56,7 @@ def run_study(
             return
         adaptive = study.sampling == "adaptive"
         count = min(study.batch, study.cases) if adaptive else study.cases
-        run.stage("space", study.scaled(_sobol(study, count)), count)
+        run.stage("space", study.scaled(sobol_points(study, count)), count)
         was = np.inf
         while adaptive:  # replayed from the start when a killed run goes on: batches depend on complete batches only
             boundary = space_boundary(study, results, count)
@@ -70,12 +70,14 @@ def run_study(
             count += size
 
 
-def space_boundary(study: Study, results: Results, cases: int | None = None) -> Boundary:
-    """The boundary from the (first ``cases``) recorded cases over the whole range, and those of the box.
+def space_boundary(
+    study: Study, results: Results, cases: int | None = None, others: tuple[str, ...] = ("box",)
+) -> Boundary:
+    """The boundary from the (first ``cases``) recorded cases over the whole range, and those of other stages.
 
-    Of either, `LARGEST` at most are taken.
+    Of each, `LARGEST` at most are taken.
     """
-    parts = [results.table("space").iloc[:cases], results.table("box")]
+    parts = [results.table("space").iloc[:cases], *map(results.table, others)]
     names = [*study.ranges, "margin"]
     points = np.vstack([part.iloc[:LARGEST][names].to_numpy(float) for part in parts])
     return fit_boundary(to_unit(study, points[:, :-1]), points[:, -1], study.seed)
@@ -148,7 +150,7 @@ class _Runner:
             self._say("no worker at the scheduler; waiting for one")
 
 
-def _sobol(study: Study, count: int) -> np.ndarray:
+def sobol_points(study: Study, count: int) -> np.ndarray:
     """The nominal case, where success is likeliest, then a Sobol set: the first cases see both sides if they can."""
     sampler = qmc.Sobol(len(study.ranges), rng=study.seed)
     cube = sampler.random_base2((count - 1).bit_length())[:count]

@@ -223,11 +223,21 @@ class Assembly:
                 continue
             j = self.joint_of(p)
             terms, by_load, sense = contributions(
-                experiment, self.tree, p, j, load[:, j], tau[:, j], self.speed_scales[j], self.parameters(k, theta)
+                experiment,
+                self.tree,
+                p,
+                j,
+                load[:, j],
+                tau[:, j],
+                self.speed_scales[j],
+                self.parameters(k, theta),
+                self.base is None,
             )
             if sense is not None:
                 passed.setdefault(j, []).append(sense)
-                blocks = [Block(j, b.index, sense(b.values)) if b.channel == j else b for b in blocks]
+                # A late encoder's share of the rigid body's torque is worked out from the motion, apart from the load.
+                apart = len(rigid) if p.at.startswith("q.") and self.base is None else 0
+                blocks[apart:] = [Block(j, b.index, sense(b.values)) if b.channel == j else b for b in blocks[apart:]]
             if by_load is not None:
                 blocks += [Block(j, b.index, by_load[:, None] * b.values) for b in rigid if b.channel == j]
             for channel, values, columns in terms:
@@ -252,7 +262,15 @@ class Assembly:
                 continue
             j = self.joint_of(p)
             terms, _, _ = contributions(
-                experiment, self.tree, p, j, load[:, j], load[:, j], self.speed_scales[j], self.parameters(k, theta)
+                experiment,
+                self.tree,
+                p,
+                j,
+                load[:, j],
+                load[:, j],
+                self.speed_scales[j],
+                self.parameters(k, theta),
+                self.base is None,
             )
             for channel, values, columns in terms:
                 load[:, channel] += values

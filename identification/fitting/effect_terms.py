@@ -31,6 +31,7 @@ def contributions(
     reading: Array,
     speed_scale: float,
     parameters: Array,
+    trusted: bool,
 ) -> tuple[list[tuple[int, Array, Array]], Array | None, Callable[[Array], Array] | None]:
     """What one placed effect adds to the torque channels.
 
@@ -48,6 +49,8 @@ def contributions(
         The joint's peak speed in the training recordings [rad/s or m/s].
     parameters : array (p,)
         All of the effect's parameters.
+    trusted : bool
+        Whether the inertia is the tree's; identified, it is in ``load`` alone.
 
     Returns
     -------
@@ -82,11 +85,24 @@ def contributions(
         "speed_scale": np.full(len(load), speed_scale),
     }
     if effect.at == "sensor":
-        # A late position encoder makes the torque channel early against the motion: time runs backwards.
-        direction = slice(None, None, -1) if placed.at.startswith("q.") else slice(None)
-        values, by_parameter, by_value = _by_segment(experiment, effect, signals, parameters, direction)
-        passed = _passed(experiment, effect, parameters, by_value, direction)
-        return [(joint, values[:, 0] - reading, by_parameter[:, 0])], None, passed
+        # Against the motion that a late position encoder reads, all that the joint's motion causes is early: time runs
+        # backwards.
+        encoder = placed.at.startswith("q.")
+        direction = slice(None, None, -1) if encoder else slice(None)
+
+        def sensed(value: Array) -> tuple[Array, Array, Array | None]:
+            found, by, by_value = _by_segment(experiment, effect, signals | {"value": value}, parameters, direction)
+            return found[:, 0] - value, by[:, 0], by_value
+
+        if encoder and trusted:
+            change, by, by_value = sensed(reading - load)
+            moved = [sensed(x[:, joint]) for x in (motion.q, motion.qd, motion.qdd)]
+            terms = _along(experiment, joint, *(np.stack(x, 1) for x in list(zip(*moved, strict=True))[:2]))
+            terms[joint] = (joint, terms[joint][1] + change, terms[joint][2] + by)
+        else:
+            change, by, by_value = sensed(reading)
+            terms = [(joint, change, by)]
+        return terms, None, _passed(experiment, effect, parameters, by_value, direction)
     if effect.states:
         signals["inertia"] = experiment.mass_matrix[:, joint, joint]
     values, by_parameter, by_load = _by_segment(experiment, effect, signals, parameters)
@@ -94,16 +110,17 @@ def contributions(
         return rig_terms(experiment, tree, effect, placed.at, values, by_parameter), None, None
     if effect.acts_on == "torque":
         return [(joint, values[:, 0], by_parameter[:, 0])], None if by_load is None else by_load[:, 0, 0], None
+    return _along(experiment, joint, values, by_parameter), None, None
+
+
+def _along(experiment: Experiment, joint: int, values: Array, by_parameter: Array) -> list[tuple[int, Array, Array]]:
+    """What a change of a joint's position, rate and acceleration (n, 3) adds to every channel, to first order."""
     by_position, by_rate = experiment.tangent
     paths = np.stack([by_position[:, :, joint], by_rate[:, :, joint], experiment.mass_matrix[:, :, joint]], 2)
-    return (
-        [
-            (c, np.einsum("nd,nd->n", paths[:, c], values), np.einsum("nd,ndp->np", paths[:, c], by_parameter))
-            for c in range(paths.shape[1])
-        ],
-        None,
-        None,
-    )
+    return [
+        (c, np.einsum("nd,nd->n", paths[:, c], values), np.einsum("nd,ndp->np", paths[:, c], by_parameter))
+        for c in range(paths.shape[1])
+    ]
 
 
 def _link_change(effect: Effect, tree: Tree, link: int, parameters: Array) -> tuple[Array, Array]:

@@ -21,6 +21,9 @@ MOST_VARIANTS = 36
 """Grid points of one effect at one place; a finer grid is thinned evenly."""
 
 
+MOST_OF_WHOLE = 1.6
+"""Most that a law's whole contribution at a point of its grid is multiplied by: beyond, another point is meant."""
+
 MOST_COMBINED = 4
 """Most columns of a link effect of which every combination is tried."""
 
@@ -94,7 +97,7 @@ def variants(assembly: Assembly, placed: Placed) -> list[Variant]:
     if len(masses) < len(amplitudes):  # slopes are taken at one kilogram
         axes = [[1.0] if i in masses else axis for i, axis in enumerate(axes)]
     index = np.array(amplitudes, int)
-    bounds = [assembly.bounds(placed, placed.effect.parameters[i]) for i in index] or [(0.0, np.inf)]
+    bounds = [assembly.bounds(placed, placed.effect.parameters[i]) for i in index] or [(0.0, MOST_OF_WHOLE)]
     low, high = (np.array(x, float) for x in zip(*bounds, strict=True))
     grid = list(product(*axes))
     step = -(-len(grid) // MOST_VARIANTS)
@@ -133,6 +136,7 @@ def candidate_columns(
         state.tau[:, joint],
         assembly.speed_scales[joint],
         variant.parameters,
+        assembly.base is None,
     )
     found = []
     for channel, values, columns in terms:
@@ -164,6 +168,7 @@ def free_parameters(assembly: Assembly, experiment: Experiment, state: Evaluatio
         state.tau[:, joint],
         assembly.speed_scales[joint],
         parameters,
+        assembly.base is None,
     )
     moves = np.sum([np.sum(columns**2, axis=0) for _, _, columns in terms], axis=0) > 0
     amplitudes = {p.name for p in placed.effect.parameters if _is_linear(p) and len(variant.amplitudes)}

@@ -120,14 +120,20 @@ def search(
         instruments = before.instruments
     for number in range(2, MOST_ROUNDS + 2):
         passing = [j for j in _passing(result, model.joints) if j.placed.key not in barred]
-        chosen = _choose(result, passing)
-        if not chosen:
+        news = [(j, wide) for j in _choose(result, passing) if (wide := _widest(j, taken)) is not None]
+        if not news:
             break
-        replaced = {t.judged.placed.key for t in taken for j in chosen if _replaces(j.placed, t.judged.placed)}
-        taken = [t for t in taken if t.judged.placed.key not in replaced]
-        taken += [_weigh(result, j, passing, seed) for j in chosen]
+        chosen = [wide for _, wide in news]
+        weighed = [_weigh(result, j, passing, seed) for j, _ in news]
+        for new, wide in zip(weighed, chosen, strict=True):
+            gone = {t.judged.placed.key for t in taken if _is_all(wide, t.judged)} | {wide.placed.key}
+            # What has become part of something wider speaks for it; what explained more speaks louder.
+            strongest = max([new, *(t for t in taken if t.judged.placed.key in gone)], key=lambda t: t.judged.score)
+            rivals = tuple(r for r in strongest.rivals if r.placed.key not in gone)
+            taken = [t for t in taken if t.judged.placed.key not in gone]
+            taken.append(Taken(wide, strongest.probability, rivals))
+            model = replace(model, effects=tuple(p for p in model.effects if p.key not in gone))
         start = {key: value for j in chosen for key, value in j.start().items()}
-        model = replace(model, effects=tuple(p for p in model.effects if p.key not in replaced))
         model = model.with_effects([j.placed for j in chosen], start)
         progress("refitting with " + ", ".join(f"{j.placed.effect.name} at {j.placed.at}" for j in chosen))
         assembly = assemble(model, base, scales)
@@ -215,9 +221,22 @@ def _near_rest(result: Screening, j: Judged) -> bool:
     return j.case.evidence is result.near_rest.evidence
 
 
-def _replaces(new: Placed, old: Placed) -> bool:
-    """Is an effect all that another one is, and more? Levels of friction add up instead."""
-    return new.at == old.at and old.effect.name in new.effect.contains and new.effect.family != "joint friction"
+def _is_all(wide: Judged, other: Judged) -> bool:
+    """Is an effect all that another one at its place is, and more? Levels of friction add up instead."""
+    effect = wide.placed.effect
+    contained = wide.placed.at == other.placed.at and other.placed.effect.name in effect.contains
+    return contained and effect.family != "joint friction"
+
+
+def _widest(new: Judged, taken: Sequence[Taken]) -> Judged | None:
+    """A candidate, or what was taken before if it is all that; with every parameter free. None where it is already."""
+    for old in (t.judged for t in taken):
+        for wide, part in ((new, old), (old, new)):
+            if _is_all(wide, part):
+                if wide is old and not old.placed.hold:
+                    return None
+                return replace(wide, placed=replace(wide.placed, hold=()))
+    return new
 
 
 def _choose(result: Screening, passing: Sequence[Judged]) -> list[Judged]:
@@ -265,19 +284,22 @@ def _together(result: Screening, several: Sequence[Judged]) -> float:
 def _weigh(result: Screening, best: Judged, passing: Sequence[Judged], seed: int) -> Taken:
     """Bootstrap over time blocks: how often does each candidate on these channels beat all others?"""
     evidence = result.evidence
-    # What contains the effect as a special case does not contradict it.
+
+    def contradicts(j: Judged) -> bool:
+        """What contains the effect as a special case does not; of a link's mass, it may be the whole truth."""
+        if best.placed.effect.name not in j.placed.effect.contains or best.placed.at != j.placed.at:
+            return True
+        return best.placed.effect.at == "link" and evidence.likeness(best.signal(), j.signal()) > ALIKE
+
     rivals = [best] + [
         j
         for j in passing
-        if j is not best
-        and best.placed.effect.name not in j.placed.effect.contains
-        and set(j.channels) & set(best.channels)
-        and j.score > 0.2 * best.score
+        if j is not best and set(j.channels) & set(best.channels) and j.score > 0.2 * best.score and contradicts(j)
     ]
     rivals = rivals[:8]
     near_rest = any(_near_rest(result, j) for j in rivals)
     alike = [j.among(result.near_rest) if near_rest else j for j in rivals]
-    gains = np.array([j.case.shares() for j in alike])
+    gains = np.array([j.case.shares() / (AHEAD if _is_all(j, best) else 1.0) for j in alike])
     price = np.array([j.price for j in rivals])
     rng = np.random.default_rng(seed)
     counts = rng.multinomial(evidence.n_blocks, np.full(evidence.n_blocks, 1 / evidence.n_blocks), BOOTSTRAPS)
