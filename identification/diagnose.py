@@ -27,7 +27,7 @@ from .links.answer import with_links
 from .links.diagnose import diagnose_links
 from .search.forward import Found, Taken, carry, search, without
 from .search.rest import bridged, fitted
-from .search.screening import MOST
+from .search.trial import MOST
 from .snare.diagnose import diagnose_captures
 
 Array = NDArray[np.float64]

@@ -4,14 +4,16 @@ The motion is exact but for the encoders' steps, so that all the fast accelerati
 """
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-import pinocchio as pin
+import pinocchio
 import pytest
 
 from snarelab.identification.diagnose import diagnose
 from snarelab.models.model_file import load_model
 
+pin: Any = pinocchio  # its stubs lack most names
 ARM = Path(__file__).resolve().parents[1] / "studies" / "bundled" / "arm3.urdf"
 RATE, SECONDS, STEP = 200.0, 24.0, 2e-5
 COULOMB, VISCOUS = np.array([3.0, 4.0, 2.0]), np.array([4.0, 5.0, 2.0])

@@ -19,7 +19,7 @@ from ..search.candidates import MOST_VARIANTS
 from ..search.forward import ALIKE, BOOTSTRAPS, MOST_ROUNDS
 from ..search.noise import Whitener, whitener
 from ..search.saturated import BLOCK, MOST_BLOCKS
-from ..search.screening import WORTH
+from ..search.trial import WORTH
 from .pair import Pair, PairFit, fit_pair
 
 Array = NDArray[np.float64]

@@ -23,7 +23,8 @@ from .closed_loop import DRIVEN, planned
 from .evidence import ABSORBED
 from .judged import Judged
 from .rest import fitted
-from .screening import WORTH, Screening, reliably_positive, screen
+from .screening import Screening, reliably_positive, screen
+from .trial import WORTH
 
 Array = NDArray[np.float64]
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -124,6 +125,20 @@ class Judged:
         return {f"{self.placed.key}.{name}": float(value) for name, value in zip(names, full, strict=True)}
 
 
+class Bounded(Protocol):
+    """Anything whose amplitudes have bounds, each (k,)."""
+
+    @property
+    def low(self) -> Array:
+        """Lower ones."""
+        ...
+
+    @property
+    def high(self) -> Array:
+        """Upper ones."""
+        ...
+
+
 @dataclass(frozen=True)
 class Samples:
     """The samples that candidates are judged on, whitened and plain.
@@ -144,7 +159,7 @@ class Samples:
     plain: Callable[[int, Sequence[Array]], Array]
     beside: Mapping[int, Parts]
 
-    def case(self, variant: Variant, columns: Mapping[int, Parts]) -> Case:
+    def case(self, variant: Bounded, columns: Mapping[int, Parts]) -> Case:
         """A candidate's columns on whitened samples."""
         return self._case(self.evidence, self.whiten, variant, columns)
 
@@ -152,7 +167,7 @@ class Samples:
         """The same samples with nothing beside a candidate."""
         return replace(self, beside={})
 
-    def explained(self, variant: Variant, columns: Mapping[int, Parts]) -> float:
+    def explained(self, variant: Bounded, columns: Mapping[int, Parts]) -> float:
         """Share of the plain residual's energy that a candidate explains, 0 to 1."""
         case = self._case(self.raw, self.plain, variant, columns)
         energy = sum(float(np.sum(self.raw.channels[c].residual ** 2)) for c in columns)
@@ -164,7 +179,7 @@ class Samples:
         self,
         evidence: Evidence,
         bring: Callable[[int, Sequence[Array]], Array],
-        variant: Variant,
+        variant: Bounded,
         columns: Mapping[int, Parts],
     ) -> Case:
         own = {c: bring(c, parts) for c, parts in columns.items()}
@@ -177,7 +192,7 @@ class Samples:
         low, high = np.concatenate([variant.low, zero]), np.concatenate([variant.high, zero + np.inf])
         return Case(evidence, products, low, high, tuple(own), beside)
 
-    def foreseen(self, variant: Variant, columns: Mapping[int, Parts], spread: float) -> float:
+    def foreseen(self, variant: Bounded, columns: Mapping[int, Parts], spread: float) -> float:
         """The same share in blocks that were not fitted to; may be negative."""
         energy = sum(float(np.sum(self.raw.channels[c].residual ** 2)) for c in columns)
         return float(2 * np.sum(self._case(self.raw, self.plain, variant, columns).fresh_gains(spread)) / energy)

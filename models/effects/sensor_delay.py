@@ -22,7 +22,7 @@ def _rate(s: Symbols, p: Symbols) -> list[ca.SX]:
 
 
 def _law(s: Symbols, p: Symbols) -> ca.SX:
-    return sum(n * s[name] for n, name in zip(_NUMERATOR, _STATES, strict=True))
+    return ca.dot(ca.DM(_NUMERATOR), ca.vertcat(*(s[name] for name in _STATES)))
 
 
 EFFECT = Effect(

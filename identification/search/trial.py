@@ -1,0 +1,175 @@
+"""One effect at one place, tried on every ground that suits it: its best shape, and what the recordings say of it."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...models.effect import Effect
+from .candidates import Variant, free_parameters
+from .grounds import NULLS, Grounds, Reading, Readings
+from .judged import Case, Judged, Parts, Samples
+
+Array = NDArray[np.float64]
+Option = tuple[Variant, dict[int, Parts]]
+"""A point of the grid over an effect's shapes, and its columns."""
+
+WORTH = 0.05
+"""Least share of its channels' residual energy that an effect must explain to be named."""
+
+MOST = 0.5
+"""Share of its channels' residual energy, near rest too, from which on an effect with a memory of where the joint
+turned is named for what it does near rest: joints that stick and rounded signs look like one, and leave most of it."""
+
+DRIVEN_MOST = 0.25
+"""Share of its own channel's residual energy from which on a drive's spring or play is named for what it explains along
+the motion as measured, which knows how the link rings: what disturbances drive looks like one too, and leaves most."""
+
+TUNINGS = 3
+"""Rounds in which the shape of such a candidate is tuned; what rings falls between the points of a grid."""
+
+
+@dataclass
+class Null:
+    """Best score that any candidate reaches on each set of channels with sign-flipped noises, so far (NULLS,)."""
+
+    scores: dict[tuple[int, ...], Array]
+
+    def enter(self, reached: tuple[int, ...], scores: Array) -> None:
+        """Note a candidate's."""
+        self.scores[reached] = np.maximum(self.scores.get(reached, np.zeros(NULLS)), scores)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """The better of what the grounds make of an effect, and what the motion that was asked for makes of it, where that
+    is another: of a drive that was judged along the motion as measured."""
+
+    best: Judged
+    asked: Judged | None
+
+
+def tried(ground: Grounds, options: Sequence[Option], null: Null) -> Trial | None:
+    """Judge an effect at a place; None where nothing speaks for it.
+
+    Parameters
+    ----------
+    ground : Grounds
+    options : sequence of Option
+        Columns from the reading that `source` names.
+    null : Null
+        What noise alone reaches is entered.
+    """
+    judge = _Judge(ground)
+    effect, whole = options[0][0].placed.effect, ground.readings.everywhere
+    plain = judge(ground.measured if effect.at_rest else ground.asked, options, null)
+    asked: Judged | None = None
+    others: list[Judged | None] = []
+    if effect.acts_on == "position":
+        if plain is not None and judge.beyond_noise(plain, ground.asked, ground.readings.asked) < WORTH:
+            plain = None
+        driven = judge.along_measured([v for v, _ in options])
+        if driven is not None:
+            asked, others = plain, [driven]
+    if effect.exceeds_at_rest or effect.remembers:
+        near = [(v, whole.columns(v)) for v, _ in options]
+        if effect.exceeds_at_rest:
+            others.append(judge(ground.near_rest, near))
+        if effect.remembers:
+            j = judge(ground.near_rest.alone(), near)
+            others += [j] if j is not None and j.explained > MOST else []
+    if effect.at_rest and plain is not None and plain.case.share() > WORTH:
+        # What is plain in motion may be worth its name for what it does near rest.
+        share = ground.near_rest.alone().explained(plain.variant, whole.columns(plain.variant))
+        plain = replace(plain, explained=max(plain.explained, share))
+    best = max((j for j in (plain, *others) if j is not None), key=lambda j: j.score, default=None)
+    if best is None:
+        return None
+    free = judge.free(best.variant)
+    hold = tuple(p.name for p in best.placed.effect.parameters if p.name not in free)
+    return Trial(replace(best, placed=replace(best.placed, hold=hold)), asked)
+
+
+def source(along: Readings, effect: Effect) -> Reading:
+    """The reading that an effect's columns come from: the smallest motion shows friction that sticks, and a low-passed
+    one has lost it."""
+    return along.measured if effect.at_rest else along.asked
+
+
+class _Judge:
+    """Candidates before samples, at the price of their parameters."""
+
+    def __init__(self, ground: Grounds) -> None:
+        self._ground = ground
+        self._log_size = np.log(ground.asked.evidence.size)
+
+    def free(self, variant: Variant) -> tuple[str, ...]:
+        """Names of the parameters that a variant has."""
+        asked = self._ground.readings.asked
+        return free_parameters(asked.found.assembly, asked.experiments[0], asked.states[0], variant)
+
+    def __call__(self, samples: Samples, options: Sequence[Option], null: Null | None = None) -> Judged | None:
+        """The best point of an effect's grid and set of amplitudes; None where no point gains anything."""
+        best: tuple[float, float, Variant, Array, Case, dict[int, Parts]] | None = None
+        for subset in options[0][0].subsets():
+            price = 0.5 * self._log_size * len(self.free(_with(options[0][0], subset)))
+            for whole, columns in options:
+                variant = _with(whole, subset)
+                own = {c: [x[:, subset] for x in parts] for c, parts in columns.items()}
+                case = samples.case(variant, own)
+                gain = case.gain()
+                if gain.total <= 0:
+                    continue
+                if best is None or gain.total - price > best[0]:
+                    best = (gain.total - price, price, variant, gain.amplitudes[: len(subset)], case, own)
+                if null is not None:
+                    null.enter(tuple(own), samples.evidence.null_gains(case.own) - price)
+        if best is None:
+            return None
+        score, price, variant, amplitudes, case, own = best
+        columns = {c: self._ground.noise.whiten(c, parts) for c, parts in own.items()}
+        explained = samples.explained(variant, own)
+        everywhere = self._ground.readings.everywhere.columns
+        return Judged(
+            variant, variant.placed, amplitudes, score, price, explained, tuple(own), case, columns, everywhere
+        )
+
+    def beyond_noise(self, j: Judged, samples: Samples, reading: Reading) -> float:
+        """Share of its joint's own residual that a drive explains, less what the encoders' noise accounts for."""
+        own = reading.found.assembly.joint_of(j.placed)
+        return samples.explained(j.variant, {own: reading.columns(j.variant)[own]}) - self._ground.heard[own]
+
+    def along_measured(self, grid: Sequence[Variant]) -> Judged | None:
+        """A drive's spring or play along the motion as measured, its shape tuned; None where it explains too little."""
+        samples, reading = self._ground.measured, self._ground.readings.measured
+
+        def judged(some: Sequence[Variant]) -> Judged | None:
+            return self(samples, [(v, reading.columns(v)) for v in some])
+
+        j = _tuned(judged(grid), judged)
+        return j if j is not None and self.beyond_noise(j, samples, reading) > DRIVEN_MOST else None
+
+
+def _tuned(best: Judged | None, judge: Callable[[Sequence[Variant]], Judged | None]) -> Judged | None:
+    """The best candidate near a point of its grid: every shape up or down, by ever smaller factors."""
+    if best is None:
+        return None
+    for factor in 1.8 ** (0.5 ** np.arange(TUNINGS)):
+        shape = best.variant.parameters
+        near = [
+            shape * np.where(np.arange(len(shape)) == i, f, 1.0)
+            for i in range(len(shape))
+            for f in (factor, 1 / factor)
+        ]
+        other = judge([replace(best.variant, parameters=x) for x in near])
+        if other is not None and other.score > best.score:
+            best = other
+    return best
+
+
+def _with(variant: Variant, subset: NDArray[np.int_]) -> Variant:
+    """A variant reduced to some of its amplitudes."""
+    if not len(variant.amplitudes):
+        return variant
+    return replace(variant, amplitudes=variant.amplitudes[subset], low=variant.low[subset], high=variant.high[subset])
