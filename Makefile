@@ -4,7 +4,7 @@ BIN := .venv/bin
 SOURCES := $(shell git ls-files --cached --others --exclude-standard '*.py' '*.toml' '*.urdf' '*.csv' '*.json' 2>/dev/null | grep -v -e '^tests/' -e '^bench/' -e '^proof/')
 STUDIES := emps kuka bam free-floating ground-capture zero-g-rig orbit-inspection orbit-hover tolerance
 
-BENCHES := torque friction_fit diagnosis floating cosim fmu snare ecos_inspection
+BENCHES := torque friction_fit diagnosis floating cosim fmu snare ecos_inspection tolerance
 
 .PHONY: help demo test check studies bench accuracy fuzz kills proof fmus docs clean $(STUDIES:%=study-%)
 

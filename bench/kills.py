@@ -62,6 +62,7 @@ capture = "toy_capture:CAPTURE"
 sampling = "sobol"
 batch = 8
 cases = 24
+envelope = false
 [ranges]
 radial_y = [-0.1, 0.1]
 radial_z = [-0.1, 0.1]

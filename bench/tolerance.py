@@ -144,7 +144,8 @@ def main() -> int:
     parser.add_argument("--cases", type=int, default=32, help="ground captures for the workers")
     options = parser.parse_args()
 
-    ground = replace(load_study(GROUND), sampling="sobol", cases=options.cases, batch=options.cases, box={})
+    study = replace(load_study(GROUND), box={}, envelope=False)
+    ground = replace(study, sampling="sobol", cases=options.cases, batch=options.cases)
     nominal = ground.values(ground.scaled(np.full((1, len(ground.ranges)), 0.5))[0])
     load = os.getloadavg()[0]
     one, two = clock(ground, 1, nominal), clock(ground, 2, nominal)
@@ -157,7 +158,7 @@ def main() -> int:
     for name, cost in (("ground", processor), ("inspection", inspection)):
         print(f"{name} capture: {cost:.2f} s of a core, {3600 / cost:.0f} an hour (goal on the ground {HOURLY_GOAL}); "
               f"10 000 take {cost / 0.36:.1f} core hours", flush=True)  # fmt: skip
-    adaptive = replace(load_study(GROUND), capture=Capture("instant", CAPTURE.axes, instant), box={}, width=1e-6)
+    adaptive = replace(study, capture=Capture("instant", CAPTURE.axes, instant), width=1e-6)
     own = clock(adaptive, 1, nominal) / adaptive.cases
     print(f"the engine: {1e3 * own:.0f} ms a case, {100 * own / seconds:.1f} % of a ground capture's {seconds:.2f} s, "
           f"both by the clock (goal {100 * OVERHEAD_GOAL:g} %)", flush=True)  # fmt: skip

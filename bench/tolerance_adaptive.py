@@ -106,7 +106,7 @@ def compare(folder: Path, seed: int, width: float) -> dict[str, object]:
     spread = replace(adaptive, sampling="sobol", cases=round(ours.cases[-1] / GOAL))
     plain = Results(folder / f"sobol-{seed}", spread)
     theirs = narrowed(spread, plain)
-    others = plain.table("space").iloc[: theirs.cases[-1]]
+    others = plain.table("space").iloc[BATCH : theirs.cases[-1]]  # both sets begin with the same batch
     p = space_boundary(adaptive, chosen, ours.cases[-1]).probability(
         to_unit(adaptive, others[list(RANGES)].to_numpy(float))
     )

@@ -1,5 +1,6 @@
 """Typical misses: which are shown, that they are linked, and that a real capture plays."""
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -70,6 +71,16 @@ def test_misses_are_linked_and_played_once(study, results, monkeypatch):
         assert (results.folder / miss["file"]).read_text(encoding="utf-8").startswith("<p>")
     play_misses(study, results)
     assert len(FILMED) == 3
+
+
+def test_a_study_without_its_envelope_has_a_page(study, results, monkeypatch):
+    monkeypatch.setattr(report, "sensitivities", partial(sensitivities, samples=64))
+    content = report.summarise(replace(study, envelope=False), results)
+    assert content["envelope"] == {}
+    assert "envelope_radial" not in content
+    page = (results.folder / "report.html").read_text(encoding="utf-8")
+    assert "Where captures succeed" in page
+    assert "Envelope" not in page
 
 
 def test_a_ground_capture_plays(monkeypatch):

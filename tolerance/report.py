@@ -30,8 +30,9 @@ def summarise(study: Study, results: Results) -> dict[str, Any]:
     """
     space = results.table("space")
     boundary = space_boundary(study, results, others=_OTHERS)
-    found, indices = ends(study, results.table(STAGE)), sensitivities(study, boundary)
-    limits = envelope(study, found)
+    indices = sensitivities(study, boundary)
+    found = ends(study, results.table(STAGE)) if study.envelope else []
+    limits = envelope(study, found) if study.envelope else {}
     content: dict[str, Any] = {
         "study": study.name,
         "capture": study.capture.name,
@@ -108,14 +109,6 @@ def _page(
     boundary = space_boundary(study, results, others=_OTHERS)
     sections = [
         (
-            "envelope",
-            "Envelope",
-            figure(
-                envelope_bars(study, limits), "Envelope of each axis", "Bars: success; black: the interval of each end."
-            )
-            + numbers,
-        ),
-        (
             "maps",
             "Where captures succeed",
             figure(
@@ -145,8 +138,13 @@ def _page(
             + paragraph(f"Cases without a result: {reasons}."),
         ),
     ]
+    if limits:
+        drawn = figure(
+            envelope_bars(study, limits), "Envelope of each axis", "Bars: success; black: the interval of each end."
+        )
+        sections.insert(0, ("envelope", "Envelope", drawn + numbers))
     if misses:
-        sections.insert(3, ("misses", "Typical misses", _gallery(misses)))
+        sections.insert(-1, ("misses", "Typical misses", _gallery(misses)))
     header = f"<h1>{content['sentence']}</h1>"
     return page(f"{study.name}: capture tolerance", header, sections, f"Written by snarelab {__version__}.")
 

@@ -48,7 +48,7 @@ def run_study(
         run = _Runner(study, results, client, say)
         if study.box:
             run.stage("box", box_points(study), study.box_cases)
-        while wanted := next_cases(study, results.table(STAGE)):
+        while study.envelope and (wanted := next_cases(study, results.table(STAGE))):
             run.cases(STAGE, wanted)
         if study.sampling == "latin_hypercube":
             cube = qmc.LatinHypercube(len(study.ranges), rng=study.seed).random(study.cases)
@@ -95,7 +95,7 @@ class _Runner:
     def __init__(self, study: Study, results: Results, client: Any, say: Say) -> None:
         self._study, self._results, self._client, self._say = study, results, client, say
         self._begun, self._ran = time.monotonic(), 0
-        self._most_on_rays = 1 + len(rays(study)) * (COARSE + int(np.log2(COARSE)))
+        self._most_on_rays = 1 + len(rays(study)) * (COARSE + int(np.log2(COARSE))) if study.envelope else 0
 
     def stage(self, stage: str, points: np.ndarray, count: int, first: int = 0) -> None:
         """Run cases ``first`` to ``first + count`` of a stage; points of the varied axes, shape (count, n_ranges)."""

@@ -15,7 +15,20 @@ from .capture import Capture, Outcome, find_capture
 SAMPLINGS = ("adaptive", "sobol", "latin_hypercube")
 LARGEST = 1000
 """Cases that a boundary is fitted to at most: the time of a fit grows with their cube, to half a minute here."""
-_KEYS = ("name", "capture", "seed", "sampling", "batch", "cases", "width", "ranges", "fixed", "success", "box")
+_KEYS = (
+    "name",
+    "capture",
+    "seed",
+    "sampling",
+    "batch",
+    "cases",
+    "width",
+    "ranges",
+    "fixed",
+    "success",
+    "box",
+    "envelope",
+)
 _SUCCESS = ("radial_error", "strength")
 
 
@@ -74,6 +87,8 @@ class Study:
         Cases that are run for it.
     box_ends : bool
         Each axis of the box stands at one of its two ends, by chance; else they are drawn evenly between.
+    envelope : bool
+        Captures along single axes are run, too; see `rays`.
     """
 
     path: Path
@@ -90,6 +105,7 @@ class Study:
     box: Mapping[str, tuple[float, float]]
     box_cases: int
     box_ends: bool = False
+    envelope: bool = True
 
     def scaled(self, unit: np.ndarray) -> np.ndarray:
         """Points of the unit cube, shape (n, n_ranges), as values of the varied axes."""
@@ -147,9 +163,7 @@ def load_study(path: str | Path) -> Study:
             raise InputError(f"{path}: [fixed] {name} = {value}; allowed is {axis.low:g} to {axis.high:g} {axis.unit}")
     box_table = dict(_table(path, raw, "box"))
     box_cases = _count(path, box_table.pop("cases", 60), "[box] cases", 1)
-    box_ends = box_table.pop("ends", False)
-    if not isinstance(box_ends, bool):
-        raise InputError(f"{path}: [box] ends = {box_ends!r}; allowed is true or false")
+    box_ends = _flag(path, box_table.pop("ends", False), "[box] ends")
     box = _ranges(path, {"box": box_table}, "box", capture)
     for name, (low, high) in box.items():
         if name not in ranges or low < ranges[name][0] or high > ranges[name][1]:
@@ -169,6 +183,7 @@ def load_study(path: str | Path) -> Study:
         box,
         box_cases,
         box_ends,
+        _flag(path, raw.get("envelope", True), "envelope"),
     )
 
 
@@ -239,6 +254,12 @@ def _positive(path: Path, what: str, value: Any) -> float:
 def _count(path: Path, value: Any, what: str, least: int) -> int:
     if isinstance(value, bool) or not isinstance(value, int) or value < least:
         raise InputError(f"{path}: {what} = {value!r}; allowed is a whole number from {least}")
+    return value
+
+
+def _flag(path: Path, value: Any, what: str) -> bool:
+    if not isinstance(value, bool):
+        raise InputError(f"{path}: {what} = {value!r}; allowed is true or false")
     return value
 
 
