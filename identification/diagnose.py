@@ -36,6 +36,9 @@ CONFIRM = 0.05
 """An effect is confirmed if the held-out residual energy of its channels, in motion, rises by this share when it is
 taken out."""
 
+LEAST = 1e-6
+"""An effect that moves no more of the held-out residual's energy, all else as it is, adds nothing."""
+
 SECOND_CHOICES = 2
 """Searches for another explanation of what the held-out recording did not confirm."""
 
@@ -152,7 +155,10 @@ def _attempt(
             if effect.at_rest or effect.exceeds_at_rest:
                 # What was named for leaving little near rest must still do so, now that the others are there.
                 pairs.append((with_all, rms, MOST / (1 - MOST) if effect.remembers else CONFIRM))
-            rises.append(max((_energy(b, c, final) / _energy(a, c, final) - 1) / bar for a, b, bar in pairs))
+            rise = max((_energy(b, c, final) / _energy(a, c, final) - 1) / bar for a, b, bar in pairs)
+            # Without an effect that adds nothing, a fit that ends elsewhere says nothing of it.
+            adds = channel_rms(assembly, locked, carry(final, assembly))[0]
+            rises.append(rise if _energy(adds - with_all, c, final) > LEAST * _energy(with_all, c, final) else 0.0)
             worst = c[int(np.argmax(rms[c] / measured[c] - with_all[c] / measured[c]))]
             trials[t.judged.placed.key] = (
                 float(with_all[worst] / measured[worst]),

@@ -75,9 +75,9 @@ class Motion:
         Every how many samples `to_band` keeps one.
     notes : tuple of str
         What was done to the recording, in words.
-    encoder_noise : array (n_joints,)
-        Standard deviation of the acceleration in the analysis band that white noise of the encoders, steps included,
-        makes [rad/s² or m/s²].
+    encoder_noise : array (3, n_joints)
+        Standard deviation of position, rate and acceleration in the analysis band that white noise of the encoders,
+        steps included, makes [rad or m, per s, per s²].
     """
 
     path: str
@@ -195,7 +195,7 @@ def condition(dataset: xr.Dataset, joints: Sequence[str], band: float | None = N
         tuple(segments),
         thinning,
         tuple(notes),
-        np.sqrt(white * rate / 2 * np.sum(np.convolve(kernels[2], _taps(thinning)) ** 2)),
+        np.sqrt([white * rate / 2 * np.sum(np.convolve(k, _taps(thinning)) ** 2) for k in kernels]),
     )
 
 

@@ -141,6 +141,14 @@ class Assembly:
         self.low = np.array([s.low for s in slots], float)
         self.high = np.array([s.high for s in slots], float)
 
+    @property
+    def early_alone(self) -> bool:
+        """Whether a late encoder is taken to make its own torque channel early, and that alone.
+
+        True of a single joint, whatever its inertia; other joints' torques move with the tree's inertia.
+        """
+        return len(self._joints) == 1 and self.base is not None
+
     def joint_of(self, p: Placed) -> int:
         """Index of the joint that an effect's place belongs to."""
         if isinstance(self.tree, Rig) and p.effect.at == "sling":
@@ -231,12 +239,12 @@ class Assembly:
                 tau[:, j],
                 self.speed_scales[j],
                 self.parameters(k, theta),
-                self.base is None,
+                self.early_alone,
             )
             if sense is not None:
                 passed.setdefault(j, []).append(sense)
                 # A late encoder's share of the rigid body's torque is worked out from the motion, apart from the load.
-                apart = len(rigid) if p.at.startswith("q.") and self.base is None else 0
+                apart = len(rigid) if p.at.startswith("q.") and not self.early_alone else 0
                 blocks[apart:] = [Block(j, b.index, sense(b.values)) if b.channel == j else b for b in blocks[apart:]]
             if by_load is not None:
                 blocks += [Block(j, b.index, by_load[:, None] * b.values) for b in rigid if b.channel == j]
@@ -270,7 +278,7 @@ class Assembly:
                 load[:, j],
                 self.speed_scales[j],
                 self.parameters(k, theta),
-                self.base is None,
+                self.early_alone,
             )
             for channel, values, columns in terms:
                 load[:, channel] += values

@@ -31,7 +31,7 @@ def contributions(
     reading: Array,
     speed_scale: float,
     parameters: Array,
-    trusted: bool,
+    early_alone: bool,
 ) -> tuple[list[tuple[int, Array, Array]], Array | None, Callable[[Array], Array] | None]:
     """What one placed effect adds to the torque channels.
 
@@ -49,8 +49,8 @@ def contributions(
         The joint's peak speed in the training recordings [rad/s or m/s].
     parameters : array (p,)
         All of the effect's parameters.
-    trusted : bool
-        Whether the inertia is the tree's; identified, it is in ``load`` alone.
+    early_alone : bool
+        Whether a late encoder makes its own channel early, and that alone.
 
     Returns
     -------
@@ -94,7 +94,7 @@ def contributions(
             found, by, by_value = _by_segment(experiment, effect, signals | {"value": value}, parameters, direction)
             return found[:, 0] - value, by[:, 0], by_value
 
-        if encoder and trusted:
+        if encoder and not early_alone:
             change, by, by_value = sensed(reading - load)
             moved = [sensed(x[:, joint]) for x in (motion.q, motion.qd, motion.qdd)]
             terms = _along(experiment, joint, *(np.stack(x, 1) for x in list(zip(*moved, strict=True))[:2]))

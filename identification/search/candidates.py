@@ -136,7 +136,7 @@ def candidate_columns(
         state.tau[:, joint],
         assembly.speed_scales[joint],
         variant.parameters,
-        assembly.base is None,
+        assembly.early_alone,
     )
     found = []
     for channel, values, columns in terms:
@@ -168,7 +168,7 @@ def free_parameters(assembly: Assembly, experiment: Experiment, state: Evaluatio
         state.tau[:, joint],
         assembly.speed_scales[joint],
         parameters,
-        assembly.base is None,
+        assembly.early_alone,
     )
     moves = np.sum([np.sum(columns**2, axis=0) for _, _, columns in terms], axis=0) > 0
     amplitudes = {p.name for p in placed.effect.parameters if _is_linear(p) and len(variant.amplitudes)}
