@@ -264,12 +264,18 @@ def test_a_late_encoder_is_behind_the_torque_of_every_joint(arm, experiment):
         assert missed < 0.1 * change, (channel, missed, change)
 
 
-def test_a_late_encoder_with_the_inertia_free_makes_its_channel_early(arm, experiment):
-    base = base_parameters(arm[1])
-    assembly = build(arm, experiment, placed(("sensor_delay", "q.joint2")), base)
-    tau = assembly.torque(experiment, np.append(base.matrix @ arm[0].phi, 4 * PERIOD))[:, 1]
-    m = experiment.motion
-    load = experiment.body.torque(m.q, m.qd, m.qdd, arm[0].phi)[:, 1]
+def test_a_late_encoder_of_one_joint_whose_inertia_is_free_makes_the_torque_early(tmp_path):
+    drawn = random_arm(np.random.default_rng(3), 1, 0.4)
+    (tmp_path / "arm.urdf").write_text(drawn.urdf())
+    tree = load_urdf(tmp_path / "arm.urdf", (0.3, -0.2, -9.81))
+    body = RigidBody(tree)
+    recorded, base = Experiment(motion([tree.joints[0].kind]), body), base_parameters(body)
+    effects = placed(("sensor_delay", "q.joint1"))
+    assembly = Assembly(tree, effects, base, scales([recorded]), {})
+    heavier = 1.7 * base.matrix @ tree.links[0].phi
+    tau = assembly.torque(recorded, np.append(heavier, 4 * PERIOD))[:, 0]
+    m = recorded.motion
+    load = 1.7 * body.torque(m.q, m.qd, m.qdd, tree.links[0].phi)[:, 0]
     middle = np.arange(50, len(load) - 50)
     np.testing.assert_allclose(tau[middle], load[middle + 4], atol=1e-3 * np.ptp(load))
 

@@ -276,7 +276,7 @@ def test_joints_come_in_the_models_order_and_notes_of_the_reader_are_kept():
 
 
 def test_the_encoders_noise_is_what_it_leaves_in_the_band():
-    """Noise alone, through the same filters, has the deviation that is foretold from a recording of noise and motion."""
+    """Noise alone, through the same filters, deviates as is foretold from a recording of noise and motion."""
     time = clock(60.0)
     noise = 1e-4 * np.random.default_rng(3).normal(size=len(time))
     foretold = condition(recording(time, sine(time, 0.7)[0] + noise), ["joint1"], BAND).encoder_noise

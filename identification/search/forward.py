@@ -300,7 +300,9 @@ def _weigh(result: Screening, best: Judged, passing: Sequence[Judged], seed: int
     rivals = rivals[:8]
     near_rest = any(_near_rest(result, j) for j in rivals)
     alike = [j.among(result.near_rest) if near_rest else j for j in rivals]
-    gains = np.array([j.case.shares() / (AHEAD if _is_all(j, best) else 1.0) for j in alike])
+    # As in the choice: what has more freedom must explain plainly more, at whatever link.
+    wide = [best.placed.effect.at == "link" and best.placed.effect.name in j.placed.effect.contains for j in rivals]
+    gains = np.array([j.case.shares() / (AHEAD if w else 1.0) for j, w in zip(alike, wide, strict=True)])
     price = np.array([j.price for j in rivals])
     rng = np.random.default_rng(seed)
     counts = rng.multinomial(evidence.n_blocks, np.full(evidence.n_blocks, 1 / evidence.n_blocks), BOOTSTRAPS)
