@@ -97,7 +97,7 @@ def report_on(
     notes = [f"{Path(e.motion.path).name}: {note}" for e in (*train, *locked) for note in e.motion.notes]
     notes += [
         f"{t.judged.placed.effect.name} at {t.judged.placed.at} passed on the training recordings but made the "
-        f"held-out one no better: not named"
+        f"held-out one hardly better: not named"
         for t in found.taken
         if t.judged.placed.key not in named
     ]

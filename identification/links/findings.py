@@ -220,7 +220,8 @@ def notes_of(link: LinkDiagnosis) -> list[str]:
         f"zero of q_link.{link.pair.joint} against q.{link.pair.joint}, one recording after another: {zeros} m{unit}"
     ]
     notes += [
-        f"{p.effect.name} at {p.at} passed on the training recordings but made the held-out one no better: not named"
+        f"{p.effect.name} at {p.at} passed on the training recordings but made the held-out one hardly better: "
+        f"not named"
         for p in link.rejected
     ]
     words = nameless(link)

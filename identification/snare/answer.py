@@ -69,7 +69,7 @@ def report_on(
     verdict = "missing_physics" if findings else "unknown_effect" if description else "adequate"
     notes = [f"{Path(c.path).name}: {note}" for c in (*train, *locked) for note in c.notes]
     notes += [
-        f"{p.effect.name} at {p.at} passed on the captures fitted but made the held-out one no better: not named"
+        f"{p.effect.name} at {p.at} passed on the captures fitted but made the held-out one hardly better: not named"
         for p in found.rejected
     ]
     notes += [
