@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...models.floating.tree import n_carriers
+from ...models.rig.rig import Rig
 from ..fitting.assembly import Assembly
 from ..fitting.experiment import Bridge, Experiment
 
@@ -33,10 +34,11 @@ LONGEST_RUN = 48
 def slow(experiment: Experiment, joint: int) -> Mask:
     """Samples at which a joint is near rest (n,), with those that differentiation mixes with them.
 
-    A floating base is never at rest.
+    A floating base is never at rest. On a suspension, which never hangs quite still, friction lets go of what it holds,
+    and the joints that stand feel what the others do to the slings: there, every sample counts.
     """
     motion = experiment.motion
-    if joint < n_carriers(experiment.body.tree):
+    if joint < n_carriers(experiment.body.tree) or isinstance(experiment.body.tree, Rig):
         return np.zeros(len(motion.time), bool)
     speed = motion.qd[:, joint]
     found = np.abs(speed) < REST * np.max(np.abs(speed))
