@@ -10,7 +10,6 @@ Three linear-phase FIR filters, so that every sample is either exact or left out
 3. Samples whose filter window leaves the recording, or touches a gap, are dropped, never padded.
 """
 
-import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -19,10 +18,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 from scipy.signal import fftconvolve
-from scipy.signal.windows import kaiser
 
 from ..errors import InputError
 from .columns import nearest
+from .filters import derivative_kernels, low_pass, thin, thin_half, thinned_length
 
 Array = NDArray[np.float64]
 
@@ -41,10 +40,6 @@ MINIMUM_RUN = 16
 
 FEWEST = 64
 """Samples in the longest run from which on its spectrum tells the encoders' noise."""
-
-
-GROUP = 16
-"""Kept samples that are filtered together."""
 
 
 @dataclass(frozen=True)
@@ -97,11 +92,11 @@ class Motion:
 
     def to_band(self, x: Array) -> Array:
         """Low-pass and thin an array (n_samples, ...) segment by segment: (n_band, ...)."""
-        return np.concatenate([_thin(x[s], self.thinning) for s in self.segments])
+        return np.concatenate([thin(x[s], self.thinning) for s in self.segments])
 
     def band_segments(self) -> tuple[slice, ...]:
         """Where each segment stands in the output of `to_band`."""
-        stops = np.cumsum([0] + [_thinned_length(s.stop - s.start, self.thinning) for s in self.segments])
+        stops = np.cumsum([0] + [thinned_length(s.stop - s.start, self.thinning) for s in self.segments])
         return tuple(slice(int(a), int(b)) for a, b in pairwise(stops))
 
 
@@ -160,9 +155,9 @@ def condition(dataset: xr.Dataset, joints: Sequence[str], band: float | None = N
     thinning = max(1, int(np.ceil(rate / (2 * band) - 1e-9)))
     band = rate / (2 * thinning)
     notes.append(f"analysis band 0 to {band:.3g} Hz ({limit}; every {thinning} samples make one)")
-    kernels = _derivative_kernels(min(band, rate / 2.5), rate)
+    kernels = derivative_kernels(min(band, rate / 2.5), rate)
     half = len(kernels[0]) // 2
-    shortest = 2 * half + 1 + 2 * _thin_half(thinning) + MINIMUM_RUN * thinning
+    shortest = 2 * half + 1 + 2 * thin_half(thinning) + MINIMUM_RUN * thinning
     parts, segments, start = [], [], 0
     for t, pq, ptau, ptemp in pieces:
         if len(t) < shortest:
@@ -173,7 +168,7 @@ def condition(dataset: xr.Dataset, joints: Sequence[str], band: float | None = N
         parts.append((t[inner], *derived, ptau[inner], ptemp[inner]))
         segments.append(slice(start, start + len(t) - 2 * half))
         start = segments[-1].stop
-    kept = sum(_thinned_length(s.stop - s.start, thinning) for s in segments)
+    kept = sum(thinned_length(s.stop - s.start, thinning) for s in segments)
     if kept < MINIMUM_SAMPLES:
         raise InputError(
             f"{path}: too few samples: {len(stamps)} rows leave {kept} in the {band:.3g} Hz analysis band, at least "
@@ -195,7 +190,7 @@ def condition(dataset: xr.Dataset, joints: Sequence[str], band: float | None = N
         tuple(segments),
         thinning,
         tuple(notes),
-        np.sqrt([white * rate / 2 * np.sum(np.convolve(k, _taps(thinning)) ** 2) for k in kernels]),
+        np.sqrt([white * rate / 2 * np.sum(np.convolve(k, low_pass(thinning)) ** 2) for k in kernels]),
     )
 
 
@@ -276,81 +271,3 @@ def _band_from_noise(position: Array, white: Array, period: float, edge: float) 
             why = "the cap" if band == edge else "beyond it encoder noise would reach the acceleration"
             return float(band), why
     return float(edge / 20), "encoder noise is high: the narrowest band tried"
-
-
-def _derivative_kernels(band: float, rate: float) -> tuple[Array, Array, Array]:
-    """Convolution kernels for position, rate and acceleration: windowed sinc and its derivatives, moments exact."""
-    cutoff = min(2.5 * band, 0.5 * (band + 0.5 * rate))
-    width = 2 * (cutoff - band)
-    half = int(np.ceil(72 / (2.285 * 2 * np.pi * width / rate) / 2)) + 2
-    k = np.arange(-half, half + 1)
-    window = kaiser(2 * half + 1, 7.857)  # 80 dB
-    w = 2 * np.pi * cutoff / rate
-    x = np.where(k == 0, 1.0, w * k)
-    zero = k == 0
-    h0 = np.where(zero, 1.0, np.sin(x) / x) * w / np.pi
-    h1 = np.where(zero, 0.0, (np.cos(x) - np.sin(x) / x) / x) * w**2 / np.pi
-    smooth = _with_moments(h0 * window, window, (1.0, 0.0, 0.0, 0.0))
-    # Convolution runs backwards: sum h[k] x[n-k], so a ramp of slope 1 needs the first moment -1.
-    slope = _with_moments(h1 * window, window, (0.0, -1.0, 0.0, 0.0)) * rate
-    # Twice the first derivative: windowing the ideal second derivative would leave a constant error over the band.
-    second = np.convolve(slope, slope)
-    return np.pad(smooth, half), np.pad(slope, half), second
-
-
-def _with_moments(h: Array, window: Array, moments: Sequence[float]) -> Array:
-    """Least change of a kernel, under its window, that makes its moments (in samples) what they must be."""
-    half = len(h) // 2
-    powers = (np.arange(-half, half + 1)[:, None] / half) ** np.arange(len(moments))
-    wanted = np.asarray(moments) / half ** np.arange(len(moments))
-    basis = powers * window[:, None]
-    return h + basis @ np.linalg.solve(powers.T @ basis, wanted - powers.T @ h)
-
-
-def _thin_half(thinning: int) -> int:
-    return 0 if thinning == 1 else 4 * thinning
-
-
-def _thinned_length(n: int, thinning: int) -> int:
-    inner = n - 2 * _thin_half(thinning)
-    return max(0, -(-inner // thinning))
-
-
-def _thin(x: Array, thinning: int) -> Array:
-    """Kaiser-windowed sinc, half amplitude at half the thinned rate, evaluated at the kept samples only."""
-    if thinning == 1:
-        return x
-    n = _thinned_length(len(x), thinning)
-    if n == 0:
-        return x[:0]
-    taps = _group_taps(thinning)
-    columns = x.reshape(len(x), -1).T
-    groups = -(-n // GROUP)
-    windows = np.zeros((len(columns), groups, len(taps)))
-    whole = (len(x) - len(taps)) // (GROUP * thinning) + 1 if len(x) >= len(taps) else 0
-    if whole:
-        view = np.lib.stride_tricks.sliding_window_view(columns, len(taps), axis=1)
-        windows[:, :whole] = view[:, :: GROUP * thinning][:, :whole]
-    for k in range(whole, groups):
-        rest = columns[:, k * GROUP * thinning :]
-        windows[:, k, : min(rest.shape[1], len(taps))] = rest[:, : len(taps)]
-    kept = (windows.reshape(-1, len(taps)) @ taps).reshape(len(columns), -1)[:, :n]
-    return kept.T.reshape(n, *x.shape[1:])
-
-
-@functools.cache
-def _group_taps(thinning: int) -> Array:
-    """The low-pass of `GROUP` kept samples in a row (n_taps, GROUP): one matrix product filters them all."""
-    h = _taps(thinning)
-    taps = np.zeros(((GROUP - 1) * thinning + len(h), GROUP))
-    for i, column in enumerate(taps.T):
-        column[i * thinning : i * thinning + len(h)] = h
-    return taps
-
-
-def _taps(thinning: int) -> Array:
-    """The low-pass before thinning: its impulse response, which sums to one."""
-    half = _thin_half(thinning)
-    k = np.arange(-half, half + 1)
-    h = np.sinc(k / thinning) * kaiser(2 * half + 1, 6.0)
-    return h / h.sum()

@@ -1,7 +1,8 @@
-"""The torque of a model with many effects: against hand-written formulas, and its derivatives against differences."""
+"""The torque of a model with many effects, against hand-written formulas."""
 
 import numpy as np
 import pytest
+from moving_arm import PERIOD, build, jacobian, motion, placed, three_joints
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
@@ -10,194 +11,19 @@ from snarelab.errors import InputError
 from snarelab.identification.fitting.assembly import Assembly
 from snarelab.identification.fitting.base_parameters import base_parameters
 from snarelab.identification.fitting.experiment import Experiment, scales
-from snarelab.models.effects import get_effect
-from snarelab.models.model import Placed
 from snarelab.models.rigid_body import RigidBody
 from snarelab.models.urdf import load_urdf
-from snarelab.recordings.condition import Motion
-
-PERIOD = 5e-3
-JOINTS = ("joint1", "joint2", "joint3")
-
-
-def placed(*entries):
-    """``("viscous_friction", "joint1")`` or with names of held parameters after it."""
-    return [Placed(get_effect(name), at, tuple(hold)) for name, at, *hold in entries]
-
-
-def motion(kinds, n=1200, segments=None, thinning=3, first=0):
-    """Sines of every joint, exact; samples ``first`` to ``first + n`` of one endless motion."""
-    t = np.asarray(PERIOD * np.arange(first, first + n), np.float64)
-    size = np.array([0.15 if kind == "prismatic" else 0.8 for kind in kinds])
-    q, qd, qdd = np.zeros((3, n, len(kinds)))
-    for k, (amplitude, frequency) in enumerate([(1.0, 0.37), (0.4, 0.9), (0.1, 2.3)]):
-        w = 2 * np.pi * frequency * (1 + 0.13 * np.arange(len(kinds)))
-        angle = w * t[:, None] + 0.7 * k + np.arange(len(kinds))
-        q += amplitude * size * np.sin(angle)
-        qd += amplitude * size * w * np.cos(angle)
-        qdd -= amplitude * size * w**2 * np.sin(angle)
-    tau = 30.0 * np.cos(t[:, None] + np.arange(len(kinds)))
-    temperature = np.full_like(q, 20.0)
-    band = 1 / (2 * thinning * PERIOD)
-    parts = segments or (slice(0, n),)
-    return Motion(
-        "run.csv", JOINTS[: len(kinds)], PERIOD, band, t, q, qd, qdd, tau, temperature, parts, thinning, (), 0 * q[0]
-    )
 
 
 @pytest.fixture(scope="module")
 def arm(tmp_path_factory):
-    """A random arm of two revolute joints and a prismatic one."""
-    for seed in range(100):
-        drawn = random_arm(np.random.default_rng(seed), 3, 0.4)
-        if [link.kind for link in drawn.links] == ["revolute", "revolute", "prismatic"]:
-            path = tmp_path_factory.mktemp("arm") / "arm.urdf"
-            path.write_text(drawn.urdf())
-            tree = load_urdf(path, (0.3, -0.2, -9.81))
-            return tree, RigidBody(tree)
-    raise AssertionError("no such arm in 100 draws")
+    return three_joints(tmp_path_factory.mktemp("arm"))
 
 
 @pytest.fixture(scope="module")
 def experiment(arm):
     tree, body = arm
     return Experiment(motion([j.kind for j in tree.joints]), body)
-
-
-def build(arm, experiment, effects, base=None, values=None):
-    return Assembly(arm[0], effects, base, scales([experiment]), values or {})
-
-
-def jacobian(assembly, experiment, theta):
-    """Derivative blocks added up to one array (n, J, P)."""
-    state = assembly.evaluate(experiment, theta)
-    dense = np.zeros((*state.tau.shape, len(theta)))
-    for block in state.blocks:
-        for k, i in enumerate(block.index):
-            dense[:, block.channel, i] += block.values[:, k]
-    return dense
-
-
-def differences(assembly, experiment, theta):
-    """Central differences of the torque (n, J, P)."""
-    columns = []
-    for k, x in enumerate(theta):
-        step = np.zeros_like(theta)
-        step[k] = 1e-5 * max(abs(x), 1e-2)
-        ahead, behind = (assembly.torque(experiment, theta + s) for s in (step, -step))
-        columns.append((ahead - behind) / (2 * step[k]))
-    return np.stack(columns, axis=2)
-
-
-def errors(found, wanted):
-    """Relative error of each parameter's columns over all samples and channels; some inertias move no joint at all."""
-    size = np.linalg.norm(wanted, axis=(0, 1))
-    assert np.mean(size > 1e-6) > 0.8
-    return np.linalg.norm(found - wanted, axis=(0, 1)) / np.maximum(size, 1e-6)
-
-
-INSIDE = {
-    "delay": 0.011,
-    "speed": 0.2,
-    "mass": 1.7,
-    "x": 0.05,
-    "y": -0.03,
-    "z": 0.12,
-    "coefficient": 0.08,
-    "level": 3.0,
-}
-"""Values away from zero, where every parameter has a say."""
-
-_MANY = """
-viscous_friction@joint1 viscous_friction@joint3 coulomb_friction@joint1 stribeck_friction@joint1
-asymmetric_friction@joint2 load_dependent_friction@joint2 load_dependent_friction@joint3
-position_dependent_friction@joint2 harness_stiffness@joint3 rotor_inertia@joint2 torque_ripple@joint1
-presliding_hysteresis@joint3 sensor_gain@tau.joint1 sensor_delay@tau.joint2 sensor_gain@tau.joint2
-sensor_bias@tau.joint2 sensor_delay@q.joint3 sensor_drift@tau.joint3
-"""
-MANY = placed(*(entry.split("@") for entry in _MANY.split()))
-LINKS = placed(("payload_mass", "link3"), ("com_offset", "link2"), ("inertia_error", "link1"))
-
-
-def inside(assembly):
-    """A parameter vector strictly between the bounds, with nothing at zero."""
-    rng = np.random.default_rng(5)
-    start = np.array([INSIDE.get(s.name, 0.0) or s.start for s in assembly.slots])
-    start = start + np.where(
-        start == 0, rng.uniform(0.05, 0.15, len(start)), 0.1 * start * rng.uniform(-1, 1, len(start))
-    )
-    return np.clip(start, np.nan_to_num(assembly.low) * 0.999, np.nan_to_num(assembly.high) * 0.999)
-
-
-def test_derivatives_of_many_effects_at_once(arm, experiment):
-    assembly = build(arm, experiment, LINKS + MANY)
-    theta = inside(assembly)
-    found = errors(jacobian(assembly, experiment, theta), differences(assembly, experiment, theta))
-    for slot, error in zip(assembly.slots, found, strict=True):
-        assert error < 1e-6, (slot.key, error)
-
-
-def test_derivatives_with_the_inertia_free(arm, experiment):
-    base = base_parameters(arm[1])
-    assembly = build(arm, experiment, MANY, base)
-    theta = inside(assembly)
-    theta[: len(base.columns)] = base.matrix @ arm[0].phi
-    assert len(theta) > len(base.columns) > 10
-    found = errors(jacobian(assembly, experiment, theta), differences(assembly, experiment, theta))
-    for slot, error in zip(assembly.slots, found, strict=True):
-        assert error < 1e-6, (slot.key, error)
-
-
-def test_derivatives_behind_a_flexible_joint(arm, experiment):
-    """Exact by stiffness and damping, and by all that does not feed the spring.
-
-    Knowingly left out is the twist that more payload would cause: the twist changes the torque by a few parts in a
-    hundred here, its change with the payload by no more.
-    """
-    effects = placed(("joint_elasticity", "joint2"), ("payload_mass", "link3", "x", "y", "z")) + MANY
-    assembly = build(arm, experiment, effects)
-    theta = inside(assembly)
-    for k, slot in enumerate(assembly.slots):
-        if slot.effect == "joint_elasticity":
-            theta[k] = {"stiffness": 15000.0, "damping": 100.0}[slot.name]
-    rigid = build(arm, experiment, effects[1:])
-    share = np.linalg.norm(assembly.torque(experiment, theta) - rigid.torque(experiment, theta[2:]))
-    share /= np.linalg.norm(assembly.torque(experiment, theta))
-    assert 1e-3 < share < 0.1
-    found = errors(jacobian(assembly, experiment, theta), differences(assembly, experiment, theta))
-    for slot, error in zip(assembly.slots, found, strict=True):
-        limit = 2 * share if slot.effect == "payload_mass" else 1e-6
-        assert error < limit, (slot.key, error, share)
-
-
-def test_derivative_by_a_free_inertia_behind_a_flexible_joint(arm, experiment):
-    """All inertia grown alike: the derivative says that the torque grows alike, and leaves out that the twist does."""
-    base = base_parameters(arm[1])
-    assembly = build(arm, experiment, placed(("joint_elasticity", "joint2")), base)
-    n = len(base.columns)
-    theta = np.concatenate([base.matrix @ arm[0].phi, [15000.0, 100.0]])
-    more = theta + np.r_[1e-4 * theta[:n], 0.0, 0.0]
-    wanted = (assembly.torque(experiment, more) - assembly.torque(experiment, theta)) / 1e-4
-    found = jacobian(assembly, experiment, theta)[:, :, :n] @ theta[:n]
-    twist = assembly.torque(experiment, theta) - assembly.evaluate(experiment, theta).load
-    assert np.linalg.norm(found - wanted) < 1.05 * np.linalg.norm(twist)
-    assert np.linalg.norm(twist) < 0.1 * np.linalg.norm(wanted)
-
-
-def test_residual_is_measured_minus_modelled_in_the_band_with_its_derivatives(arm, experiment):
-    base = base_parameters(arm[1])
-    for chosen, effects in ((None, LINKS + MANY), (base, MANY), (base, MANY[:4])):
-        assembly = build(arm, experiment, effects, chosen)
-        for theta in (inside(assembly), 1.01 * inside(assembly)):  # twice: constant columns come from the store then
-            residual, blocks = assembly.residual(experiment, theta)
-            recorded = experiment.motion
-            wanted = recorded.to_band(recorded.tau - assembly.torque(experiment, theta))
-            np.testing.assert_allclose(residual, wanted, atol=1e-9)
-            dense = np.zeros((*residual.shape, len(theta)))
-            for block in blocks:
-                for k, i in enumerate(block.index):
-                    dense[:, block.channel, i] += block.values[:, k]
-            np.testing.assert_allclose(dense, recorded.to_band(jacobian(assembly, experiment, theta)), atol=1e-8)
 
 
 def test_torque_of_plain_effects_is_the_sum_by_hand(arm, experiment):

@@ -45,7 +45,20 @@ def recording(body, friction, still=()):
     temperature = np.full_like(q, 20.0)
     band = 1 / (2 * THINNING * PERIOD)
     motion = Motion(
-        "run.csv", JOINTS, PERIOD, band, t, q, qd, qdd, tau, temperature, (slice(0, N),), THINNING, (), 0 * q[0]
+        "run.csv",
+        JOINTS,
+        PERIOD,
+        band,
+        t,
+        q,
+        qd,
+        qdd,
+        tau,
+        temperature,
+        (slice(0, N),),
+        THINNING,
+        (),
+        np.zeros((3, q.shape[1])),
     )
     return Experiment(motion, body)
 

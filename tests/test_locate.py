@@ -38,7 +38,20 @@ def experiment(body, qd, q=None, tau: float | np.ndarray = 10.0, segments=None):
     none = np.full_like(qd, np.nan)
     parts = segments or (slice(0, N),)
     recorded = Motion(
-        "run.csv", ("joint1", "joint2"), PERIOD, 100 / 3, TIME, q, qd, 0 * qd, torque, none, parts, 3, (), 0 * q[0]
+        "run.csv",
+        ("joint1", "joint2"),
+        PERIOD,
+        100 / 3,
+        TIME,
+        q,
+        qd,
+        0 * qd,
+        torque,
+        none,
+        parts,
+        3,
+        (),
+        np.zeros((3, q.shape[1])),
     )
     return Experiment(recorded, body)
 

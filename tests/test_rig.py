@@ -40,7 +40,20 @@ def motion(tree, n=400, seed=0):
     names = tuple(j.name for j in tree.joints)
     whole = (slice(0, n),)
     return Motion(
-        "run.csv", names, PERIOD, 50.0, t, q, qd, qdd, np.ones_like(q), np.full_like(q, 20.0), whole, 1, (), 0 * q[0]
+        "run.csv",
+        names,
+        PERIOD,
+        50.0,
+        t,
+        q,
+        qd,
+        qdd,
+        np.ones_like(q),
+        np.full_like(q, 20.0),
+        whole,
+        1,
+        (),
+        np.zeros((3, q.shape[1])),
     )
 
 

@@ -127,17 +127,7 @@ def candidate_columns(
         key = ("candidate", placed.key, variant.parameters.tobytes(), variant.amplitudes.tobytes())
         if key in experiment.store:
             return [(joint, experiment.store[key])]
-    terms, by_load, _ = contributions(
-        experiment,
-        assembly.tree,
-        placed,
-        joint,
-        state.load[:, joint],
-        state.tau[:, joint],
-        assembly.speed_scales[joint],
-        variant.parameters,
-        assembly.early_alone,
-    )
+    terms, by_load = _terms(assembly, experiment, state, placed, variant.parameters)
     found = []
     for channel, values, columns in terms:
         own = columns[:, variant.amplitudes] if len(variant.amplitudes) else values[:, None]
@@ -150,26 +140,27 @@ def candidate_columns(
     return found
 
 
+def _terms(
+    assembly: Assembly, experiment: Experiment, state: Evaluation, placed: Placed, parameters: Array
+) -> tuple[list[tuple[int, Array, Array]], Array | None]:
+    """What an effect adds beside the model as evaluated, and its derivative by the joint's load."""
+    joint = assembly.joint_of(placed)
+    load, reading, speed = state.load[:, joint], state.tau[:, joint], assembly.speed_scales[joint]
+    terms, by_load, _ = contributions(
+        experiment, assembly.tree, placed, joint, load, reading, speed, parameters, assembly.early_alone
+    )
+    return terms, by_load
+
+
 def free_parameters(assembly: Assembly, experiment: Experiment, state: Evaluation, variant: Variant) -> tuple[str, ...]:
     """Names of the parameters that matter once the variant's amplitudes in ``low`` are switched on.
 
     A shape that only acts through an amplitude left at zero has no derivative, and is not counted.
     """
     placed = variant.placed
-    joint = assembly.joint_of(placed)
     parameters = variant.parameters.copy()
     parameters[variant.amplitudes] = 1.0
-    terms, _, _ = contributions(
-        experiment,
-        assembly.tree,
-        placed,
-        joint,
-        state.load[:, joint],
-        state.tau[:, joint],
-        assembly.speed_scales[joint],
-        parameters,
-        assembly.early_alone,
-    )
+    terms, _ = _terms(assembly, experiment, state, placed, parameters)
     moves = np.sum([np.sum(columns**2, axis=0) for _, _, columns in terms], axis=0) > 0
     amplitudes = {p.name for p in placed.effect.parameters if _is_linear(p) and len(variant.amplitudes)}
     on = {placed.effect.parameters[i].name for i in variant.amplitudes}
