@@ -11,15 +11,17 @@ import os
 import sys
 import warnings
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
 
 from . import __version__
 from .cosim.command import add_parser as add_cosim
 from .errors import InputError, one_line
+from .exit_status import status_of
 from .files import written_whole
 from .fmu.command import add_parser as add_export
-from .progress import Progress, start_logging, terminated_is_interrupted
+from .progress import Progress, start_logging
 from .tolerance.command import add_parser as add_tolerance
 
 
@@ -29,16 +31,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = parser.parse_args(arguments)
     start_logging(given.verbose)
     try:
-        with warnings.catch_warnings(), terminated_is_interrupted():
+        with warnings.catch_warnings():
             warnings.showwarning = _notice
-            given.run(given)
-            sys.stdout.flush()
-    except InputError as error:
-        print(f"snarelab: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("snarelab: interrupted; files that are there are whole; run the same command again", file=sys.stderr)
-        return 130
+            return status_of(partial(_run, given))
     except OSError as error:
         if error.errno not in (errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
             raise
@@ -50,6 +45,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
             file=sys.stderr,
         )
         return 2
+
+
+def _run(given: argparse.Namespace) -> int:
+    given.run(given)
+    sys.stdout.flush()
     return 0
 
 

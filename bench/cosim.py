@@ -10,7 +10,6 @@ solution. libcosim and Ecos are left out, by name, where they cannot be loaded.
 """
 
 import ctypes
-import json
 import os
 import platform
 import sys
@@ -29,6 +28,7 @@ from fmpy.fmi2 import FMU2Slave
 
 from bench.cosim_accuracy import CONNECTIONS, exact
 from bench.oscillator_fmu import build
+from bench.results import write_result
 from snarelab.cosim.master import Master
 from snarelab.cosim.participants.fmu import Fmu
 from snarelab.cosim.setup import Setup
@@ -202,8 +202,7 @@ def main() -> int:
             f"{row['error']:11.1e}"
         )
     result = {"bench": "cosim", "n_steps": N_STEPS, "step": STEP, "repetitions": REPETITIONS, "masters": rows}
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(result, indent=2) + "\n")
+    write_result(path, result)
     if rows[0]["cpu_microseconds"] > GOAL:
         print(f"ours takes {rows[0]['cpu_microseconds']:.2f} us a step, more than {GOAL}", file=sys.stderr)
         return 1

@@ -23,6 +23,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from bench.fmu_models import tool_environment
+from bench.results import write_result
 from snarelab.cosim.orbit_capture import DURATION, MACRO_STEP, SNARE, Capture, Passive, capture_of, co_simulate
 from snarelab.cosim.participants.fmu import Fmu
 from snarelab.cosim.setup import Setup
@@ -155,8 +156,7 @@ def main() -> int:
         print(f"{name:6s} the pin is {1e3 * end[0]:.4f} and {1e3 * end[1]:.4f} mm off the axis at {END:g} s")
     print(f"apart  {1e6 * place:.2f} um at most (bar {1e6 * POSITION_BAR:g})")
     print(f"force  {100 * force:.3f} % RMS over {1e3 * WINDOW:g} ms (bar {100 * FORCE_BAR:g})")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(result, indent=2) + "\n")
+    write_result(path, result)
     return 0 if place <= POSITION_BAR and force <= FORCE_BAR else 1
 
 

@@ -9,7 +9,6 @@ are medians over the repetitions.
 
 # pyright: reportAttributeAccessIssue=false
 # (pyright does not see the names that mujoco takes from its compiled module)
-import json
 import os
 import platform
 import sys
@@ -26,6 +25,7 @@ import pinocchio as pin
 from mujoco import rollout
 from scipy.spatial.transform import Rotation
 
+from bench.results import write_result
 from snarelab.models.floating.arm import FloatingArm
 from snarelab.models.floating.dynamics import in_world, tip_pose
 from snarelab.models.floating.ets_vii import ets_vii
@@ -221,8 +221,7 @@ def main() -> int:
         "goal": GOAL,
         "engines": rows,
     }
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(result, indent=2) + "\n")
+    write_result(path, result)
     return 0
 
 

@@ -8,7 +8,6 @@ against DOP853 on pinocchio's forward dynamics. Exit status 1 where a bar is not
 """
 
 import ctypes
-import json
 import os
 import platform
 import sys
@@ -26,6 +25,7 @@ import pinocchio
 from scipy.integrate import solve_ivp
 
 from bench.fmu_models import Slave, everywhere, write_model
+from bench.results import write_result
 from snarelab.fmu.build import write_fmu
 from snarelab.fmu.equations import Equations
 from snarelab.fmu.export import model_equations
@@ -133,8 +133,7 @@ def main() -> int:
         f" (bar {BARS['times_faster']:g})"
     )
     print(f"error against DOP853             {found:8.1e}             (bar {BARS['error']:g})")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(result, indent=2) + "\n")
+    write_result(path, result)
     met = each["fmu"] <= BARS["microseconds"] and ratio >= BARS["times_faster"] and found <= BARS["error"]
     return 0 if met else 1
 

@@ -9,7 +9,6 @@ the Makkar law scipy may stop a little higher by its own default tolerance, whic
 another optimum. Else nothing is reported.
 """
 
-import json
 import os
 import sys
 import tempfile
@@ -29,6 +28,7 @@ from bench.arm import Arm, random_arm
 from bench.lugre import Bristles, LuGre
 from bench.motion import fourier_motion
 from bench.mujoco_plant import write_csv
+from bench.results import write_result
 from snarelab.identification.fitting.assembly import Assembly
 from snarelab.identification.fitting.experiment import Experiment, load_experiments, scales
 from snarelab.identification.fitting.fit import fit
@@ -146,8 +146,7 @@ def main() -> int:
         return 1
     print(f"goal: {GOAL:g} x against two-point")
     result = {"bench": "friction_fit", "n_samples": n_samples, "n_joints": N_JOINTS, "n_parameters": len(start)}
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(result | {"repetitions": REPETITIONS, "goal": GOAL, "solvers": rows}, indent=2) + "\n")
+    write_result(path, result | {"repetitions": REPETITIONS, "goal": GOAL, "solvers": rows})
     return 0
 
 

@@ -8,7 +8,6 @@ A sling of constant tension T on a point of a link is a point mass -T/g that has
 second torque, at rest, with those masses for parameters.
 """
 
-import json
 import os
 import platform
 import sys
@@ -28,6 +27,7 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import MultibodyForces
 
+from bench.results import write_result
 from snarelab.models.inertia import Array, from_central
 from snarelab.models.rigid_body import RigidBody
 from snarelab.models.tree import Tree
@@ -188,8 +188,7 @@ def main() -> int:
         "repetitions": REPETITIONS,
         "engines": rows,
     }
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(result, indent=2) + "\n")
+    write_result(path, result)
     return 0
 
 

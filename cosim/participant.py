@@ -12,6 +12,9 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ..errors import InputError
+from ..recordings import nearest
+
 Causality = Literal["input", "output", "parameter"]
 
 
@@ -107,6 +110,14 @@ class Participant(ABC):
 
     def close(self) -> None:  # noqa: B027  most participants hold nothing to give back
         """Give back processes, files and memory; no call follows."""
+
+    def start_parameters(self, given: Mapping[str, float] | None) -> dict[str, float]:
+        """Every parameter's start value, or the one given; InputError for one that it does not have."""
+        values = {v.name: v.start for v in self.variables if v.causality == "parameter"}
+        for key in given or ():
+            if key not in values:
+                raise InputError(f"{self.name}: has no parameter {key!r}; nearest is {nearest(key, values)!r}")
+        return values | dict(given or {})
 
     def names(self, causality: Causality) -> tuple[str, ...]:
         """Names of the variables of one causality, in order."""

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..exit_status import status_of
 from ..identification.links.diagnose import PROVED
 from ..models.effects import effects
 from ..models.model import Placed
@@ -25,7 +26,6 @@ from ..recordings.find import SHA256
 from .bam_figures import explained, positions
 from .bam_naming import START, Fitted, Round, Tried, Values, fit, name_missing, rms
 from .bam_servo import DUTY, MOTOR, ServoRun, position_error, read_run
-from .command import status_of
 from .outcome import FOLDER, Quantity, table, write_result
 from .page import Picture, Section, write_page
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
+from ..exit_status import status_of
 from ..identification.diagnose import Answer, diagnose
 from ..identification.diagnosis import Diagnosis
 from ..identification.identify import identify
@@ -20,7 +21,6 @@ from ..identification.report.page import write_report
 from ..models.model_file import load_model
 from ..models.model_write import save_model
 from ..recordings import find_recording
-from .command import status_of
 
 HERE = Path(__file__).parent
 OUT = Path("build/studies/emps")

@@ -13,6 +13,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from pydrake.geometry import Box, Sphere
 
+from ..exit_status import status_of
 from ..models.floating.arm import FloatingArm
 from ..models.floating.dynamics import (
     base_twist,
@@ -31,7 +32,6 @@ from ..models.floating.plant import FloatingPlant, Run
 from ..models.inertia import Array, to_central
 from ..report.drawing import AFTER, BEFORE, MEASURED, drawing, line, margins, svg
 from ..report.playback import Playback
-from .command import status_of
 from .outcome import Quantity, table, write_result
 from .page import Picture, Section, write_page
 

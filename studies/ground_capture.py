@@ -13,12 +13,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..exit_status import status_of
 from ..models.snare.history import SnareHistory
 from ..models.snare.model import SnareModel
 from ..models.snare.parameters import WIDE_RING, SnareParameters
 from ..models.snare.target import Target
 from ..report.snare_scene import snare_scene
-from .command import status_of
 from .ground_capture_figures import sections
 from .outcome import Quantity, table, write_result
 from .page import write_page

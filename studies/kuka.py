@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from ..exit_status import status_of
 from ..identification.diagnose import Answer, diagnose
 from ..identification.fitting.assembly import Assembly
 from ..identification.fitting.experiment import Experiment, load_experiments, scales
@@ -28,7 +29,6 @@ from ..models.model_file import load_model
 from ..models.model_write import save_model
 from ..models.rigid_body import RigidBody
 from ..recordings import find_recording
-from .command import status_of
 from .kuka_figures import MDEG, differences, left_over, pattern, rms, without
 from .outcome import FOLDER, Quantity, table, write_result
 from .page import Picture, Section, write_page

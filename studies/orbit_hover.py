@@ -2,7 +2,7 @@
 
 import sys
 
-from .command import status_of
+from ..exit_status import status_of
 from .orbit.capture import study
 
 

@@ -11,13 +11,13 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
+from ..exit_status import status_of
 from ..report.html import page, paragraph
 from ..report.html import table as markup_table
 from ..tolerance.report import summarise
 from ..tolerance.results import Results
 from ..tolerance.run import run_study
 from ..tolerance.study import Study, load_study
-from .command import status_of
 from .outcome import FOLDER, Quantity, table, write_result
 
 STUDIES = ("ground", "inspection")

@@ -26,6 +26,25 @@ def emps() -> Path:
     pytest.skip("EMPS recordings not found: set SNARELAB_RECORDINGS to the folder that holds emps/DATA_EMPS.mat")
 
 
+@pytest.fixture(scope="module")
+def own_cache(tmp_path_factory):
+    """A cache of compiled models that no other test has filled."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
+@pytest.fixture(scope="module")
+def halves(tmp_path_factory) -> Path:
+    """A folder with the two halves of an oscillator as FMUs of FMI 2.0, in plain C."""
+    from bench.oscillator_fmu import build
+
+    place = tmp_path_factory.mktemp("system")
+    for side in ("left", "right"):
+        build(place, side, 2)
+    return place
+
+
 @pytest.fixture
 def arm_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The current folder, with an arm's model and recordings as a user has them."""

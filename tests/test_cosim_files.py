@@ -10,7 +10,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bench.oscillator_fmu import build
 from snarelab.cosim.command import add_parser
 from snarelab.cosim.participants.oscillator import RightOscillator
 from snarelab.cosim.setup import Hosting, load_setup
@@ -18,15 +17,6 @@ from snarelab.errors import InputError
 
 HERE = Hosting(own_process=False)
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the test FMUs are built for Linux")
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """A folder with the two halves as FMUs of FMI 2.0."""
-    place = tmp_path_factory.mktemp("system")
-    for side in ("left", "right"):
-        build(place, side, 2)
-    return place
 
 
 TOML = """
@@ -52,9 +42,9 @@ spring = { effort = "right.force", flow = "left.v" }
 """
 
 
-def written(folder, text=TOML, name="system.toml"):
-    (folder / name).write_text(text)
-    return folder / name
+def written(halves, text=TOML, name="system.toml"):
+    (halves / name).write_text(text)
+    return halves / name
 
 
 def command(*arguments):
@@ -67,8 +57,8 @@ def command(*arguments):
 # TOML
 
 
-def test_toml_becomes_a_run(folder):
-    setup = load_setup(written(folder), HERE)
+def test_toml_becomes_a_run(halves):
+    setup = load_setup(written(halves), HERE)
     assert (setup.step, setup.stop, setup.scheme, setup.hold) == (2e-3, 0.5, "gauss_seidel", "midpoint")
     with setup.master() as master:
         run = master.run(setup.stop)
@@ -95,9 +85,9 @@ def test_toml_becomes_a_run(folder):
         ('scheme = "gauss_seidel"', 'scheme = "both"', "choose jacobi or gauss_seidel"),
     ],
 )
-def test_mistakes_in_toml_are_named_with_the_file(folder, tmp_path, old, new, message):
+def test_mistakes_in_toml_are_named_with_the_file(halves, tmp_path, old, new, message):
     assert old in TOML
-    text = TOML.replace(old, new).replace('"left2.fmu"', f'"{folder}/left2.fmu"')
+    text = TOML.replace(old, new).replace('"left2.fmu"', f'"{halves}/left2.fmu"')
     path = written(tmp_path, text)
     with pytest.raises(InputError) as caught:
         command(path, "--out", tmp_path / "run.csv", "--same-process")
@@ -110,41 +100,41 @@ def test_mistakes_in_toml_are_named_with_the_file(folder, tmp_path, old, new, me
 # The command
 
 
-def test_command_writes_the_recording(folder, tmp_path, capsys):
-    command(written(folder), "--out", tmp_path / "run.parquet", "--until", "0.1", "--step", "0.01")
+def test_command_writes_the_recording(halves, tmp_path, capsys):
+    command(written(halves), "--out", tmp_path / "run.parquet", "--until", "0.1", "--step", "0.01")
     table = pd.read_parquet(tmp_path / "run.parquet")
     np.testing.assert_allclose(table["time"], np.arange(11) * 0.01, atol=1e-12)
     assert {"left.x [m]", "right.force [N]", "residual.spring [J]"} <= set(table)
     assert "10 steps" in capsys.readouterr().out
 
 
-def test_failed_run_keeps_its_recording(folder, tmp_path):
+def test_failed_run_keeps_its_recording(halves, tmp_path):
     text = TOML.replace("mass = 2", "mass = 2, fault = 4, fault_time = 0.1")  # 4: the FMU kills its process
     with pytest.raises(InputError) as caught:
-        command(written(folder, text, "bad.toml"), "--out", tmp_path / "run.csv")
+        command(written(halves, text, "bad.toml"), "--out", tmp_path / "run.csv")
     message = str(caught.value)
     assert "left: its process was killed by SIGKILL in the step from 0.1 s; last good step ended at 0.1 s" in message
     assert str(tmp_path / "run.csv") in message
     assert len(pd.read_csv(tmp_path / "run.csv")) == 51
 
 
-def test_interrupted_run_keeps_its_recording(folder, tmp_path, monkeypatch, capsys):
+def test_interrupted_run_keeps_its_recording(halves, tmp_path, monkeypatch, capsys):
     def stopped(participant, time, size):
         if time > 0.1:
             signal.raise_signal(signal.SIGTERM)
 
     monkeypatch.setattr(RightOscillator, "step", stopped)
     with pytest.raises(SystemExit) as caught:
-        command(written(folder), "--out", tmp_path / "run.csv", "--same-process")
+        command(written(halves), "--out", tmp_path / "run.csv", "--same-process")
     assert caught.value.code == 130
     assert len(pd.read_csv(tmp_path / "run.csv")) == 51 + 1
     assert "interrupted at 0.102 s" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", ["run.txt", "nowhere/run.csv"])
-def test_command_refuses_a_bad_place_before_it_runs(folder, tmp_path, name):
+def test_command_refuses_a_bad_place_before_it_runs(halves, tmp_path, name):
     with pytest.raises(InputError):
-        command(written(folder), "--out", tmp_path / name)
+        command(written(halves), "--out", tmp_path / name)
 
 
 def test_command_refuses_other_files(tmp_path):
@@ -169,6 +159,6 @@ def test_python_of_the_page_runs():
     assert names["run"].steps == 1000
 
 
-def test_system_file_of_the_page_loads(folder):
+def test_system_file_of_the_page_loads(halves):
     (shown,) = [block for block in blocks("toml") if "[participants.left]" in block]
-    assert load_setup(written(folder, shown.replace('"left.fmu"', '"left2.fmu"')), HERE).master().run(0.05).steps == 50
+    assert load_setup(written(halves, shown.replace('"left.fmu"', '"left2.fmu"')), HERE).master().run(0.05).steps == 50

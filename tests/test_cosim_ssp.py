@@ -20,27 +20,18 @@ HERE = Hosting(own_process=False)
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the test FMUs are built for Linux")
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """A folder with the two halves as FMUs of FMI 2.0."""
-    place = tmp_path_factory.mktemp("system")
-    for side in ("left", "right"):
-        build(place, side, 2)
-    return place
-
-
-def both(folder, **options):
+def both(halves, **options):
     connections = [
         ("right.force", "left.force"),
         Connection("left.x", "right.x_left", factor=0.5, offset=0.25),
         ("left.v", "right.v_left"),
     ]
-    parts = {side: Fmu(folder / f"{side}2.fmu") for side in ("left", "right")}
+    parts = {side: Fmu(halves / f"{side}2.fmu") for side in ("left", "right")}
     return System(parts, connections, **options)
 
 
-def test_written_ssp_reads_back_as_the_same_run(folder, tmp_path):
-    setup = Setup(both(folder, parameters={"left.mass": 2.0}), 2e-3, stop=0.2, scheme="gauss_seidel", hold="quadratic")
+def test_written_ssp_reads_back_as_the_same_run(halves, tmp_path):
+    setup = Setup(both(halves, parameters={"left.mass": 2.0}), 2e-3, stop=0.2, scheme="gauss_seidel", hold="quadratic")
     write_ssp(setup, tmp_path / "system.ssp")
     again = load_setup(tmp_path / "system.ssp", HERE)
     assert (again.step, again.stop, again.scheme, again.hold) == (2e-3, 0.2, "gauss_seidel", "quadratic")
@@ -50,11 +41,11 @@ def test_written_ssp_reads_back_as_the_same_run(folder, tmp_path):
     assert (tmp_path / "again.ssp").read_bytes() == (tmp_path / "system.ssp").read_bytes()
 
 
-def test_written_ssp_follows_the_schema_and_runs_in_fmpy(folder, tmp_path):
+def test_written_ssp_follows_the_schema_and_runs_in_fmpy(halves, tmp_path):
     from fmpy.ssp.simulation import simulate_ssp
     from fmpy.ssp.ssd import read_ssd
 
-    write_ssp(Setup(both(folder), 1e-3), tmp_path / "system.ssp")
+    write_ssp(Setup(both(halves), 1e-3), tmp_path / "system.ssp")
     top = read_ssd(str(tmp_path / "system.ssp"), validate=True).system
     assert top is not None
     assert [element.name for element in top.elements] == ["left", "right"]
@@ -63,14 +54,14 @@ def test_written_ssp_follows_the_schema_and_runs_in_fmpy(folder, tmp_path):
     assert result["left.x"][-1] < 1.0
 
 
-def test_written_ssp_runs_in_ecos_with_its_parameters(folder, tmp_path):
+def test_written_ssp_runs_in_ecos_with_its_parameters(halves, tmp_path):
     for library in Path(sys.prefix).glob("lib/libtbb.so.12"):
         ctypes.CDLL(str(library), mode=ctypes.RTLD_GLOBAL)  # Ecos wants it and does not look there
     try:
         import ecospy
     except (ImportError, OSError) as reason:
         pytest.skip(f"ecospy cannot be loaded: {reason}")
-    system = both(folder, parameters={"left.mass": 2.0, "right.coupling_stiffness": 4.0})
+    system = both(halves, parameters={"left.mass": 2.0, "right.coupling_stiffness": 4.0})
     write_ssp(Setup(system, 1e-3), tmp_path / "system.ssp")
     with ecospy.EcosSimulation(1e-3, ssp_path=str(tmp_path / "system.ssp")) as simulation:
         simulation.init(parameter_set="initialValues")
@@ -153,19 +144,19 @@ MAP = """<ssm:ParameterMapping xmlns:ssm="http://ssp-standard.org/SSP1/SystemStr
 </ssm:ParameterMapping>"""
 
 
-def by_hand(folder, path, description=HAND):
+def by_hand(halves, path, description=HAND):
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("SystemStructure.ssd", description)
         archive.writestr("resources/values.ssv", VALUES)
         archive.writestr("resources/map.ssm", MAP)
         for side in ("left", "right"):
-            archive.write(folder / f"{side}2.fmu", f"resources/{side}2.fmu")
+            archive.write(halves / f"{side}2.fmu", f"resources/{side}2.fmu")
     return path
 
 
-def test_ssp_written_by_hand_loads(folder, tmp_path):
+def test_ssp_written_by_hand_loads(halves, tmp_path):
     """Nested systems, a reversed connection, transformations across a border, mapped parameters with units."""
-    setup = load_setup(by_hand(folder, tmp_path / "hand.ssp"), HERE)
+    setup = load_setup(by_hand(halves, tmp_path / "hand.ssp"), HERE)
     assert list(setup.system.participants) == ["inner_mass", "right"]
     assert setup.system.given == {"inner_mass.mass": 2.0, "inner_mass.damping": 0.5}
     assert {(c.source, c.target, c.factor) for c in setup.system.connections} == {
@@ -174,7 +165,7 @@ def test_ssp_written_by_hand_loads(folder, tmp_path):
         ("inner_mass.v", "right.v_left", 1.0),
     }
     flat = System(
-        {"m": LeftOscillator(), "right": Fmu(folder / "right2.fmu")},
+        {"m": LeftOscillator(), "right": Fmu(halves / "right2.fmu")},
         [("right.force", "m.force"), ("m.x", "right.x_left"), ("m.v", "right.v_left")],
         parameters={"m.mass": 2.0, "m.damping": 0.5},
     )
@@ -204,21 +195,21 @@ def test_ssp_written_by_hand_loads(folder, tmp_path):
         ("</System>\n  <Def", "</Systm>\n  <Def", "is no XML"),
     ],
 )
-def test_mistakes_in_ssp_are_named_with_the_file(folder, tmp_path, old, new, message):
+def test_mistakes_in_ssp_are_named_with_the_file(halves, tmp_path, old, new, message):
     assert old in HAND
-    path = by_hand(folder, tmp_path / "bad.ssp", HAND.replace(old, new, 1))
+    path = by_hand(halves, tmp_path / "bad.ssp", HAND.replace(old, new, 1))
     with pytest.raises(InputError) as caught:
         load_setup(path, HERE)
     assert message in str(caught.value)
     assert str(caught.value).startswith(str(path))
 
 
-def test_unconverted_units_are_refused_only_where_they_differ(folder, tmp_path):
+def test_unconverted_units_are_refused_only_where_they_differ(halves, tmp_path):
     plain = HAND.replace(
         '<Connection startElement="right"', '<Connection suppressUnitConversion="true" startElement="right"'
     )
     assert plain != HAND
-    load_setup(by_hand(folder, tmp_path / "same.ssp", plain), HERE)
+    load_setup(by_hand(halves, tmp_path / "same.ssp", plain), HERE)
     other = tmp_path / "kilo"
     other.mkdir()
     build(other, "left", 2, units={"force": "kN"})

@@ -19,13 +19,7 @@ from snarelab.models.inertia import from_central, is_physical, nearest_physical,
 from snarelab.models.tree import Joint, Link, Tree
 
 Z = np.array([0.0, 0.0, 1.0])
-
-
-@pytest.fixture(autouse=True, scope="module")
-def own_cache(tmp_path_factory):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
-        yield
+pytestmark = pytest.mark.usefixtures("own_cache")
 
 
 @pytest.fixture(scope="module")

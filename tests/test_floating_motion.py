@@ -20,13 +20,7 @@ from snarelab.models.tree import Joint, Link, Tree
 
 TARGET = np.arange(1, 7) / 10
 INERTIA = 0.8  # kg·m², of the flywheel
-
-
-@pytest.fixture(autouse=True, scope="module")
-def own_cache(tmp_path_factory):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
-        yield
+pytestmark = pytest.mark.usefixtures("own_cache")
 
 
 @pytest.fixture(scope="module")

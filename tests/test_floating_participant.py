@@ -15,13 +15,7 @@ from snarelab.models.floating.space_arm import CAPTURE_POSE, space_arm, space_ar
 
 POSE = np.array(CAPTURE_POSE)
 STEP = 1e-3
-
-
-@pytest.fixture(autouse=True, scope="module")
-def own_cache(tmp_path_factory):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
-        yield
+pytestmark = pytest.mark.usefixtures("own_cache")
 
 
 @pytest.fixture(scope="module")

@@ -20,13 +20,7 @@ from snarelab.models.tree import Joint, Link, Tree
 from snarelab.models.urdf import load_urdf
 
 GRAVITY = (1.2, -0.7, -9.3)
-
-
-@pytest.fixture(autouse=True, scope="module")
-def own_cache(tmp_path_factory):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
-        yield
+pytestmark = pytest.mark.usefixtures("own_cache")
 
 
 def words(values) -> str:

@@ -19,13 +19,7 @@ from snarelab.models.floating.space_arm import (
 from snarelab.models.inertia import from_central, is_physical, to_central
 
 POSE = np.array(CAPTURE_POSE)
-
-
-@pytest.fixture(autouse=True, scope="module")
-def own_cache(tmp_path_factory):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
-        yield
+pytestmark = pytest.mark.usefixtures("own_cache")
 
 
 @pytest.fixture(scope="module")

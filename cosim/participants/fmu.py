@@ -9,9 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...errors import InputError
 from ...fmu.archive import open_fmu
-from ...recordings import nearest
 from ..fmi_calls import CompiledCalls, Instance, Vector, address
 from ..fmi_variables import Slot, read_interface
 from ..participant import Causality, Participant, StepError
@@ -57,10 +55,7 @@ class Fmu(Participant):
     def initialize(self, time: float = 0.0, parameters: Mapping[str, float] | None = None) -> None:
         """Instantiate, set parameters, initialise at a time [s]; raises InputError for a parameter it has not."""
         self.close()
-        known = self.names("parameter")
-        unknown = [name for name in parameters or () if name not in known]
-        if unknown:
-            raise InputError(f"{self.name}: has no parameter {unknown[0]!r}; nearest is {nearest(unknown[0], known)!r}")
+        self.start_parameters(parameters)
         self._instance = Instance(self._description, self._folder, self.name)
         if self.can_restore:
             self._instance.prepare_states()

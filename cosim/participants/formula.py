@@ -5,8 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError
-from ...recordings import nearest
 from ..participant import Participant, StepError, Variable
 
 
@@ -35,13 +33,7 @@ class Formula(Participant):
 
     def initialize(self, time: float = 0.0, parameters: Mapping[str, float] | None = None) -> None:
         """Inputs at their start values; raises InputError for an unknown parameter."""
-        self._parameters = {v.name: v.start for v in self.variables if v.causality == "parameter"}
-        for key in parameters or ():
-            if key not in self._parameters:
-                raise InputError(
-                    f"{self.name}: has no parameter {key!r}; nearest is {nearest(key, self._parameters)!r}"
-                )
-        self._parameters |= parameters or {}
+        self._parameters = self.start_parameters(parameters)
         self._inputs = np.array([v.start for v in self.variables if v.causality == "input"])
         self._n_outputs = len(self.names("output"))
 

@@ -20,7 +20,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ...errors import InputError
 from ..participant import Participant, Variable
 
 
@@ -45,11 +44,7 @@ class _LinearHalf(Participant):
 
     def initialize(self, time: float = 0.0, parameters: Mapping[str, float] | None = None) -> None:
         """Put the mass at its starting position and speed."""
-        values = {v.name: v.start for v in self.variables if v.causality == "parameter"}
-        unknown = set(parameters or ()) - set(values)
-        if unknown:
-            raise InputError(f"{self.name}: has no parameter {min(unknown)!r}; it has {', '.join(values)}")
-        values |= parameters or {}
+        values = self.start_parameters(parameters)
         self._state, self._input, self._output = self._equations(values)
         n, m = self._input.shape
         self._x = np.zeros(n + 3 * m)

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
-from ...recordings import nearest
 from ..participant import Participant, StepError, Variable
 
 Function = Callable[[float, np.ndarray, np.ndarray, Mapping[str, float]], tuple[Any, Any]]
@@ -49,13 +48,7 @@ class Program(Participant):
 
     def initialize(self, time: float = 0.0, parameters: Mapping[str, float] | None = None) -> None:
         """Back to the first state; raises InputError for an unknown parameter."""
-        self._parameters = {v.name: v.start for v in self.variables if v.causality == "parameter"}
-        for key in parameters or ():
-            if key not in self._parameters:
-                raise InputError(
-                    f"{self.name}: has no parameter {key!r}; nearest is {nearest(key, self._parameters)!r}"
-                )
-        self._parameters |= parameters or {}
+        self._parameters = self.start_parameters(parameters)
         self._start, self._calls = time, 0
         self._state = self._first_state.copy()
         self._inputs = np.array([v.start for v in self.variables if v.causality == "input"])

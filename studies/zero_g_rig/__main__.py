@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...exit_status import status_of
 from ...identification.diagnose import diagnose
 from ...identification.diagnosis import Diagnosis
 from ...identification.report.page import write_report
 from ...models.model_file import load_model
 from ...models.model_write import save_model
 from ...models.rig.rig import built_in_rig
-from ..command import status_of
 from ..outcome import FOLDER, Quantity, table, write_result
 from ..page import Section, write_page
 from . import figures

@@ -1,17 +1,17 @@
-"""A study as a command: the statuses of ``snarelab``, and one line where it is refused or stopped."""
+"""The exit statuses that every command and study shares, and one line where it is refused or stopped."""
 
 import sys
 from collections.abc import Callable
 
-from ..errors import InputError
-from ..progress import terminated_is_interrupted
+from .errors import InputError
+from .progress import terminated_is_interrupted
 
 
-def status_of(study: Callable[[], int]) -> int:
-    """Run a study; its status, 2 for unusable input, 130 where Ctrl-C or SIGTERM stopped it."""
+def status_of(job: Callable[[], int]) -> int:
+    """Run a job; its status, 2 for unusable input, 130 where Ctrl-C or SIGTERM stopped it."""
     try:
         with terminated_is_interrupted():
-            return study()
+            return job()
     except InputError as error:
         print(f"snarelab: {error}", file=sys.stderr)
         return 2
