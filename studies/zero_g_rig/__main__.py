@@ -36,7 +36,10 @@ CONCEALED = "link_torsion"
 
 
 def main() -> int:
-    """Run the study; leaves report, numbers, recordings and the improved model in ``build/studies/zero-g-rig``."""
+    """Run the study; leaves report, numbers, recordings and the improved model in ``build/studies/zero-g-rig``.
+
+    Status 1 where the diagnosis did not name what the plant conceals, at its place.
+    """
     begun, folder = time.monotonic(), FOLDER / STUDY
     say("The plant, in another engine, makes two recordings ...")
     digest = make_recordings(folder, CONCEALED, seed=0)
@@ -81,6 +84,9 @@ def main() -> int:
     )
     say(f"\n{table(quantities)}\n\n{sentence}\n" + "\n".join(words))
     say(f"The answer, opened now: {truth['effect']}\nReport: {(folder / 'report.html').resolve()}")
+    if not result.placed:
+        print("the diagnosis did not name what the plant conceals at its place", file=sys.stderr)
+        return 1
     return 0
 
 
