@@ -1,6 +1,6 @@
 """The rig study over many seeds: are friction curves inside their bands, and is what is concealed named?
 
-    python bench/rig_seeds.py [--seeds 20] [--only KIND] [--workers 1]
+    python bench/rig_seeds.py [--seeds 20] [--first 1] [--only KIND] [--workers 1]
     python bench/rig_seeds.py --curves [--seeds 40]
 
 With ``--curves`` only friction is identified; what is concealed is not diagnosed. Each seed draws the slides' friction,
@@ -88,6 +88,7 @@ def table(lines: list[dict[str, Any]]) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=20)
+    parser.add_argument("--first", type=int, default=1, help="the first seed")
     parser.add_argument("--only", choices=KINDS)
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--curves", action="store_true")
@@ -96,7 +97,7 @@ def main() -> None:
     lines = [json.loads(x) for x in RESULTS.read_text().splitlines()] if RESULTS.is_file() else []
     have = {(x["kind"], x["seed"]) for x in lines if asked.curves or "score" in x}
     kinds = (asked.only,) if asked.only else KINDS[:1] if asked.curves else KINDS
-    wanted = [(k, s) for s in range(1, asked.seeds + 1) for k in kinds if (k, s) not in have]
+    wanted = [(k, s) for s in range(asked.first, asked.first + asked.seeds) for k in kinds if (k, s) not in have]
     with ProcessPoolExecutor(asked.workers) as pool:
         for done in as_completed([pool.submit(run, *w, asked.curves) for w in wanted]):
             line = done.result()

@@ -36,6 +36,7 @@ def report_on(
     model: Model,
     found: Found,
     confirmed: Sequence[Taken],
+    doubtful: Sequence[Taken],
     final: Fit,
     trials: Mapping[str, tuple[float, float]],
     steps: tuple[Step, ...],
@@ -52,6 +53,8 @@ def report_on(
         The search's result.
     confirmed : sequence of Taken
         What the held-out recording confirmed; the rest of ``found.taken`` goes into the notes.
+    doubtful : sequence of Taken
+        What it confirmed too, and what only stands in for something that has no name.
     final : Fit
         With the confirmed effects.
     trials : mapping of str to (with, without)
@@ -62,8 +65,9 @@ def report_on(
     channels = [channel(model.tree, c) for c in range(model.tree.n_joints)]
     findings = tuple(_finding(t, final, trials, channels) for t in confirmed)
     fits = _fits(model, found.first, final, train, locked)
-    nameless = {c: x for c, x in found.closing.nameless.items() if x > NAMELESS}
-    unsteady = bursts(final, train)
+    nameless = {c: x for c, x in found.closing.nameless.items() if x.share > NAMELESS}
+    # What a curve explains well may also come and go.
+    unsteady = {c: b for c, b in bursts(final, train).items() if c not in nameless or nameless[c].share < PLAIN}
 
     def size(c: int, share: float) -> float:
         return float(np.sqrt(share)) * fits[c].train.relative_after
@@ -71,9 +75,9 @@ def report_on(
     said = [
         (
             c,
-            x,
-            f"on {channels[c]}, smooth curves over {found.closing.over[c]} together still explain {percent(x)} of the "
-            f"residual in blocks that they were not fitted to ({percent(size(c, x))} of the channel's torque)",
+            x.share,
+            f"on {channels[c]}, smooth curves over {x.over} still explain {percent(x.share)} of the residual in "
+            f"blocks that they were not fitted to ({percent(size(c, x.share))} of the channel's torque)",
         )
         for c, x in nameless.items()
     ] + [
@@ -85,7 +89,7 @@ def report_on(
         )
         for c, b in unsteady.items()
     ]
-    loud = {c for c, x, _ in said if size(c, x) >= MATERIAL} | {c for c, x in nameless.items() if x > PLAIN}
+    loud = {c for c, x, _ in said if size(c, x) >= MATERIAL} | {c for c, x in nameless.items() if x.share > PLAIN}
     description = "; ".join(text for c, _, text in said if c in loud)
     if findings:
         verdict = "missing_physics"
@@ -101,6 +105,11 @@ def report_on(
         for t in found.taken
         if t.judged.placed.key not in named
     ]
+    notes += [
+        f"{t.judged.placed.effect.name} at {t.judged.placed.at} explains some of it, but smooth curves far more: "
+        f"not named"
+        for t in doubtful
+    ]
     notes += [f"too little to speak of: {text}" for c, _, text in said if c not in loud]
     notes += _excitation(train)
     candidates = tuple(
@@ -115,7 +124,7 @@ def report_on(
         explained = [(e.measured - e.motion.to_band(final.assembly.torque(e, final.theta))) * spoken for e in train]
     return Diagnosis(
         verdict,
-        verdict_sentence(findings, fits, remainder),
+        verdict_sentence(findings, [f for c, f in enumerate(fits) if findings or not loud or c in loud], remainder),
         description,
         model.name,
         findings,

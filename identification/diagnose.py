@@ -27,6 +27,7 @@ from .links.answer import with_links
 from .links.diagnose import diagnose_links
 from .search.forward import Found, Taken, carry, search, without
 from .search.rest import bridged, fitted
+from .search.stand_ins import stand_ins
 from .search.trial import MOST
 from .snare.diagnose import diagnose_captures
 
@@ -103,10 +104,16 @@ def diagnose(
         if np.sum(np.log(last.final.sigma)) < np.sum(np.log(best.final.sigma)):
             best = last
     confirmed, trials, final = best.confirmed, best.trials, best.final
-    found = replace(best.found, taken=(*confirmed, *rejected.values()))
+    doubtful, found = stand_ins(best.found, confirmed, final, train)
+    if doubtful:
+        gone = {t.judged.placed.key for t in doubtful}
+        confirmed = tuple(t for t in confirmed if t.judged.placed.key not in gone)
+        assembly = final.assembly.keep([p for p in final.assembly.placed if p.key not in gone], final.theta)
+        final = fit(assembly, fitted(assembly, train), start=carry(final, assembly), multi_start=False)
+    found = replace(found, taken=(*confirmed, *rejected.values()))
     final, inertia = physical(final, train)
     steps = _steps(found, confirmed, final, train, locked)
-    diagnosis = report_on(model, found, confirmed, final, trials, steps, train, locked)
+    diagnosis = report_on(model, found, confirmed, doubtful, final, trials, steps, train, locked)
     values = {**model.values, **final.assembly.values(final.theta), **inertial_values(model, inertia)}
     of_links = tuple(p for p in model.effects if p.at.startswith("q_link."))
     after = replace(model, effects=(*final.assembly.placed, *of_links), values=values)

@@ -10,7 +10,6 @@ from ...models.effect import Parameter
 from ...models.effects import effects
 from ...models.floating.tree import n_carriers
 from ...models.model import Model, Placed, places
-from ...models.rig.rig import Rig
 from ..fitting.assembly import Assembly, Evaluation
 from ..fitting.effect_terms import contributions
 from ..fitting.experiment import Experiment
@@ -174,36 +173,3 @@ def free_parameters(assembly: Assembly, experiment: Experiment, state: Evaluatio
 def _is_linear(parameter: Parameter) -> bool:
     """Whether a column stands for the parameter: an amplitude, or a mass's place, whose grid is its origin alone."""
     return not parameter.grid or parameter.grid == (0.0,)
-
-
-def smooth_columns(experiment: Experiment, state: Evaluation, joint: int, pieces: int = 8) -> Array:
-    """Smooth nameless curves on one channel (n_band, k): over position, speed, load and time, as hat functions."""
-    motion = experiment.motion
-    coordinates = (motion.q[:, joint], motion.qd[:, joint], state.load[:, joint], experiment.elapsed)
-    return motion.to_band(np.concatenate([_hats(x, pieces) for x in coordinates], axis=1))
-
-
-def nameless_columns(experiment: Experiment, state: Evaluation, joint: int) -> dict[str, Array]:
-    """Curves that no effect has a name for, on one channel, by the words for what they run over (n_band, k)."""
-    motion, found = experiment.motion, {}
-    found["position, speed, load and time"] = smooth_columns(experiment, state, joint)
-    slow, speed = _hats(experiment.elapsed, 8), motion.qd[:, joint, None]
-    found["speed, changing with time,"] = experiment.to_band(slow * speed, joint)
-    if isinstance(experiment.body.tree, Rig) or n_carriers(experiment.body.tree) or not np.ptp(motion.q[:, joint]):
-        return found  # on a suspension or a floating base every joint moves what carries the others
-    forth = 0.5 + 0.5 * np.tanh(speed / (1e-2 * np.max(np.abs(speed))))
-    found["direction, changing with time,"] = experiment.to_band(slow * (2 * forth - 1), joint)
-    local = _hats(motion.q[:, joint], 24)
-    either = np.concatenate([forth * local, (1 - forth) * local], axis=1)
-    found["position, apart for either direction,"] = experiment.to_band(either, joint)
-    for c, other in enumerate(motion.joints):
-        if c != joint and np.ptp(motion.q[:, c]):
-            curves = np.concatenate([_hats(motion.q[:, c], 8), _hats(motion.qd[:, c], 8)], axis=1)
-            found[f"position and speed of {other}"] = experiment.to_band(curves, joint)
-    return found
-
-
-def _hats(x: Array, pieces: int) -> Array:
-    """Piecewise linear basis (n, k) over a coordinate, knots at its range's even steps."""
-    at = np.linspace(np.min(x), np.max(x), pieces) if np.ptp(x) > 0 else np.zeros(0)
-    return np.stack([np.interp(x, at, row) for row in np.eye(len(at))], axis=1) if len(at) else np.zeros((len(x), 0))

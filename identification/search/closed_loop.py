@@ -18,7 +18,7 @@ from ...models.floating.tree import n_carriers
 from ..fitting.experiment import Experiment
 from ..fitting.fit import Fit
 from ..fitting.problem import gather
-from .candidates import smooth_columns
+from .curves import smooth_columns
 from .rest import REST
 
 Array = NDArray[np.float64]
@@ -78,7 +78,7 @@ def _bands(found: Fit, experiments: Sequence[Experiment]) -> Array:
         for c in range(n_carriers(assembly.tree), n_joints):
             index, own = gather(blocks, c)
             fitted = [own] if len(index) else []
-            columns = np.concatenate([*fitted, smooth_columns(e, state, c), _directed(e, c)], axis=1)
+            columns = np.concatenate([*fitted, *smooth_columns([e], [state], c), _directed(e, c)], axis=1)
             left = residual[:, c] - columns @ np.linalg.lstsq(columns, residual[:, c], rcond=1e-8)[0]
             # Friction that sticks is physics that the model may lack, not a disturbance.
             left = left * (np.abs(e.motion.to_band(e.motion.qd)[:, c]) > REST * np.max(np.abs(e.motion.qd[:, c])))

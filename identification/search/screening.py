@@ -12,7 +12,8 @@ from ..diagnosis import Limit
 from ..fitting.assembly import Assembly
 from ..fitting.experiment import Experiment
 from ..fitting.fit import Fit
-from .candidates import library, nameless_columns, smooth_columns, variants
+from .candidates import library, variants
+from .curves import nameless_columns, smooth_columns
 from .evidence import Evidence
 from .grounds import NULLS, Grounds, Readings, grounds, readings
 from .judged import Judged, Samples
@@ -23,6 +24,16 @@ Array = NDArray[np.float64]
 
 LEVEL = 0.995
 """Quantile of the best score on noise that a candidate must beat, among all that reach the same channels."""
+
+
+@dataclass(frozen=True)
+class Nameless:
+    """A nameless curve on a channel: what it runs over, in words; the share of the residual's energy that it explains
+    in blocks that it was not fitted to; and the log-likelihood that it gains there."""
+
+    over: str
+    share: float
+    gain: float
 
 
 @dataclass(frozen=True)
@@ -39,9 +50,8 @@ class Screening:
     asked: Mapping[str, Judged]
     """Of drives judged along the motion as measured: the same along the motion that was asked for."""
     threshold: Mapping[tuple[int, ...], float]
-    nameless: Mapping[int, float]
-    over: Mapping[int, str]
-    """What the nameless curves run over, in words."""
+    nameless: Mapping[int, Nameless]
+    """The best curve of each channel that has one."""
     limits: tuple[Limit, ...]
     noise: Noise
 
@@ -85,7 +95,6 @@ def screen(
         for j in (t.best for t in trials)
         for limit in _limits(found.assembly, evidence, j, threshold[j.channels] + j.price)
     ]
-    nameless, over = _nameless(ground, threshold)
     return Screening(
         evidence,
         ground.near_rest,
@@ -93,8 +102,7 @@ def screen(
         tuple(judged),
         {t.asked.placed.key: t.asked for t in trials if t.asked is not None},
         threshold,
-        nameless,
-        over,
+        _nameless(ground, threshold),
         tuple(limits),
         noise,
     )
@@ -108,25 +116,23 @@ class _Free:
         self.low = -self.high
 
 
-def _nameless(ground: Grounds, threshold: Mapping[tuple[int, ...], float]) -> tuple[dict[int, float], dict[int, str]]:
-    """Share of each channel's residual that a curve without a name would explain afresh, and what it runs over."""
+def _nameless(ground: Grounds, threshold: Mapping[tuple[int, ...], float]) -> dict[int, Nameless]:
+    """The curve without a name that explains most of each channel's residual afresh."""
     asked = ground.readings.asked
     sigma, log_size = asked.found.sigma, np.log(ground.asked.evidence.size)
-    nameless: dict[int, float] = {}
-    over: dict[int, str] = {}
+    found: dict[int, Nameless] = {}
     for c in range(len(sigma)):
-        curves = [nameless_columns(e, s, c) for e, s in zip(asked.experiments, asked.states, strict=True)]
-        for words in curves[0]:
-            parts = [x[words] for x in curves]
+        for words, parts in nameless_columns(asked.experiments, asked.states, c).items():
             free = _Free(parts[0].shape[1])
             case = ground.asked.case(free, {c: parts})
             score = case.gain().total - 0.5 * len(free.high) * log_size
             spread = float(sigma[c])  # a curve is no taller than what is left over, before it is seen
-            if score > threshold[(c,)] and reliably_positive(case.fresh_gains(spread)):
+            fresh = case.fresh_gains(spread)
+            if score > threshold[(c,)] and reliably_positive(fresh):
                 share = min(ground.asked.foreseen(free, {c: parts}, spread), 1.0)
-                if share > nameless.get(c, 0.0):
-                    nameless[c], over[c] = share, words
-    return nameless, over
+                if share > (found[c].share if c in found else 0.0):
+                    found[c] = Nameless(words, share, float(fresh.sum()))
+    return found
 
 
 def _limits(assembly: Assembly, evidence: Evidence, j: Judged, needed: float) -> list[Limit]:
@@ -157,7 +163,7 @@ def _saturated(along: Readings, pool: Sequence[Sequence[Option]]) -> list[Array]
     asked = along.asked
     columns = []
     for c, own in enumerate(asked.baseline()):
-        smooth = [smooth_columns(e, s, c) for e, s in zip(asked.experiments, asked.states, strict=True)]
+        smooth = smooth_columns(asked.experiments, asked.states, c)
         columns.append([np.concatenate([x for _, x in own]), np.concatenate(smooth)])
     for options in pool:
         for c, parts in options[len(options) // 2][1].items():
