@@ -53,19 +53,37 @@ margin-right:.6rem}
 .bar i{display:block;height:100%;background:#0072b2}
 figure{margin:1rem 0}
 .plate{background:#fff;border:1px solid var(--line);border-radius:.5rem;padding:.5rem;overflow-x:auto}
-.plate img{display:block;width:100%;height:auto;min-width:40rem}
+.plot{position:relative;min-width:40rem}
+.plot img{display:block;width:100%;height:auto}
 .plate.small{max-width:48rem}
 figcaption{margin-top:.35rem;max-width:50rem}
 details{margin:1rem 0}
 summary{cursor:pointer;color:var(--accent)}
+.on-paper{display:none}
 footer{margin:3rem auto 2rem;color:var(--quiet);font-size:.85rem}
 @media (max-width:40rem){.bar{display:none}th,td{padding-right:.7rem}
 .facts{grid-template-columns:1fr}.facts dd{margin-bottom:.4rem}}
 @media print{:root{--paper:#fff;--ink:#000;--quiet:#444;--line:#bbb;--card:#fff;--accent:#000}
-@page{margin:15mm}body{font-size:10.5pt}nav{display:none}.plate{border:0;padding:0}.plate img{min-width:0}
+@page{margin:15mm}body{font-size:10.5pt}nav,.on-screen{display:none}.on-paper{display:block}
+.plate{border:0;padding:0}.plot{min-width:0}
 figure,.card,tr{break-inside:avoid}h2,h3,summary{break-after:avoid}.scroll,.plate{overflow:visible}
 .status{-webkit-print-color-adjust:exact;print-color-adjust:exact}.bar,.bar i{print-color-adjust:exact}
 details::details-content{content-visibility:visible;block-size:auto}}
+"""
+
+# What scrolls sideways on a narrow window can be reached by key; not every browser sees to that by itself.
+_SCROLLING = """
+(() => {
+  const boxes = document.querySelectorAll(".scroll,.plate");
+  const see = () => {
+    for (const box of boxes) {
+      if (box.scrollWidth <= box.clientWidth) { box.removeAttribute("tabindex"); box.role = box.ariaLabel = null; }
+      else Object.assign(box, {tabIndex: 0, role: "group", ariaLabel: "scrolls sideways"});
+    }
+  };
+  const observer = new ResizeObserver(see);
+  boxes.forEach(box => observer.observe(box));
+})();
 """
 
 
@@ -83,7 +101,7 @@ def page(title: str, header: str, sections: Sequence[tuple[str, str, str]], foot
         '<link rel="icon" href="data:,">\n'
         f"<title>{escape(title)}</title>\n<style>{STYLE}</style></head>\n<body>\n<header>{header}</header>\n"
         f'<nav aria-label="Sections">{links}</nav>\n<main>\n{body}\n</main>\n'
-        f"<footer>{escape(footer)}</footer>\n</body>\n</html>\n"
+        f"<footer>{escape(footer)}</footer>\n<script>{_SCROLLING}</script>\n</body>\n</html>\n"
     )
 
 
@@ -100,7 +118,7 @@ def table(
     def cells(row: Sequence[str], tag: str, scope: str) -> str:
         return "".join(
             f'<th scope="{scope}"{_class("n" if i in numeric else "")}>{cell}</th>'
-            if tag == "th" or i == 0
+            if (tag == "th" and cell) or i == 0
             else f"<td{_class('n' if i in numeric else '')}>{cell}</td>"
             for i, cell in enumerate(row)
         )
@@ -118,7 +136,8 @@ def figure(svg: bytes, alternative: str, caption: str, small: bool = False) -> s
     data = base64.b64encode(svg).decode("ascii")
     return (
         f'<figure><div class="plate{" small" if small else ""}">'
-        f'<img src="data:image/svg+xml;base64,{data}" alt="{escape(alternative)}"></div>'
+        f'<div class="plot"><img src="data:image/svg+xml;base64,{data}" alt="{escape(alternative)}">'
+        "</div></div>"
         f"<figcaption>{escape(caption)}</figcaption></figure>\n"
     )
 

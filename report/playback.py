@@ -28,6 +28,8 @@ _STRETCH = 0.01
 _BAR = """
 <style>
 #meshcat-pane{height:calc(100vh - 2.6rem)!important}
+#meshcat-pane:focus-visible{outline:3px solid #00588f;outline-offset:-3px}
+.dg{display:none!important} /* Meshcat's own controls: without labels, and with an animation of their own */
 #bar{height:2.6rem;display:flex;gap:.75rem;align-items:center;padding:0 .75rem;background:#fff;color:#1c2329;
 font:14px/1 system-ui,sans-serif;box-sizing:border-box}
 #bar button{width:4.5rem;height:1.8rem;font:inherit}
@@ -62,6 +64,11 @@ font:14px/1 system-ui,sans-serif;box-sizing:border-box}
     animator.play();  // Without this its actions would not follow the slider.
     animator.pause();
     slider.max = animator.duration;
+    const view = document.getElementById("meshcat-pane");
+    Object.assign(view, {tabIndex: 0, role: "application"});
+    view.ariaLabel = "3-D view: arrow keys shift it, with Shift they turn it";
+    Object.assign(viewer.controls, {keyRotateSpeed: 8, keyPanSpeed: 20});
+    viewer.controls.listenToKeyEvents(view);
     slider.disabled = button.disabled = false;
     go(START);
     requestAnimationFrame(tick);
@@ -183,7 +190,7 @@ class Playback:
     def html(self, start: float = 0.0) -> str:
         """The whole page, which asks nothing of the network; it opens at the time ``start`` [s]."""
         self._meshcat.SetAnimation(self._animation)
-        page = self._meshcat.StaticHtml()
+        page = self._meshcat.StaticHtml().replace("<html>", '<html lang="en">', 1)
         before, end, after = page.rpartition("</body>")
         return before + _BAR.replace("START", repr(float(start))) + end + after
 

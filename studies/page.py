@@ -17,7 +17,8 @@ _KINDS = {
     "reference": "Ours alone; there is no number to compare with.",
 }
 
-_PLAYBACK = """<figure><div class="plate"><iframe id="playback-frame" title="3-D playback"
+_PLAYBACK = """<p class="on-paper">The playback moves in the HTML file only: open it on a screen.</p>
+<figure class="on-screen"><div class="plate"><iframe id="playback-frame" title="3-D playback"
 style="display:block;width:100%;height:min(38rem,85vh);border:0"></iframe></div>
 <figcaption>CAPTION</figcaption></figure>
 <noscript><p>The playback needs JavaScript.</p></noscript>

@@ -99,6 +99,13 @@ def test_page_unpacks_its_playback_in_a_browser(
     path = write_page("demo", "Test", "It moves.", QUANTITIES, [Section("One", (), [picture()])], moving().html(1.0))
     assert path.stat().st_size < 3e6
     with opened(browser, path, size=(1000, 1600)) as page:
-        playing(page)
+        playback = playing(page)
         shown = pixels(page)
+        playback.locator("#meshcat-pane").focus()
+        for _ in range(5):
+            page.keyboard.press("ArrowRight")
+        drawn(playback)
+        shifted = pixels(page)
+    # The view goes right by 20 pixels a key, and what is in it goes left.
+    assert extent(shifted[700:], 0)[0] - extent(shown[700:], 0)[0] == pytest.approx(-0.1, abs=0.02)
     assert all(np.isfinite(extent(shown[700:], channel)[0]) for channel in range(3))
