@@ -4,6 +4,9 @@ import base64
 from collections.abc import Sequence
 from html import escape
 
+from . import time_cursor
+from .time_axes import time_axes
+
 STYLE = """
 :root{color-scheme:light dark;--paper:#fff;--ink:#1c2329;--quiet:#56616b;--line:#d5dbe0;--card:#f5f7f9;--accent:#00588f;
 --missing:#a34700;--adequate:#00664b;--unknown:#7a3f66}
@@ -95,13 +98,16 @@ def page(title: str, header: str, sections: Sequence[tuple[str, str, str]], foot
         f"{content}</section>"
         for key, heading, content in sections
     )
+    style, script = STYLE, _SCROLLING
+    if ' data-time-axes="' in body:
+        style, script = STYLE + time_cursor.STYLE, _SCROLLING + time_cursor.SCRIPT
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head><meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         '<link rel="icon" href="data:,">\n'
-        f"<title>{escape(title)}</title>\n<style>{STYLE}</style></head>\n<body>\n<header>{header}</header>\n"
+        f"<title>{escape(title)}</title>\n<style>{style}</style></head>\n<body>\n<header>{header}</header>\n"
         f'<nav aria-label="Sections">{links}</nav>\n<main>\n{body}\n</main>\n'
-        f"<footer>{escape(footer)}</footer>\n<script>{_SCROLLING}</script>\n</body>\n</html>\n"
+        f"<footer>{escape(footer)}</footer>\n<script>{script}</script>\n</body>\n</html>\n"
     )
 
 
@@ -132,11 +138,11 @@ def table(
 
 
 def figure(svg: bytes, alternative: str, caption: str, small: bool = False) -> str:
-    """A picture on a white plate, so that it reads the same on light and dark paper."""
+    """A picture on a white plate, so that it reads the same on light and dark paper; plots over time share a cursor."""
     data = base64.b64encode(svg).decode("ascii")
     return (
         f'<figure><div class="plate{" small" if small else ""}">'
-        f'<div class="plot"><img src="data:image/svg+xml;base64,{data}" alt="{escape(alternative)}">'
+        f'<div class="plot"{time_axes(svg)}><img src="data:image/svg+xml;base64,{data}" alt="{escape(alternative)}">'
         "</div></div>"
         f"<figcaption>{escape(caption)}</figcaption></figure>\n"
     )

@@ -74,11 +74,13 @@ def test_tab_reaches_every_control(browser: Browser, pages: dict[str, Path], kin
 @pytest.mark.parametrize("kind", [*VERDICTS, "study"])
 def test_paper_hides_and_cuts_nothing(browser: Browser, pages: dict[str, Path], kind: str) -> None:
     with opened(browser, pages[kind], "dark", (680, 1010)) as page:  # A4 less its margins, at 96 dots an inch
+        page.locator(".times").first.focus()
+        page.keyboard.press("End")
         page.emulate_media(media="print")
         assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
-        assert not page.locator("nav:visible,iframe:visible").count()
+        assert not page.locator(".cursor:visible,.times:visible,nav:visible,iframe:visible").count()
         hidden = page.evaluate("""() => [...document.querySelectorAll("body *")]
-            .filter(x => !x.closest("nav,script,style,noscript,.on-screen,.bar"))
+            .filter(x => !x.closest("nav,script,style,noscript,.on-screen,.cursor,.times,.bar"))
             .filter(x => !x.getBoundingClientRect().height || !x.checkVisibility({contentVisibilityAuto: true}))
             .map(x => x.outerHTML.slice(0, 80))""")
         assert [element for element in hidden if not element.startswith(("<col", "<br"))] == []
@@ -93,4 +95,4 @@ def test_without_scripts_the_plots_are_plain(browser: Browser, pages: dict[str, 
     with opened(browser, pages["missing_physics"], scripts=False) as page:
         assert page.locator("h1").inner_text() == VERDICTS["missing_physics"]().sentence
         assert page.locator(".plot img:visible").count() > 5
-        assert page.locator("[tabindex]").count() == 0
+        assert page.locator(".cursor,.times,[tabindex]").count() == 0
