@@ -1,7 +1,8 @@
 """3-D playback of a simulation in the browser, with a time slider: one HTML text that needs nothing else.
 
-Drake's Meshcat draws; its recording is saved as a page, and a bar with a button and a slider is put under it. Nothing
-is simulated here: poses and curves come in as arrays over time.
+Drake's Meshcat draws; its recording is saved as a page, and a bar with a button and a slider is put under it.
+It and a page that frames it tell each other the time, by messages ``{playbackTime}`` [s]. Nothing is simulated here:
+poses and curves come in as arrays over time.
 """
 
 import logging
@@ -42,10 +43,16 @@ font:14px/1 system-ui,sans-serif;box-sizing:border-box}
 (() => {
   const [button, slider, label] = ["button", "input", "output"].map(tag => document.querySelector("#bar " + tag));
   let animator, playing = false, last = 0;
-  const go = time => {
+  const seek = time => {
     slider.value = time;
     label.value = Number(slider.value).toFixed(2) + " s";
     animator.seek(Number(slider.value));
+  };
+  // A page that frames this one is told the time, and may set it.
+  const framed = parent !== window;
+  const go = time => {
+    seek(time);
+    if (framed) parent.postMessage({playbackTime: Number(slider.value)}, "*");
   };
   const run = on => { playing = on; last = performance.now(); button.textContent = on ? "Pause" : "Play"; };
   const tick = now => {
@@ -72,6 +79,11 @@ font:14px/1 system-ui,sans-serif;box-sizing:border-box}
     slider.disabled = button.disabled = false;
     go(START);
     requestAnimationFrame(tick);
+    addEventListener("message", event => {
+      if (!framed || event.source !== parent) return;
+      run(false);
+      seek(event.data.playbackTime);
+    });
   };
   slider.addEventListener("input", () => { run(false); go(slider.value); });
   button.addEventListener("click", () => {

@@ -11,7 +11,7 @@ STYLE = """
 padding:0 .3rem;background:rgba(255,255,255,.88);color:#7a3f66;font-size:.75rem;line-height:1.3;font-weight:600;
 font-variant-numeric:tabular-nums}
 .cursor.left span{left:auto;right:3px}
-.cursor[hidden],.cursor span:empty{display:none}
+.cursor span:empty{display:none}
 .times{position:absolute;cursor:crosshair;border-radius:.2rem}
 .times:focus-visible{outline:2px solid #00588f;outline-offset:2px}
 @media print{.cursor,.times{display:none}}
