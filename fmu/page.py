@@ -14,9 +14,10 @@ from .equations import Variable
 if TYPE_CHECKING:
     from .description import About
 
-STYLE = """body{font:15px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem;color:#1c2530}
+STYLE = """:root{color-scheme:light dark}
+body{font:15px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem}
 table{border-collapse:collapse;width:100%;margin-bottom:1.5rem}th,td{text-align:left;padding:.25rem .6rem;border-bottom:
-1px solid #d8dee6;vertical-align:top}td.b{white-space:nowrap}td.n{text-align:right;font-variant-numeric:tabular-nums}
+1px solid #8888;vertical-align:top}td.b{white-space:nowrap}td.n{text-align:right;font-variant-numeric:tabular-nums}
 code{font-size:.95em}h1{font-size:1.5rem}h2{font-size:1.1rem;margin-top:2rem}"""
 
 _HEADINGS = {"input": "Inputs", "parameter": "Parameters", "output": "Outputs"}
@@ -32,7 +33,8 @@ def page(about: "About", variables: tuple[Variable, ...], version: int) -> str:
         "needs nothing but the C library": not about.needs_tool,
     }
     parts = [
-        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{escape(about.name)}</title>',
+        '<!doctype html><html lang="en"><meta charset="utf-8">',
+        f'<meta name="viewport" content="width=device-width, initial-scale=1"><title>{escape(about.name)}</title>',
         f"<style>{STYLE}</style>",
         f"<h1>{escape(about.name)}</h1><p>{escape(about.description)}</p>",
         f"<p>FMI {version}.0 co-simulation, any number of instances, any communication step. Made with snarelab "

@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..identification.diagnosis import Array
+from .time_axes import is_over_time, over_time, with_time_axes
 
 # Okabe & Ito (2008), Color universal design.
 MEASURED = "#000000"
@@ -58,10 +59,10 @@ def drawing() -> Iterator[None]:
 
 
 def svg(figure: Figure) -> bytes:
-    """The figure as SVG without a date, so that the same diagnosis draws the same picture."""
+    """The figure as SVG with its time axes named, without a date: the same diagnosis draws the same picture."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="svg", dpi=_DOTS_PER_INCH, metadata={"Date": None, "Creator": None})
-    return buffer.getvalue()
+    return with_time_axes(buffer.getvalue(), figure)
 
 
 def margins(figure: Figure, left: float, right: float, bottom: float, top: float) -> dict[str, float]:
@@ -71,8 +72,13 @@ def margins(figure: Figure, left: float, right: float, bottom: float, top: float
 
 
 def line(axes: Axes, time: Array, values: Array, colour: str, width: float = 0.8, label: str = "") -> None:
-    """A signal over time, thinned to what the eye can see, broken where samples are missing."""
+    """A signal over time, thinned to what the eye can see, broken where samples are missing.
+
+    Its axes run over time from then on, in no recording that has a name unless `over_time` says so.
+    """
     axes.plot(*thinned(time, values), color=colour, linewidth=width, label=label, solid_joinstyle="round")
+    if not is_over_time(axes):
+        over_time(axes)
 
 
 def thinned(time: Array, values: Array, columns: int = 700) -> tuple[Array, Array]:

@@ -4,6 +4,9 @@ import base64
 from collections.abc import Sequence
 from html import escape
 
+from . import time_cursor
+from .time_axes import time_axes
+
 STYLE = """
 :root{color-scheme:light dark;--paper:#fff;--ink:#1c2329;--quiet:#56616b;--line:#d5dbe0;--card:#f5f7f9;--accent:#00588f;
 --missing:#a34700;--adequate:#00664b;--unknown:#7a3f66}
@@ -53,19 +56,37 @@ margin-right:.6rem}
 .bar i{display:block;height:100%;background:#0072b2}
 figure{margin:1rem 0}
 .plate{background:#fff;border:1px solid var(--line);border-radius:.5rem;padding:.5rem;overflow-x:auto}
-.plate img{display:block;width:100%;height:auto;min-width:40rem}
+.plot{position:relative;min-width:40rem}
+.plot img{display:block;width:100%;height:auto}
 .plate.small{max-width:48rem}
 figcaption{margin-top:.35rem;max-width:50rem}
 details{margin:1rem 0}
 summary{cursor:pointer;color:var(--accent)}
+.on-paper{display:none}
 footer{margin:3rem auto 2rem;color:var(--quiet);font-size:.85rem}
 @media (max-width:40rem){.bar{display:none}th,td{padding-right:.7rem}
 .facts{grid-template-columns:1fr}.facts dd{margin-bottom:.4rem}}
 @media print{:root{--paper:#fff;--ink:#000;--quiet:#444;--line:#bbb;--card:#fff;--accent:#000}
-@page{margin:15mm}body{font-size:10.5pt}nav{display:none}.plate{border:0;padding:0}.plate img{min-width:0}
+@page{margin:15mm}body{font-size:10.5pt}nav,.on-screen{display:none}.on-paper{display:block}
+.plate{border:0;padding:0}.plot{min-width:0}
 figure,.card,tr{break-inside:avoid}h2,h3,summary{break-after:avoid}.scroll,.plate{overflow:visible}
 .status{-webkit-print-color-adjust:exact;print-color-adjust:exact}.bar,.bar i{print-color-adjust:exact}
 details::details-content{content-visibility:visible;block-size:auto}}
+"""
+
+# What scrolls sideways on a narrow window can be reached by key; not every browser sees to that by itself.
+_SCROLLING = """
+(() => {
+  const boxes = document.querySelectorAll(".scroll,.plate");
+  const see = () => {
+    for (const box of boxes) {
+      if (box.scrollWidth <= box.clientWidth) { box.removeAttribute("tabindex"); box.role = box.ariaLabel = null; }
+      else Object.assign(box, {tabIndex: 0, role: "group", ariaLabel: "scrolls sideways"});
+    }
+  };
+  const observer = new ResizeObserver(see);
+  boxes.forEach(box => observer.observe(box));
+})();
 """
 
 
@@ -77,13 +98,16 @@ def page(title: str, header: str, sections: Sequence[tuple[str, str, str]], foot
         f"{content}</section>"
         for key, heading, content in sections
     )
+    style, script = STYLE, _SCROLLING
+    if ' data-time-axes="' in body:
+        style, script = STYLE + time_cursor.STYLE, _SCROLLING + time_cursor.SCRIPT
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head><meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         '<link rel="icon" href="data:,">\n'
-        f"<title>{escape(title)}</title>\n<style>{STYLE}</style></head>\n<body>\n<header>{header}</header>\n"
+        f"<title>{escape(title)}</title>\n<style>{style}</style></head>\n<body>\n<header>{header}</header>\n"
         f'<nav aria-label="Sections">{links}</nav>\n<main>\n{body}\n</main>\n'
-        f"<footer>{escape(footer)}</footer>\n</body>\n</html>\n"
+        f"<footer>{escape(footer)}</footer>\n<script>{script}</script>\n</body>\n</html>\n"
     )
 
 
@@ -100,7 +124,7 @@ def table(
     def cells(row: Sequence[str], tag: str, scope: str) -> str:
         return "".join(
             f'<th scope="{scope}"{_class("n" if i in numeric else "")}>{cell}</th>'
-            if tag == "th" or i == 0
+            if (tag == "th" and cell) or i == 0
             else f"<td{_class('n' if i in numeric else '')}>{cell}</td>"
             for i, cell in enumerate(row)
         )
@@ -114,11 +138,12 @@ def table(
 
 
 def figure(svg: bytes, alternative: str, caption: str, small: bool = False) -> str:
-    """A picture on a white plate, so that it reads the same on light and dark paper."""
+    """A picture on a white plate, so that it reads the same on light and dark paper; plots over time share a cursor."""
     data = base64.b64encode(svg).decode("ascii")
     return (
         f'<figure><div class="plate{" small" if small else ""}">'
-        f'<img src="data:image/svg+xml;base64,{data}" alt="{escape(alternative)}"></div>'
+        f'<div class="plot"{time_axes(svg)}><img src="data:image/svg+xml;base64,{data}" alt="{escape(alternative)}">'
+        "</div></div>"
         f"<figcaption>{escape(caption)}</figcaption></figure>\n"
     )
 

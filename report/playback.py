@@ -1,7 +1,8 @@
 """3-D playback of a simulation in the browser, with a time slider: one HTML text that needs nothing else.
 
-Drake's Meshcat draws; its recording is saved as a page, and a bar with a button and a slider is put under it. Nothing
-is simulated here: poses and curves come in as arrays over time.
+Drake's Meshcat draws; its recording is saved as a page, and a bar with a button and a slider is put under it.
+It and a page that frames it tell each other the time, by messages ``{playbackTime}`` [s]. Nothing is simulated here:
+poses and curves come in as arrays over time.
 """
 
 import logging
@@ -28,6 +29,8 @@ _STRETCH = 0.01
 _BAR = """
 <style>
 #meshcat-pane{height:calc(100vh - 2.6rem)!important}
+#meshcat-pane:focus-visible{outline:3px solid #00588f;outline-offset:-3px}
+.dg{display:none!important} /* Meshcat's own controls: without labels, and with an animation of their own */
 #bar{height:2.6rem;display:flex;gap:.75rem;align-items:center;padding:0 .75rem;background:#fff;color:#1c2329;
 font:14px/1 system-ui,sans-serif;box-sizing:border-box}
 #bar button{width:4.5rem;height:1.8rem;font:inherit}
@@ -40,10 +43,16 @@ font:14px/1 system-ui,sans-serif;box-sizing:border-box}
 (() => {
   const [button, slider, label] = ["button", "input", "output"].map(tag => document.querySelector("#bar " + tag));
   let animator, playing = false, last = 0;
-  const go = time => {
+  const seek = time => {
     slider.value = time;
     label.value = Number(slider.value).toFixed(2) + " s";
     animator.seek(Number(slider.value));
+  };
+  // A page that frames this one is told the time, and may set it.
+  const framed = parent !== window;
+  const go = time => {
+    seek(time);
+    if (framed) parent.postMessage({playbackTime: Number(slider.value)}, "*");
   };
   const run = on => { playing = on; last = performance.now(); button.textContent = on ? "Pause" : "Play"; };
   const tick = now => {
@@ -62,9 +71,19 @@ font:14px/1 system-ui,sans-serif;box-sizing:border-box}
     animator.play();  // Without this its actions would not follow the slider.
     animator.pause();
     slider.max = animator.duration;
+    const view = document.getElementById("meshcat-pane");
+    Object.assign(view, {tabIndex: 0, role: "application"});
+    view.ariaLabel = "3-D view: arrow keys shift it, with Shift they turn it";
+    Object.assign(viewer.controls, {keyRotateSpeed: 8, keyPanSpeed: 20});
+    viewer.controls.listenToKeyEvents(view);
     slider.disabled = button.disabled = false;
     go(START);
     requestAnimationFrame(tick);
+    addEventListener("message", event => {
+      if (!framed || event.source !== parent) return;
+      run(false);
+      seek(event.data.playbackTime);
+    });
   };
   slider.addEventListener("input", () => { run(false); go(slider.value); });
   button.addEventListener("click", () => {
@@ -183,7 +202,7 @@ class Playback:
     def html(self, start: float = 0.0) -> str:
         """The whole page, which asks nothing of the network; it opens at the time ``start`` [s]."""
         self._meshcat.SetAnimation(self._animation)
-        page = self._meshcat.StaticHtml()
+        page = self._meshcat.StaticHtml().replace("<html>", '<html lang="en">', 1)
         before, end, after = page.rpartition("</body>")
         return before + _BAR.replace("START", repr(float(start))) + end + after
 

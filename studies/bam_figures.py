@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..report.drawing import AFTER, BEFORE, GREY, MEASURED, drawing, line, margins, svg
+from ..report.time_axes import over_time
 from .bam_naming import Tried, Values
 from .bam_servo import ServoRun, simulate
 
@@ -20,6 +21,7 @@ def positions(runs: Sequence[ServoRun], before: Values, after: Values) -> bytes:
             line(axes, run.time, run.position, MEASURED, 1.2, "measured")
             line(axes, run.time, simulate(run, before), BEFORE, 1.0, "Coulomb and viscous")
             line(axes, run.time, simulate(run, after), AFTER, 1.0, "with what was named")
+            over_time(axes, run.name)
             axes.set_title(run.trajectory.replace("_", " "))
         for axes in panels[2:]:
             axes.set_xlabel("time [s]")

@@ -10,6 +10,7 @@ from ..identification.links.pair import Pair
 from ..identification.links.search import library
 from ..models.model import Model
 from ..report.drawing import AFTER, BEFORE, GREY, drawing, line, margins, svg
+from ..report.time_axes import over_time
 
 Array = NDArray[np.float64]
 Left = tuple[Array, Array, Array]
@@ -71,6 +72,7 @@ def differences(axes: Sequence[str], before: Sequence[Left], after: Sequence[Lef
             strip.axhline(0, color=GREY, linewidth=0.6)
             line(strip, old[0], MDEG * old[2], BEFORE, 1.0, "as recorded")
             line(strip, new[0], MDEG * new[2], AFTER, 1.0, "with what was named")
+            over_time(strip, f"{axis}, run C")
             strip.set_title(f"link less motor position, {axis}, run C")
             strip.set_ylabel("difference [mdeg]")
         strips[-1].set_xlabel("time [s]")

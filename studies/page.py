@@ -2,8 +2,9 @@
 
 import base64
 import gzip
+import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from html import escape
 from pathlib import Path
 
@@ -17,7 +18,8 @@ _KINDS = {
     "reference": "Ours alone; there is no number to compare with.",
 }
 
-_PLAYBACK = """<figure><div class="plate"><iframe id="playback-frame" title="3-D playback"
+_PLAYBACK = """<p class="on-paper">The playback moves in the HTML file only: open it on a screen.</p>
+<figure class="on-screen"><div class="plate"><iframe id="playback-frame" title="3-D playback"
 style="display:block;width:100%;height:min(38rem,85vh);border:0"></iframe></div>
 <figcaption>CAPTION</figcaption></figure>
 <noscript><p>The playback needs JavaScript.</p></noscript>
@@ -30,6 +32,24 @@ new IntersectionObserver(async (entries, observer) => {
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
   document.getElementById("playback-frame").srcdoc = await new Response(stream).text();
 }).observe(document.getElementById("playback-frame"));
+(() => {
+  const frame = document.getElementById("playback-frame"), clock = CLOCK;
+  let ready = false, wanted = null;  // The playback speaks first; a time chosen before that waits.
+  const seek = () => frame.contentWindow.postMessage({playbackTime: (wanted - clock.start) / clock.rate}, "*");
+  document.addEventListener("timechosen", ({detail: {recording, time}}) => {
+    if (recording !== "") return;
+    wanted = time;
+    if (ready) seek();
+  });
+  addEventListener("message", ({source, data}) => {
+    if (source !== frame.contentWindow) return;
+    const time = clock.start + clock.rate * data.playbackTime;
+    if (ready || wanted === null)
+      document.dispatchEvent(new CustomEvent("timeplayed", {detail: {recording: "", time}}));
+    else seek();
+    ready = true;
+  });
+})();
 </script>
 """
 
@@ -52,6 +72,14 @@ class Section:
     pictures: Sequence[Picture] = ()
 
 
+@dataclass(frozen=True)
+class Clock:
+    """Time in the plots, of the axes that name no recording: ``start`` [s] plus ``rate`` times the playback's."""
+
+    start: float = 0.0
+    rate: float = 1.0
+
+
 def write_page(
     study: str,
     title: str,
@@ -60,6 +88,7 @@ def write_page(
     sections: Sequence[Section] = (),
     playback: str | None = None,
     caption: str = "Drag to turn, scroll to come closer, right button to shift.",
+    clock: Clock = Clock(),
 ) -> Path:
     """Write ``build/studies/<study>/report.html``, whole or not at all; returns its path.
 
@@ -80,6 +109,8 @@ def write_page(
         A page of its own, from `Playback.html`.
     caption : str
         What the playback shows.
+    clock : Clock
+        How the playback's time goes with that of the plots, whose cursor and it move each other.
     """
     parts = [("numbers", "The paper's numbers and ours", _numbers(quantities))]
     for number, section in enumerate(sections, start=1):
@@ -87,7 +118,7 @@ def write_page(
         content += "".join(figure(p.svg, p.alternative, p.caption) for p in section.pictures)
         parts.append((f"part{number}", section.heading, content))
     if playback is not None:
-        parts.append(("playback", "Playback in 3-D", _frame(playback, caption)))
+        parts.append(("playback", "Playback in 3-D", _frame(playback, caption, clock)))
     header = f'<p class="quiet">{escape(title)}</p>\n<h1>{escape(found)}</h1>\n'
     document = page(title, header, parts, f"Written by snarelab: make study-{study}.")
     folder = FOLDER / study
@@ -126,6 +157,7 @@ def _text(ours: float | str | list[str]) -> str:
     return ", ".join(ours) if isinstance(ours, list) else f"{ours:.4g}"
 
 
-def _frame(playback: str, caption: str) -> str:
+def _frame(playback: str, caption: str, clock: Clock) -> str:
     data = base64.b64encode(gzip.compress(playback.encode(), mtime=0)).decode("ascii")
-    return _PLAYBACK.replace("CAPTION", escape(caption)).replace("DATA", data)
+    page = _PLAYBACK.replace("CAPTION", escape(caption)).replace("CLOCK", json.dumps(asdict(clock)))
+    return page.replace("DATA", data)

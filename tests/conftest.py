@@ -53,3 +53,12 @@ def arm_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     write_arm_folder(tmp_path)
     monkeypatch.chdir(tmp_path)
     return tmp_path
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """A headless browser of one file of tests."""
+    from browser import started  # found by the paths above
+
+    with started() as running:
+        yield running

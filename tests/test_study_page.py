@@ -2,51 +2,19 @@
 
 import json
 import re
-import shutil
-import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
-from matplotlib.image import imread
-from pydrake.geometry import Cylinder, Sphere
+from browser import drawn, opened, pixels, playing
+from playwright.sync_api import Browser
+from pydrake.geometry import Sphere
+from study_pages import QUANTITIES, moving, picture
 
 from snarelab.errors import InputError
-from snarelab.report.drawing import AFTER, drawing, line, svg
 from snarelab.report.playback import Playback
-from snarelab.studies.outcome import Quantity, write_result
-from snarelab.studies.page import Picture, Section, write_page
-
-QUANTITIES = [
-    Quantity("first_contact", "s", 2.57, "calibrated", paper=2.6, low=2.55, high=2.61),
-    Quantity("final_radial_y", "m", 0.00797, "predicted", paper=0.01),
-    Quantity("named", "1", ["joint_elasticity at joint2", "<odd>"], "reference"),
-]
-TIMES = np.linspace(0, 4, 401)
-
-
-def picture() -> Picture:
-    with drawing():
-        figure = Figure(figsize=(6, 2))
-        line(figure.subplots(), TIMES, np.sin(TIMES), AFTER)
-        return Picture(svg(figure), "A sine over time", "The sine.")
-
-
-def moving() -> Playback:
-    """A blue chain that stretches to the left, and a red ball that crosses and is hidden after 2 s."""
-    scene = Playback(frames_per_second=10)
-    reach = np.linspace(0.05, 0.3, TIMES.size)
-    points = np.zeros((TIMES.size, 6, 3))
-    points[:, :, 1] = reach[:, None] * np.linspace(0, 1, 6)
-    scene.curve("chain", 0.01, TIMES, points, "#0000ff")
-    scene.body("ball", Sphere(0.04), "#ff0000")
-    scene.move("ball", TIMES, np.stack([0 * TIMES, 0.3 - 0.15 * TIMES, 0 * TIMES + 0.1], axis=-1))
-    scene.show("ball", TIMES, TIMES < 2)
-    scene.body("post", Cylinder(0.02, 0.2), "#00ff00")
-    scene.move("post", [0.0], [[0.0, 0.0, -0.1]], [[np.cos(np.pi / 4), np.sin(np.pi / 4), 0, 0]])  # lies along y
-    scene.camera([-0.6, 0, 0], [0, 0, 0])
-    return scene
+from snarelab.studies.outcome import write_result
+from snarelab.studies.page import Section, write_page
 
 
 def test_page_says_the_finding_first_and_explains_the_kinds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -97,39 +65,22 @@ def test_names_and_curves_are_checked() -> None:
         scene.curve("cable", 0.01, [0.0], np.zeros((1, 1, 3)), "#0000ff")
 
 
-BROWSER = shutil.which("chromium") or shutil.which("google-chrome") or shutil.which("chromium-browser")
-FLAGS = """--headless --no-sandbox --disable-gpu --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader
---disable-quic --no-first-run --disable-background-networking --disable-component-update --disable-sync
---hide-scrollbars --enable-logging=stderr --virtual-time-budget=8000"""
-
-
-def shot(page: Path, size: tuple[int, int], folder: Path) -> tuple[np.ndarray, str]:
-    """Pixels (height, width, 3) from 0 to 1, and what the browser's console said."""
-    target = folder / "shot.png"
-    command = [BROWSER or "", *FLAGS.split(), f"--user-data-dir={folder / 'profile'}", f"--screenshot={target}"]
-    command += [f"--window-size={size[0]},{size[1]}", page.resolve().as_uri()]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=True)
-    said = [s for s in done.stderr.splitlines() if "CONSOLE" in s and "GL Driver Message" not in s]
-    return imread(target)[..., :3], "\n".join(said)
-
-
-def extent(pixels: np.ndarray, channel: int) -> tuple[float, float]:
+def extent(shown: np.ndarray, channel: int) -> tuple[float, float]:
     """First and last column of the pixels of one pure colour, 0 (left) to 1; NaN where there is none."""
-    others = np.delete(pixels, channel, axis=2).max(axis=2)
-    columns = np.flatnonzero(np.any((pixels[..., channel] > 0.35) & (others < 0.25), axis=0)) / pixels.shape[1]
+    others = np.delete(shown, channel, axis=2).max(axis=2)
+    columns = np.flatnonzero(np.any((shown[..., channel] > 0.35) & (others < 0.25), axis=0)) / shown.shape[1]
     return (columns[0], columns[-1]) if columns.size else (np.nan, np.nan)
 
 
-@pytest.mark.skipif(BROWSER is None, reason="neither chromium nor google-chrome is installed")
-def test_playback_shows_each_time_in_a_browser(tmp_path: Path) -> None:
+def test_playback_shows_each_time_in_a_browser(browser: Browser, tmp_path: Path) -> None:
     scene = moving()
     seen = []
     for start in (1.0, 3.0):
-        page = tmp_path / f"{start}.html"
-        page.write_text(scene.html(start), encoding="utf-8")
-        pixels, said = shot(page, (600, 440), tmp_path)
-        assert said == ""
-        seen.append(pixels[:398, :, :])  # the bar below
+        path = tmp_path / f"{start}.html"
+        path.write_text(scene.html(start), encoding="utf-8")
+        with opened(browser, path, size=(600, 440)) as page:
+            drawn(page.main_frame)
+            seen.append(pixels(page)[:398])  # the bar below
     red, blue, green = (extent(seen[0], channel) for channel in (0, 2, 1))
     # Seen along x from behind, +y is to the left. The picture's height spans 75 degrees, at a distance of 0.6 m.
     scale = 398 / 600 / (2 * 0.6 * np.tan(np.radians(37.5)))
@@ -141,14 +92,20 @@ def test_playback_shows_each_time_in_a_browser(tmp_path: Path) -> None:
     assert extent(seen[1], 2)[0] == pytest.approx(0.5 - 0.2375 * scale, abs=0.01)
 
 
-@pytest.mark.skipif(BROWSER is None, reason="neither chromium nor google-chrome is installed")
-def test_page_unpacks_its_playback_in_a_browser(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_page_unpacks_its_playback_in_a_browser(
+    browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
     path = write_page("demo", "Test", "It moves.", QUANTITIES, [Section("One", (), [picture()])], moving().html(1.0))
     assert path.stat().st_size < 3e6
-    # The browser's virtual time does not wait for the unpacking: a busy timer makes it pass slowly.
-    busy = "<script>setInterval(() => { for (let i = 0; i < 2e6; i++); }, 20)</script></body>"
-    path.write_text(path.read_text(encoding="utf-8").replace("</body>", busy), encoding="utf-8")
-    pixels, said = shot(path, (1000, 1600), tmp_path)
-    assert said == ""
-    assert all(np.isfinite(extent(pixels[700:], channel)[0]) for channel in range(3))
+    with opened(browser, path, size=(1000, 1600)) as page:
+        playback = playing(page)
+        shown = pixels(page)
+        playback.locator("#meshcat-pane").focus()
+        for _ in range(5):
+            page.keyboard.press("ArrowRight")
+        drawn(playback)
+        shifted = pixels(page)
+    # The view goes right by 20 pixels a key, and what is in it goes left.
+    assert extent(shifted[700:], 0)[0] - extent(shown[700:], 0)[0] == pytest.approx(-0.1, abs=0.02)
+    assert all(np.isfinite(extent(shown[700:], channel)[0]) for channel in range(3))

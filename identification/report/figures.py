@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ...report.drawing import AFTER, BEFORE, GREY, MEASURED, SHADE, drawing, line, margins, svg
+from ...report.time_axes import over_time
 from ..diagnosis import Array, Candidate, Location, Step, Trace
 from .words import percent, unit_words, words
 
@@ -22,6 +23,7 @@ def residual_over_time(traces: Sequence[Trace], places: Sequence[Location]) -> b
         figure.subplots_adjust(**margins(figure, 0.75, 0.15, 0.5, 0.3), hspace=0.45)
         for axes, trace in zip(strips, traces, strict=True):
             line(axes, trace.time, trace.measured - trace.before, BEFORE)
+            over_time(axes, trace.recording)
             span = axes.get_xlim()
             windows = [window for place in places if place.channel == trace.channel for window in place.time_windows]
             for start, end in windows:
@@ -59,6 +61,8 @@ def before_and_after(trace: Trace, changed: bool) -> bytes:
                 line(lower, time, measured - before, BEFORE, wide)
             line(upper, time, after[part], AFTER, wide, "model after" if changed else "model")
             line(lower, time, measured - after[part], AFTER, wide)
+            for axes in (upper, lower):
+                over_time(axes, trace.recording)
             upper.tick_params(labelbottom=False)
             lower.set_xlabel("time [s]")
             lower.set_xlim(upper.get_xlim())

@@ -12,7 +12,7 @@ from .fit import notes, parameters, screened, shape, step_by_step, unseen
 
 
 def write_report(diagnosis: Diagnosis, path: str | Path) -> None:
-    """Write a diagnosis as one HTML file that needs nothing else: no script, and no request to anywhere.
+    """Write a diagnosis as one HTML file that needs nothing else, and asks nothing of the network.
 
     The file appears whole or not at all. Raises InputError where it cannot be written.
     """

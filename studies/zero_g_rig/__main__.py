@@ -21,7 +21,7 @@ from ...models.model_file import load_model
 from ...models.model_write import save_model
 from ...models.rig.rig import built_in_rig
 from ..outcome import FOLDER, Quantity, table, write_result
-from ..page import Section, write_page
+from ..page import Clock, Section, write_page
 from . import figures
 from .explain import alike_in_words, remedy, suspected_boom, tell_apart
 from .recordings import make_recordings, open_answer
@@ -69,6 +69,7 @@ def main() -> int:
         rig_scene(built_in_rig(), friction.train.time, friction.train.q).html(),
         f"The fitted recording, {FASTER:g} times as fast: arm, joints, slings and the carriages above them. Drag to "
         "turn, scroll to come closer, right button to shift.",
+        Clock(float(friction.train.time[0]), FASTER),
     )
     write_result(
         STUDY,

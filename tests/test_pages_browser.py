@@ -1,0 +1,98 @@
+"""Every kind of page in a browser: axe's findings, the keyboard, paper, no scripts; its console and the network."""
+
+from pathlib import Path
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from browser import opened, playing
+from diagnoses import VERDICTS
+from playwright.sync_api import Browser
+from study_pages import QUANTITIES, moving, picture
+
+from snarelab.fmu.description import About
+from snarelab.fmu.equations import Variable
+from snarelab.fmu.page import page as fmu_page
+from snarelab.identification.report.page import write_report
+from snarelab.studies.page import Section, write_page
+
+KINDS = [*VERDICTS, "study", "fmu"]
+AXE = {"resultTypes": ["violations"], "iframes": False}  # between frames of a file axe cannot talk: each by itself
+
+# Everything that can be used, and is to be seen; a frame counts by what is in it.
+CONTROLS = """() => [...document.querySelectorAll("a[href],button,input,select,summary,[tabindex='0']")]
+    .filter(x => x.checkVisibility({visibilityProperty: true}) && !x.disabled).map((x, i) => x.dataset.seen = `${i}`)"""
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    folder = tmp_path_factory.mktemp("pages")
+    for verdict, make in VERDICTS.items():
+        write_report(make(), folder / f"{verdict}.html")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        sections = [Section("Motion", ["What moves."], [picture()])]
+        study = write_page("demo", "Test", "It moves.", QUANTITIES, sections, moving().html(1.0)).resolve()
+    variables = (
+        Variable("torque", "input", "N*m", 0.0, "torque of the motor"),
+        Variable("stiffness", "parameter", "N*m/rad", 5400.0, "of the spring", 0.0),
+        Variable("speed", "output", "rad/s", 0.0, "of the link"),
+    )
+    about = About("elastic_joint", "joint", "A joint on a spring", "0", 0.001, 1.0, True, False, False, True, "joint.c")
+    (folder / "fmu.html").write_text(fmu_page(about, variables, 3), encoding="utf-8")
+    return {kind: folder / f"{kind}.html" for kind in KINDS} | {"study": study}
+
+
+@pytest.mark.parametrize(("scheme", "width"), [("light", 1200), ("dark", 1200), ("light", 400)])
+@pytest.mark.parametrize("kind", KINDS)
+def test_axe_finds_nothing_serious(browser: Browser, pages: dict[str, Path], kind: str, scheme, width: int) -> None:
+    with opened(browser, pages[kind], scheme, (width, 900)) as page:
+        page.evaluate("document.querySelectorAll('details').forEach(x => x.open = true)")
+        frames = [page.main_frame, playing(page)] if kind == "study" else [page.main_frame]
+        for frame in frames:
+            found = Axe().run(frame, options=AXE).response
+            assert len(found["violations"]) < 5
+            serious = [x for x in found["violations"] if x["impact"] in ("serious", "critical")]
+            assert [(x["id"], node["html"]) for x in serious for node in x["nodes"]] == []
+
+
+@pytest.mark.parametrize("width", [1200, 400])
+@pytest.mark.parametrize("kind", [*VERDICTS, "study"])
+def test_tab_reaches_every_control(browser: Browser, pages: dict[str, Path], kind: str, width: int) -> None:
+    with opened(browser, pages[kind], size=(width, 900)) as page:
+        frames = [page.main_frame, playing(page)] if kind == "study" else [page.main_frame]
+        wanted = [{*frame.evaluate(CONTROLS)} for frame in frames]
+        assert all(len(controls) >= 3 for controls in wanted)
+        reached = [set[str]() for _ in frames]
+        page.evaluate("window.scrollTo(0, 0)")
+        for _ in range(sum(map(len, wanted)) + 5):
+            page.keyboard.press("Tab")
+            for frame, seen in zip(frames, reached, strict=True):
+                seen.add(frame.evaluate("document.activeElement.dataset.seen"))
+        assert all(controls <= seen for controls, seen in zip(wanted, reached, strict=True))
+
+
+@pytest.mark.parametrize("kind", [*VERDICTS, "study"])
+def test_paper_hides_and_cuts_nothing(browser: Browser, pages: dict[str, Path], kind: str) -> None:
+    with opened(browser, pages[kind], "dark", (680, 1010)) as page:  # A4 less its margins, at 96 dots an inch
+        page.locator(".times").first.focus()
+        page.keyboard.press("End")
+        page.emulate_media(media="print")
+        assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
+        assert not page.locator(".cursor:visible,.times:visible,nav:visible,iframe:visible").count()
+        hidden = page.evaluate("""() => [...document.querySelectorAll("body *")]
+            .filter(x => !x.closest("nav,script,style,noscript,.on-screen,.cursor,.times,.bar"))
+            .filter(x => !x.getBoundingClientRect().height || !x.checkVisibility({contentVisibilityAuto: true}))
+            .map(x => x.outerHTML.slice(0, 80))""")
+        assert [element for element in hidden if not element.startswith(("<col", "<br"))] == []
+        cut = page.evaluate("""() => [...document.querySelectorAll(".scroll,.plate,body")]
+            .filter(x => x.checkVisibility() && x.scrollWidth > x.clientWidth + 1)
+            .map(x => x.outerHTML.slice(0, 80))""")
+        assert cut == []
+        assert page.locator(".on-paper:visible").count() == (kind == "study")
+
+
+def test_without_scripts_the_plots_are_plain(browser: Browser, pages: dict[str, Path]) -> None:
+    with opened(browser, pages["missing_physics"], scripts=False) as page:
+        assert page.locator("h1").inner_text() == VERDICTS["missing_physics"]().sentence
+        assert page.locator(".plot img:visible").count() > 5
+        assert page.locator(".cursor,.times,[tabindex]").count() == 0
