@@ -18,7 +18,7 @@ from ..models.snare.history import SnareHistory
 from ..models.snare.model import SnareModel
 from ..models.snare.parameters import WIDE_RING, SnareParameters
 from ..models.snare.target import Target
-from ..report.snare_scene import snare_scene
+from ..report.snare_scene import Seen, snare_scene
 from .ground_capture_figures import sections
 from .outcome import Quantity, table, write_result
 from .page import write_page
@@ -81,7 +81,7 @@ def main() -> int:
     _say(table(quantities))
     found = sentence(cases)
     base = cases[0]
-    scene = snare_scene(base.history, SnareParameters())
+    scene = snare_scene(Seen.of(base.history), SnareParameters())
     page = write_page(
         STUDY,
         "Suspended ground test of a snare (Li et al.)",

@@ -7,7 +7,6 @@ chosen by its error: a fifth of the processor time of equal steps, and the pin's
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import cast
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -24,7 +23,6 @@ from ..cosim.orbit_capture import (
 from ..cosim.orbit_capture import (
     Capture as Motion,
 )
-from ..models.snare.history import SnareHistory
 from ..models.snare.parameters import SnareParameters
 from .capture import Axis, Capture, Outcome, source_version
 from .enclosure import runs_through
@@ -133,28 +131,16 @@ def _encloses(done: Simulated) -> bool:
     return runs_through(cables[0], cables[-1], done.motion.relative[last], axis, done.snare)
 
 
-@dataclass(frozen=True)
-class _Seen:
-    """What a scene reads of a `SnareHistory`, in the end effector's frame; where cables touch is not known here."""
-
-    times: np.ndarray
-    target_position: np.ndarray
-    target_quaternion: np.ndarray
-    cables: np.ndarray
-    contact_points: tuple[np.ndarray, ...]
-
-
 def film(values: Mapping[str, float]) -> str:
     """A page that plays the capture, as seen from the end effector."""
-    from ..report.snare_scene import snare_scene
+    from ..report.snare_scene import Seen, snare_scene
 
     done = simulate(values)
     rows, cables = done.seen()
     tip, pin = done.motion.tip[rows, 3:], done.motion.pin[rows, 3:]
     turned = Rotation.from_matrix(tip.transpose(0, 2, 1) @ pin).as_quat(canonical=True)
-    none = tuple(np.zeros((0, 3)) for _ in rows)
-    seen = _Seen(done.motion.times[rows], done.motion.relative[rows], np.roll(turned, 1, axis=1), cables, none)
-    return snare_scene(cast(SnareHistory, seen), done.snare).html(start=done.motion.first_contact or 0.0)
+    seen = Seen(done.motion.times[rows], done.motion.relative[rows], np.roll(turned, 1, axis=1), cables)
+    return snare_scene(seen, done.snare).html(start=done.motion.first_contact or 0.0)
 
 
 SOURCES = (
