@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from .arm import Arm
 
@@ -38,7 +38,12 @@ def fourier_motion(
     q, qd, _ = raw(np.linspace(0.0, duration, 4000))
     travel, speed = (np.array([getattr(link, name) for link in arm.links]) for name in ("travel", "speed"))
     scale = share * np.minimum(travel / np.abs(q).max(axis=0), speed / np.abs(qd).max(axis=0))
-    return lambda time: tuple(scale * part for part in raw(np.asarray(time, float)))  # pyright: ignore[reportReturnType]
+
+    def scaled(time: ArrayLike) -> tuple[NDArray, NDArray, NDArray]:
+        q, qd, qdd = raw(np.asarray(time, float))
+        return scale * q, scale * qd, scale * qdd
+
+    return scaled
 
 
 def point_to_point_motion(

@@ -31,7 +31,7 @@ cases = 10
 def write(tmp_path: Path, monkeypatch):
     module = type(sys)("own_capture")
     axes = (Axis("radial_y", "m", "", 0.0, -0.5, 0.5), Axis("friction", "1", "", 0.1, 0.0, 1.0))
-    module.CAPTURE = Capture("own", axes, lambda values: Outcome(True, 0.0, 1.0, 1.0, 1.0))  # type: ignore[attr-defined]
+    vars(module)["CAPTURE"] = Capture("own", axes, lambda values: Outcome(True, 0.0, 1.0, 1.0, 1.0))
     monkeypatch.setitem(sys.modules, "own_capture", module)
 
     def save(text: str) -> Path:
