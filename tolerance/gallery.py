@@ -38,7 +38,7 @@ def typical_misses(study: Study, table: pd.DataFrame, count: int = 3) -> list[tu
     """
     kinds: dict[str, list[Case]] = {}
     for row in table.to_dict("records"):
-        kind = _kind(study, row)
+        kind = kind_of_miss(study, row)
         if kind:
             kinds.setdefault(kind, []).append(row)
     order = sorted(kinds, key=lambda kind: (-len(kinds[kind]), kind))
@@ -68,7 +68,7 @@ def play_misses(study: Study, results: Results) -> list[Miss]:
     return played
 
 
-def _kind(study: Study, case: Case) -> str:
+def kind_of_miss(study: Study, case: Case) -> str:
     """What went wrong; empty for a success, and for a case without a result, which cannot be played."""
     if case["margin"] > 0 or case["reason"]:
         return ""

@@ -9,6 +9,7 @@ import numpy as np
 
 from .. import __version__
 from ..report.html import figure, page, paragraph, table
+from .box import why_the_box_fails
 from .gallery import Miss, play_misses
 from .pictures import envelope_bars, probability_maps, sensitivity_bars, width_curve
 from .rays import ANGLES, RADIAL, STAGE, ends, envelope, shortest
@@ -145,6 +146,9 @@ def _page(
         sections.insert(0, ("envelope", "Envelope", drawn + numbers))
     if misses:
         sections.insert(-1, ("misses", "Typical misses", _gallery(misses)))
+    if study.box:
+        words = why_the_box_fails(study, results.table("box"))
+        sections.insert(1 if limits else 0, ("box", "The box", paragraph(words)))
     header = f"<h1>{content['sentence']}</h1>"
     return page(f"{study.name}: capture tolerance", header, sections, f"Written by snarelab {__version__}.")
 
