@@ -5,6 +5,7 @@ With ``--verbose`` each message is a line of Python's logging on standard error 
 
 import logging
 import re
+import shutil
 import signal
 import sys
 import threading
@@ -58,7 +59,8 @@ class Progress:
         if share is not None and share > self._first and now > self._since:
             left = f", {duration((1.0 - share) * (now - self._since) / (share - self._first))} left"
         line = f"[{duration(now - self._start)}{left}] {text}"
-        print(f"\r\x1b[2K{line[:110]}", end="", file=sys.stderr, flush=True)
+        columns = shutil.get_terminal_size().columns  # a longer line wraps, and its first half stays
+        print(f"\r\x1b[2K{line[: columns - 1]}", end="", file=sys.stderr, flush=True)
 
     def __exit__(self, *_: object) -> None:
         """Leave the line empty."""

@@ -12,6 +12,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..exit_status import status_of
+from ..progress import Progress
 from ..report.html import page, paragraph
 from ..report.html import table as markup_table
 from ..tolerance.report import summarise
@@ -48,7 +49,9 @@ def _run(folder: Path, study: Study) -> tuple[Results, dict[str, Any], float | N
     """Results, their summary, and the time by the clock a case took [s], where cases were run."""
     results = Results(folder / f"{study.name}-{study.capture.version}", study)
     known, begun = len(results), time.monotonic()
-    run_study(study, results, say=lambda text: print(f"  {study.name}: {text}", flush=True))
+    print(f"  {study.name}: {known} cases are there; captures run until the boundary is narrow ...", flush=True)
+    with Progress() as show:
+        run_study(study, results, say=lambda text: show(f"{study.name}: {text}"))
     new = len(results) - known
     seconds = (time.monotonic() - begun) / new if new else None
     return results, summarise(study, results), seconds

@@ -210,6 +210,16 @@ def test_time_left_is_extrapolated_from_the_share_done(monkeypatch):
     assert "[40 s] now at 0.5 s" in terminal.getvalue()
 
 
+def test_a_line_of_progress_does_not_wrap(monkeypatch):
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    monkeypatch.setenv("COLUMNS", "60")
+    with Progress() as show:
+        show("screening " + 40 * "every effect at every place ")
+    longest = max(len(line) for line in terminal.getvalue().split("\r\x1b[2K"))
+    assert longest == 59
+
+
 @pytest.mark.parametrize(("seconds", "text"), [(8.4, "8 s"), (125, "2 min 05 s"), (12_000, "3 h 20 min"), (-1, "0 s")])
 def test_durations(seconds, text):
     assert duration(seconds) == text
