@@ -1,4 +1,7 @@
-"""The one exception that means "the user can mend this"."""
+"""The one exception that means "the user can mend this", and what its messages are made with."""
+
+import difflib
+from collections.abc import Iterable
 
 _LONGEST = 4000
 
@@ -20,3 +23,10 @@ class InputError(ValueError):
     def __init__(self, message: object = "") -> None:
         """Make one line of the message."""
         super().__init__(one_line(message))
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """The known name that is spelled most like ``name``; ``""`` when nothing is known."""
+    by_spelling = {candidate.casefold(): candidate for candidate in known}
+    close = difflib.get_close_matches(name.casefold(), by_spelling, n=1, cutoff=0.0)
+    return by_spelling[close[0]] if close else ""

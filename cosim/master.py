@@ -12,8 +12,7 @@ from typing import Literal, Self
 
 import numpy as np
 
-from ..errors import InputError
-from ..recordings import nearest
+from ..errors import InputError, nearest
 from .compiled_loop import CompiledLoop, compiled_loop
 from .energy import BondEnergy
 from .feedthrough import FeedThrough

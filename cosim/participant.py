@@ -12,8 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..errors import InputError
-from ..recordings import nearest
+from ..errors import InputError, nearest
 
 Causality = Literal["input", "output", "parameter"]
 

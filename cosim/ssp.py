@@ -17,9 +17,8 @@ from typing import Any
 from urllib.parse import unquote
 from xml.etree import ElementTree
 
-from ..errors import InputError
+from ..errors import InputError, nearest
 from ..files import ZIP_FAULTS
-from ..recordings import nearest
 from .fmi_variables import pint_unit
 from .participant import Participant
 from .setup import Hosting, Setup

@@ -17,8 +17,7 @@ from fnmatch import fnmatchcase
 
 import numpy as np
 
-from ..errors import InputError
-from ..recordings import nearest
+from ..errors import InputError, nearest
 
 _SAFETY, _SLOWER, _FASTER = 0.9, 0.2, 2.0
 

@@ -6,8 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..errors import InputError
-from ..recordings import nearest
+from ..errors import InputError, nearest
 from .participant import Participant, Variable
 from .units import conversion
 

@@ -28,9 +28,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError
+from ..errors import InputError, nearest
 from ..files import toml_table
-from ..recordings import nearest
 from .iteration import Iteration
 from .participant import Participant
 from .setup import Hosting, Setup

@@ -158,8 +158,8 @@ def _finding(t: Taken, final: Fit, trials: Mapping[str, tuple[float, float]], ev
     channels = [every[c] for c in t.judged.channels]
     # How often a name with this margin was right, counting those that cannot be told from it: they share it as the
     # bootstrap was shared.
-    right = reliability(t.probability)
     whole = t.probability + sum(r.probability for r in t.rivals if not r.separable)
+    right = reliability(whole)
     rivals = tuple(
         Rival(
             r.placed.effect.name,
@@ -172,9 +172,7 @@ def _finding(t: Taken, final: Fit, trials: Mapping[str, tuple[float, float]], ev
         if r.probability >= 0.005 or not r.separable
     )
     sentence = evidence_sentence(placed, t.judged.explained, channels, with_it, without_it)
-    return Finding(
-        placed.effect.name, placed.at, t.probability, t.probability * right / whole, parameters, sentence, rivals
-    )
+    return Finding(placed.effect.name, placed.at, whole, t.probability * right / whole, parameters, sentence, rivals)
 
 
 def _fits(

@@ -35,8 +35,8 @@ class Rival:
 class Finding:
     """An effect that the model left out, in the field's words.
 
-    ``margin`` is how often it beat its rivals in a bootstrap over time blocks, ``probability`` how often a name with
-    that margin was right on simulated arms, shared with the rivals that the recordings cannot tell from it.
+    ``margin`` is how often it, or one that the recordings cannot tell from it, beat the others in a bootstrap over time
+    blocks; ``probability`` how often a name with that margin was right on simulated arms, shared among those.
     """
 
     name: str

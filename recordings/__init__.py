@@ -1,6 +1,5 @@
 """Recordings of tests: reading, units, conditioning."""
 
-from .columns import nearest
 from .find import find_recording
 from .read import read_recording
 from .signals import JointKind, Signal, default_unit
@@ -15,7 +14,6 @@ __all__ = [
     "Signal",
     "default_unit",
     "find_recording",
-    "nearest",
     "read_recording",
     "sampling",
     "write_recording",

@@ -4,16 +4,15 @@ Readers know their file format and nothing of signals or units; the rest of the 
 file formats.
 """
 
-import difflib
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, nearest
 
 LARGEST = 4 << 30
 """Most bytes of numbers that are read from a recording, and of a file that is read at once."""
@@ -23,13 +22,6 @@ MOST = 10_000
 
 _ELEMENT = re.compile(r"(?P<name>.+)\[(?P<index>\d+)\]")
 _HEADER = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\[\]]*)\]")
-
-
-def nearest(name: str, known: Iterable[str]) -> str:
-    """The known name that is spelled most like ``name``; ``""`` when nothing is known."""
-    by_spelling = {candidate.casefold(): candidate for candidate in known}
-    close = difflib.get_close_matches(name.casefold(), by_spelling, n=1, cutoff=0.0)
-    return by_spelling[close[0]] if close else ""
 
 
 def check_size(path: Path, size: int) -> None:

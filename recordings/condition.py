@@ -19,8 +19,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.signal import fftconvolve
 
-from ..errors import InputError
-from .columns import nearest
+from ..errors import InputError, nearest
 from .filters import derivative_kernels, low_pass, thin, thin_half, thinned_length
 
 Array = NDArray[np.float64]

@@ -17,8 +17,7 @@ from pathlib import Path
 
 import pooch
 
-from ..errors import InputError
-from .columns import nearest
+from ..errors import InputError, nearest
 
 #: Folder of the files at their publisher, one commit of it.
 PUBLISHER = (

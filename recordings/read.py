@@ -8,10 +8,10 @@ import numpy as np
 import pint
 import xarray as xr
 
-from ..errors import InputError
+from ..errors import InputError, nearest
 from ..files import bounded_memory
 from . import csv_table, hdf5, matlab, parquet, ros_bag
-from .columns import Columns, check_count, nearest, split_header
+from .columns import Columns, check_count, split_header
 from .signals import FORMS, JointKind, Signal, default_unit, is_signal, joint_of
 from .timebase import UNIFORM, sampling
 from .units import convert, fits, parse_unit

@@ -22,9 +22,9 @@ from rosbags.highlevel import AnyReader
 from rosbags.interfaces import Connection, Nodetype
 from rosbags.typesys import Stores, get_typestore
 
-from ..errors import InputError
+from ..errors import InputError, nearest
 from ..files import content
-from .columns import Columns, nearest
+from .columns import Columns
 
 _JOINT_STATE = "sensor_msgs/msg/JointState"
 _FAMILIES = {"q": "position", "qd": "velocity", "tau": "effort"}

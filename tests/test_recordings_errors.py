@@ -6,8 +6,8 @@ import pandas as pd
 import pytest
 import scipy.io
 
-from snarelab.errors import InputError
-from snarelab.recordings import Signal, nearest, read_recording
+from snarelab.errors import InputError, nearest
+from snarelab.recordings import Signal, read_recording
 
 
 def refused(path, *words, **arguments):

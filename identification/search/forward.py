@@ -34,6 +34,9 @@ ALIKE = 0.98
 TIE = 2.0
 """Difference of two scores that says nothing."""
 
+AS_GOOD = 0.1
+"""Difference of two scores in a bootstrap that is none: twins explain the same to the last digits."""
+
 AHEAD = 1.15
 """Ratio of scores up to which a special case is preferred to what contains it."""
 
@@ -52,11 +55,13 @@ class RivalOdds:
 
 @dataclass(frozen=True)
 class Taken:
-    """An effect that the search took, with how often it beat every rival in a bootstrap over time blocks."""
+    """An effect that the search took, with how often it beat every rival in a bootstrap over time blocks, and the
+    log-likelihood that it gained in blocks left out, together with what has become part of it."""
 
     judged: Judged
     probability: float
     rivals: tuple[RivalOdds, ...]
+    gained: float
 
 
 @dataclass(frozen=True)
@@ -129,10 +134,11 @@ def search(
         for new, wide in zip(weighed, chosen, strict=True):
             gone = {t.judged.placed.key for t in taken if _is_all(wide, t.judged)} | {wide.placed.key}
             # What has become part of something wider speaks for it; what explained more speaks louder.
-            strongest = max([new, *(t for t in taken if t.judged.placed.key in gone)], key=lambda t: t.judged.score)
+            together = [new, *(t for t in taken if t.judged.placed.key in gone)]
+            strongest = max(together, key=lambda t: t.judged.score)
             rivals = tuple(r for r in strongest.rivals if r.placed.key not in gone)
             taken = [t for t in taken if t.judged.placed.key not in gone]
-            taken.append(Taken(wide, strongest.probability, rivals))
+            taken.append(Taken(wide, strongest.probability, rivals, sum(t.gained for t in together)))
             model = replace(model, effects=tuple(p for p in model.effects if p.key not in gone))
         start = {key: value for j in chosen for key, value in j.start().items()}
         model = model.with_effects([j.placed for j in chosen], start)
@@ -194,7 +200,8 @@ def _as_measured(result: Screening, j: Judged) -> bool:
 def _untied(result: Screening, passing: list[Judged]) -> list[Judged]:
     """Twins, which explain the same in motion and as well, in the order of what they explain near rest, too.
 
-    That is weak evidence, since a joint that sticks may hold anything; it only orders what nothing else does.
+    That is weak evidence, since a joint that sticks may hold anything; it only orders what nothing else does. Where it
+    says nothing either, a faulty sensor comes first: it is the first to be ruled out on a rig.
     """
     for k in range(len(passing)):
         j = passing[k]
@@ -206,7 +213,9 @@ def _untied(result: Screening, passing: list[Judged]) -> list[Judged]:
             and result.evidence.likeness(j.signal(), o.signal()) > ALIKE
         ]
         if twins and not _near_rest(result, j):
-            best = max([j, *twins], key=lambda o: o.among(result.near_rest).score)
+            alike = {id(o): o.among(result.near_rest).score for o in (j, *twins)}
+            likely = [o for o in (j, *twins) if alike[id(o)] > max(alike.values()) - TIE]
+            best = max(likely, key=lambda o: (o.placed.effect.family == "measurement", alike[id(o)]))
             passing.remove(best)
             passing.insert(k, best)
     return passing
@@ -306,12 +315,13 @@ def _weigh(result: Screening, best: Judged, passing: Sequence[Judged], seed: int
     price = np.array([j.price for j in rivals])
     rng = np.random.default_rng(seed)
     counts = rng.multinomial(evidence.n_blocks, np.full(evidence.n_blocks, 1 / evidence.n_blocks), BOOTSTRAPS)
-    winners = np.argmax(counts @ gains.T - price, axis=1)
-    # Half a win more than seen for each: no bootstrap is evidence of certainty.
-    wins = (np.bincount(winners, minlength=len(rivals)) + 0.5) / (BOOTSTRAPS + 0.5 * len(rivals))
+    scores = counts @ gains.T - price
+    # Those as good as the best share a win; and half a win more than seen for each: no bootstrap makes certain.
+    winners = scores > scores.max(axis=1, keepdims=True) - AS_GOOD
+    wins = (np.sum(winners / winners.sum(axis=1, keepdims=True), axis=0) + 0.5) / (BOOTSTRAPS + 0.5 * len(rivals))
     others = [
         RivalOdds(j.placed, float(w), bool(w < 0.05 and evidence.likeness(best.signal(), j.signal()) < ALIKE))
         for j, w in zip(rivals[1:], wins[1:], strict=True)
     ]
     others.sort(key=lambda r: -r.probability)
-    return Taken(best, float(wins[0]), tuple(others[:4]))
+    return Taken(best, float(wins[0]), tuple(others[:4]), float(best.case.fresh_gains().sum()))

@@ -24,7 +24,10 @@ AHEAD = 1.3
 """... gains this much more than they did, in blocks that neither was fitted to, ..."""
 
 PLAIN = 0.5
-"""... and explains this share of the whole."""
+"""... and explains this share of the whole, ..."""
+
+MUCH = 0.1
+"""... of which they leave this share: what explains nearly all of it is its name."""
 
 
 def stand_ins(
@@ -50,9 +53,9 @@ def stand_ins(
 
     def better(c: int) -> bool:
         # Each name was judged on top of those before it, so that what they gain adds up.
-        gained = sum(t.judged.case.fresh_gains().sum() for t in confirmed if c in t.judged.channels)
-        x = curves.get(c)
-        return x is not None and x.share > PLAIN and 1.0 - x.share < LEFT * left[c] and x.gain > AHEAD * gained
+        gained = sum(t.gained for t in confirmed if c in t.judged.channels)
+        x = curves[c]
+        return left[c] > MUCH and x.share > PLAIN and 1.0 - x.share < LEFT * left[c] and x.gain > AHEAD * gained
 
     poor = {c for c in curves if better(c)}
     doubtful = tuple(t for t in confirmed if poor and _mainly(final, t.judged.placed, experiments) in poor)
