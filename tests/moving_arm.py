@@ -32,25 +32,15 @@ def motion(kinds, n=1200, segments=None, thinning=3, first=0):
         qd += amplitude * size * w * np.cos(angle)
         qdd -= amplitude * size * w**2 * np.sin(angle)
     tau = 30.0 * np.cos(t[:, None] + np.arange(len(kinds)))
-    temperature = np.full_like(q, 20.0)
-    band = 1 / (2 * thinning * PERIOD)
-    parts = segments or (slice(0, n),)
-    return Motion(
-        "run.csv",
-        JOINTS[: len(kinds)],
-        PERIOD,
-        band,
-        t,
-        q,
-        qd,
-        qdd,
-        tau,
-        temperature,
-        parts,
-        thinning,
-        (),
-        np.zeros((3, q.shape[1])),
-    )
+    return exact(JOINTS[: len(kinds)], PERIOD, thinning, (t, q, qd, qdd, tau), segments)
+
+
+def exact(joints, period, thinning, samples, segments=None):
+    """A motion without noise; ``samples``: time (n,), then position, speed, acceleration and torque (n, J)."""
+    t, q, qd, qdd, tau = samples
+    band, parts = 1 / (2 * thinning * period), segments or (slice(0, len(t)),)
+    cold, quiet = np.full_like(q, 20.0), np.zeros((3, q.shape[1]))
+    return Motion("run.csv", joints, period, band, t, q, qd, qdd, tau, cold, parts, thinning, (), quiet)
 
 
 def three_joints(folder):

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import scipy.optimize
+from moving_arm import exact
 
 from bench.arm import random_arm
 from snarelab.identification.fitting.assembly import Assembly
@@ -16,7 +17,6 @@ from snarelab.models.effects import get_effect
 from snarelab.models.model import Placed
 from snarelab.models.rigid_body import RigidBody
 from snarelab.models.urdf import load_urdf
-from snarelab.recordings.condition import Motion
 
 PERIOD, N, THINNING = 5e-3, 4000, 2
 JOINTS = ("joint1", "joint2")
@@ -42,24 +42,7 @@ def recording(body, friction, still=()):
     for joint in still:
         q[:, joint] = qd[:, joint] = qdd[:, joint] = 0.0
     tau = body.torque(q, qd, qdd) + friction(qd)
-    temperature = np.full_like(q, 20.0)
-    band = 1 / (2 * THINNING * PERIOD)
-    motion = Motion(
-        "run.csv",
-        JOINTS,
-        PERIOD,
-        band,
-        t,
-        q,
-        qd,
-        qdd,
-        tau,
-        temperature,
-        (slice(0, N),),
-        THINNING,
-        (),
-        np.zeros((3, q.shape[1])),
-    )
+    motion = exact(JOINTS, PERIOD, THINNING, (t, q, qd, qdd, tau))
     return Experiment(motion, body)
 
 

@@ -75,6 +75,17 @@ def test_what_only_stands_in_for_an_effect_without_a_name_is_not_named(number, c
     assert any(note.startswith(f"{mimic} at") for note in found.notes)
 
 
+def test_twins_share_their_probability_and_the_sensor_is_told_first(tmp_path):
+    """In motion a torque sensor's bias and friction that differs by direction explain the same to the last digits."""
+    _, found = diagnosed(8, tmp_path / "case", 90401)
+    bias = next(e for e in found.effects if e.at == "tau.joint4")
+    twin = next(r for r in bias.rivals if r.name == "asymmetric_friction")
+    assert bias.name == "sensor_bias"
+    assert not twin.separable
+    assert twin.probability == pytest.approx(bias.probability, rel=0.05)
+    assert bias.probability < 0.5 < bias.margin
+
+
 def test_a_block_that_dwarfs_the_others_is_no_reason_to_doubt_them():
     gains = np.array([62.3, 59.1, 29.6, 18.5, 51.7, 34.5, 55.6, 66.2, 1527.0, 26.9, 45.9, 71.1, 81.5])
     assert reliably_positive(gains)
