@@ -19,7 +19,7 @@ from .elements import ELEMENTS
 from .equations import Equations
 from .hosted import capture_class, participant_names, write_hosted, write_hosted_class
 from .inverse import inverse_equations
-from .placed_laws import identifier, missing_values
+from .placed_laws import identifier
 
 
 def export(what: str, version: int, out: str | Path, inverse: bool = False, stiff: bool | None = None) -> None:
@@ -69,9 +69,7 @@ def _export_capture(model: Model, tree: SnareTree, version: int, out: Path, inve
     """A capture's model file: Python beside the importer, as the snare needs it."""
     if inverse:
         raise InputError(f"{model.path}: --inverse follows the joints of an arm, and a capture has none; leave it out")
-    missing = missing_values(model)
-    if missing:
-        raise InputError(missing)
+    model.demand_values()
     setup = tree.setup.with_values(model.values)
     arguments = {
         "parameters": asdict(setup.parameters),

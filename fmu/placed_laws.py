@@ -1,11 +1,10 @@
 """Laws of a model's effects as expressions: parameters and hidden states go into the ledger, laws come out."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import casadi as ca
 import numpy as np
 
-from ..errors import InputError
 from ..models.effect import Parameter
 from ..models.floating.tree import n_carriers
 from ..models.hidden_state import reads
@@ -43,9 +42,7 @@ class PlacedLaws:
         self._scales: dict[int, ca.SX] = {}
         self._temperatures: dict[int, ca.SX] = {}
         speeds = [f"speed_scale.{self._name(p)}" for p in model.effects if "speed_scale" in reads(p.effect)]
-        missing = missing_values(model, speeds)
-        if missing:
-            raise InputError(missing)
+        model.demand_values(*speeds)
         for p in model.effects:
             self._parameters[p.key] = {x.name: self._parameter(p, x) for x in p.effect.parameters}
             j, read = self.joint_of(p), reads(p.effect)
@@ -135,18 +132,6 @@ class PlacedLaws:
             f"{x.meaning}: {p.effect.sentence}",
             (low, high),
         )
-
-
-def missing_values(model: Model, more: Sequence[str] = ()) -> str:
-    """What is wrong where the model file lacks a parameter of its effects, or one of ``more``; else empty."""
-    wanted = [f"{p.key}.{x.name}" for p in model.effects for x in p.effect.parameters] + list(more)
-    missing = [key for key in wanted if key not in model.values]
-    if not missing:
-        return ""
-    return (
-        f"{model.path}: no value for {missing[0]!r} ({len(missing)} missing); write it under [parameters], "
-        "or let 'snarelab identify --save-model' do it"
-    )
 
 
 def identifier(name: str) -> str:

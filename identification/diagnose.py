@@ -4,7 +4,7 @@
 once, on a recording that nothing before has looked at: an effect stays only if taking it out again makes it worse.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -17,6 +17,7 @@ from ..models.model import Model
 from ..models.rigid_body import RigidBody
 from ..models.snare.setup import SnareTree
 from .answer import report_on
+from .confirm import confirm
 from .diagnosis import Diagnosis, Step
 from .fitting.assembly import Assembly
 from .fitting.base_parameters import base_parameters
@@ -25,20 +26,12 @@ from .fitting.fit import Fit, channel_rms, fit
 from .identify import inertial_values, physical
 from .links.answer import with_links
 from .links.diagnose import diagnose_links
-from .search.forward import Found, Taken, carry, search, without
-from .search.rest import bridged, fitted
+from .search.forward import Found, Taken, carry, search
+from .search.rest import fitted
 from .search.stand_ins import stand_ins
-from .search.trial import MOST
 from .snare.diagnose import diagnose_captures
 
 Array = NDArray[np.float64]
-
-CONFIRM = 0.05
-"""An effect is confirmed if the held-out residual energy of its channels, in motion, rises by this share when it is
-taken out."""
-
-LEAST = 1e-6
-"""An effect that moves no more of the held-out residual's energy, all else as it is, adds nothing."""
 
 SECOND_CHOICES = 2
 """Searches for another explanation of what the held-out recording did not confirm."""
@@ -90,7 +83,7 @@ def diagnose(
     locked = load_experiments(model, [holdout], body, band)
     demand_torque([*train, *locked])
     base = base_parameters(body) if model.inertia == "free" else None
-    best = _attempt(search(model, base, scales(train), train, progress=progress, seed=seed), train, locked, progress)
+    best = confirm(search(model, base, scales(train), train, progress=progress, seed=seed), train, locked, progress)
     last, rejected = best, {t.judged.placed.key: t for t in best.rejected}
     for _ in range(SECOND_CHOICES):
         if not last.rejected:
@@ -99,7 +92,7 @@ def diagnose(
         again = search(
             model, base, scales(train), train, before=last.found, barred=rejected, progress=progress, seed=seed
         )
-        last = _attempt(again, train, locked, progress)
+        last = confirm(again, train, locked, progress)
         rejected |= {t.judged.placed.key: t for t in last.rejected}
         if np.sum(np.log(last.final.sigma)) < np.sum(np.log(best.final.sigma)):
             best = last
@@ -123,65 +116,6 @@ def diagnose(
     if links:
         diagnosis, after = with_links(diagnosis, after, links, compared)
     return Answer(diagnosis, after)
-
-
-@dataclass(frozen=True)
-class _Attempt:
-    """A search, what of it the held-out recording confirmed and did not, the trials, and the fit of what is left."""
-
-    found: Found
-    confirmed: tuple[Taken, ...]
-    rejected: tuple[Taken, ...]
-    trials: Mapping[str, tuple[float, float]]
-    final: Fit
-
-
-def _attempt(
-    found: Found, train: Sequence[Experiment], locked: Sequence[Experiment], progress: Callable[[str], None]
-) -> _Attempt:
-    """Take out the effect that the held-out recording misses least, all else fitted again, until it misses every one.
-
-    One at a time: of two that stand in for each other, one stays. Channels are weighted as the fit weights them.
-    """
-    progress("confirming on the held-out recording")
-    confirmed, rejected, trials, final = list(found.taken), [], {}, found.fit
-    while confirmed:
-        with_all, measured = channel_rms(final.assembly, locked, final.theta)
-        moving = [bridged(e) for e in locked]
-        with_all_moving, _ = channel_rms(final.assembly, moving, final.theta)
-        rises, fits = [], []
-        for t in confirmed:
-            c = list(t.judged.channels)
-            assembly = without(final, t.judged.placed)
-            fits.append(fit(assembly, fitted(assembly, train), start=carry(final, assembly), multi_start=False))
-            rms, _ = channel_rms(assembly, locked, fits[-1].theta)
-            rms_moving, _ = channel_rms(assembly, moving, fits[-1].theta)
-            # A joint at rest holds what it is given: there, only laws for what happens at rest can be missed.
-            effect = t.judged.placed.effect
-            pairs = [(with_all_moving, rms_moving, CONFIRM)]
-            if effect.at_rest or effect.exceeds_at_rest:
-                # What was named for leaving little near rest must still do so, now that the others are there.
-                pairs.append((with_all, rms, MOST / (1 - MOST) if effect.remembers else CONFIRM))
-            rise = max((_energy(b, c, final) / _energy(a, c, final) - 1) / bar for a, b, bar in pairs)
-            # Without an effect that adds nothing, a fit that ends elsewhere says nothing of it.
-            adds = channel_rms(assembly, locked, carry(final, assembly))[0]
-            rises.append(rise if _energy(adds - with_all, c, final) > LEAST * _energy(with_all, c, final) else 0.0)
-            worst = c[int(np.argmax(rms[c] / measured[c] - with_all[c] / measured[c]))]
-            trials[t.judged.placed.key] = (
-                float(with_all[worst] / measured[worst]),
-                float(rms[worst] / measured[worst]),
-            )
-        weakest = int(np.argmin(rises))
-        if rises[weakest] > 1:
-            break
-        rejected.append(confirmed.pop(weakest))
-        final = fits[weakest]
-    return _Attempt(found, tuple(confirmed), tuple(rejected), trials, final)
-
-
-def _energy(rms: Array, channels: Sequence[int], found: Fit) -> float:
-    """Of channels, weighted as the fit weights them."""
-    return float(np.sum((rms[channels] / found.sigma[channels]) ** 2))
 
 
 def _steps(

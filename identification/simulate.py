@@ -45,15 +45,8 @@ def simulate(model: Model, motion: str | Path | None) -> xr.Dataset:
     if motion is None:
         raise InputError(f"{model.path}: system = {model.system!r} follows a motion; give --motion RECORDING")
     read = [] if isinstance(tree, FloatingTree) else load_experiments(model, [motion], RigidBody(tree))
-    needed = [f"{p.key}.{x.name}" for p in model.effects for x in p.effect.parameters]
-    if model.inertia == "free":
-        needed = [f"inertia.{link.name}.{name}" for link in model.tree.links for name in INERTIAL] + needed
-    missing = [key for key in needed if key not in model.values]
-    if missing:
-        raise InputError(
-            f"{model.path}: no value for {missing[0]!r} ({len(missing)} missing); "
-            f"write it under [parameters], or let 'snarelab identify --save-model' do it"
-        )
+    inertial = [f"inertia.{link.name}.{name}" for link in model.tree.links for name in INERTIAL]
+    model.demand_values(*(inertial if model.inertia == "free" else ()))
     if isinstance(tree, FloatingTree):
         return simulate_floating(model, tree, motion)
     (experiment,) = read

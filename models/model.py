@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from ..errors import InputError
 from ..recordings.signals import Signal
 from .effect import Effect
 from .floating.tree import n_carriers
@@ -77,6 +78,16 @@ class Model:
     def with_effects(self, added: Sequence[Placed], values: Mapping[str, float]) -> "Model":
         """The model with more effects, and with parameters that a fit found."""
         return replace(self, effects=(*self.effects, *added), values={**self.values, **values})
+
+    def demand_values(self, *more: str) -> None:
+        """Raise InputError where a parameter of the effects, or one of ``more``, has no value."""
+        wanted = [*more, *(f"{p.key}.{x.name}" for p in self.effects for x in p.effect.parameters)]
+        missing = [key for key in wanted if key not in self.values]
+        if missing:
+            raise InputError(
+                f"{self.path}: no value for {missing[0]!r} ({len(missing)} missing); write it under [parameters], "
+                "or let 'snarelab identify --save-model' do it"
+            )
 
 
 def places(effect: Effect, tree: Tree) -> tuple[str, ...]:

@@ -7,15 +7,21 @@ from axe_playwright_python.sync_playwright import Axe
 from browser import opened, playing
 from diagnoses import VERDICTS
 from playwright.sync_api import Browser
+from proof_answers import several
 from study_pages import QUANTITIES, moving, picture
+from tolerance_toy import toy_results, toy_study
 
+from proof.page import write_page as write_proof
+from proof.score import score
+from proof.seal import Seal
 from snarelab.fmu.description import About
 from snarelab.fmu.equations import Variable
 from snarelab.fmu.page import page as fmu_page
 from snarelab.identification.report.page import write_report
 from snarelab.studies.page import Section, write_page
+from snarelab.tolerance.report import summarise
 
-KINDS = [*VERDICTS, "study", "fmu"]
+KINDS = [*VERDICTS, "study", "fmu", "tolerance", "proof"]
 AXE = {"resultTypes": ["violations"], "iframes": False}  # between frames of a file axe cannot talk: each by itself
 
 # Everything that can be used, and is to be seen; a frame counts by what is in it.
@@ -39,7 +45,14 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     )
     about = About("elastic_joint", "joint", "A joint on a spring", "0", 0.001, 1.0, True, False, False, True, "joint.c")
     (folder / "fmu.html").write_text(fmu_page(about, variables, 3), encoding="utf-8")
-    return {kind: folder / f"{kind}.html" for kind in KINDS} | {"study": study}
+    captures = toy_results(folder / "captures", toy_study(folder))
+    summarise(toy_study(folder), captures)
+    answers, found = several()
+    scores = {name: score(answers, found) for name in ("snarelab", "joint_bic")}
+    seal, content = Seal.make(answers, [1] * 12, [], 90500), {"seconds_a_diagnosis": 5.0}
+    write_proof(folder / "proof.html", answers, scores, seal, content, found)
+    others = {"study": study, "tolerance": captures.folder / "report.html"}
+    return {kind: folder / f"{kind}.html" for kind in KINDS} | others
 
 
 @pytest.mark.parametrize(("scheme", "width"), [("light", 1200), ("dark", 1200), ("light", 400)])

@@ -3,34 +3,13 @@
 from dataclasses import replace
 
 import pytest
+from proof_answers import RIGHT, answer, diagnosis, finding, several
 
-from proof.cases import BANDS, Answer, Truth
+from proof.cases import Truth
 from proof.judge import judge
 from proof.misses import explained
 from proof.score import score
 from proof.statistics import calibration_error, clopper_pearson
-
-
-def answer(group="single", name="harness_stiffness", at="joint2", size=2.0, also=()) -> Answer:
-    truths = () if group in ("clean", "outside", "wrong") else (Truth(name, at, also),)
-    kinds = () if group == "clean" else (name,)
-    lowest = {f"tau.joint{k}": (0.5,) * len(BANDS) for k in (1, 2)}
-    return Answer(0, group, kinds, size, truths, (1.0,), 0.3, 0.1, 2, ("tau.joint2",) if kinds else (), lowest)
-
-
-def finding(name, at, probability=0.9, rivals=()):
-    listed = [{"name": n, "at": a, "probability": p, "separable": s} for n, a, p, s in rivals]
-    return {"name": name, "at": at, "probability": probability, "rivals": listed}
-
-
-def diagnosis(*effects, verdict="", before=1.0, after=0.55):
-    fit = {"tau.joint1": {"holdout": {"rms_before": 0.6, "rms_after": 0.6}}}
-    fit["tau.joint2"] = {"holdout": {"rms_before": before, "rms_after": after}}
-    verdict = verdict or ("missing_physics" if effects else "adequate")
-    return {"verdict": verdict, "effects": list(effects), "fit": fit, "band": {"value": 30.0}, "candidates": []}
-
-
-RIGHT = finding("harness_stiffness", "joint2")
 
 
 @pytest.mark.parametrize(
@@ -83,23 +62,7 @@ def test_closure_is_over_the_floor_where_the_effect_shows():
 
 
 def test_figures_by_hand():
-    given = [
-        *[answer("clean", size=0.0)] * 4,
-        *[answer("outside", "damaged tooth")] * 2,
-        *[answer("wrong", "link too light")] * 2,
-        *[answer(size=s) for s in (0.5, 1.0, 2.0, 4.0)],
-    ]
-    found = [
-        *[diagnosis()] * 3,
-        diagnosis(finding("torque_ripple", "joint1", 0.25)),
-        diagnosis(verdict="unknown_effect"),
-        diagnosis(RIGHT),
-        diagnosis(finding("inertia_error", "link1", 0.9)),
-        diagnosis(finding("viscous_friction", "joint1", 0.9)),
-        diagnosis(),
-        *[diagnosis(RIGHT)] * 3,
-    ]
-    figures = score(given, found).figures
+    figures = score(*several()).figures
     expected = {
         "false_alarms": 0.25,
         "unknown_recall": 0.5,

@@ -3,46 +3,22 @@
 from dataclasses import replace
 from functools import partial
 
-import numpy as np
 import pytest
+from tolerance_toy import FILMED, toy_results, toy_study
 
 from snarelab.tolerance import ground, report
-from snarelab.tolerance.capture import Axis, Capture, Outcome
 from snarelab.tolerance.gallery import play_misses, typical_misses
-from snarelab.tolerance.results import Results
-from snarelab.tolerance.study import Study, Success
 from snarelab.tolerance.summary import sensitivities
-
-FILMED = []
-
-
-def outcome(y: float, z: float) -> Outcome:
-    """Off the axis beyond 30 mm, escaped beyond 70 mm, never touched beyond 90 mm; it diverges beyond z = 80 mm."""
-    if z > 0.08:
-        return Outcome.failed("the step diverged")
-    return Outcome(y < 0.07, y / 3, np.nan if y > 0.09 else 2.6, 5.0, 100.0)
-
-
-def film(values) -> str:
-    FILMED.append(values["radial_y"])
-    return f"<p>{values['radial_y']}</p>"
 
 
 @pytest.fixture
 def study(tmp_path):
-    axes = tuple(Axis(n, "m", n, 0.0, -1.0, 1.0) for n in ("radial_y", "radial_z"))
-    capture = Capture("toy", axes, lambda values: outcome(**values), film=film)
-    ranges = {"radial_y": (0.0, 0.1), "radial_z": (-0.1, 0.1)}
-    return Study(tmp_path, "toy", capture, 1, "sobol", 8, 64, 0.05, ranges, {}, Success(0.010, 8e3), {}, 1)
+    return toy_study(tmp_path)
 
 
 @pytest.fixture
 def results(study, tmp_path):
-    results = Results(tmp_path / "out", study)
-    for number, point in enumerate(np.random.default_rng(3).random((40, 2))):
-        values = study.values(study.scaled(point[None])[0])
-        results.add("space", number, values, outcome(values["radial_y"], values["radial_z"]))
-    return results
+    return toy_results(tmp_path / "out", study)
 
 
 def test_one_of_each_kind_from_its_middle(study, results):

@@ -47,6 +47,8 @@ static void advanced(Instance *i, double *state) {
   else memcpy(state, m->state, sizeof m->state);
 }
 
+static const double *state_now(Instance *i, double *room) { return advanced(i, room), room; }
+
 static Status backend_step(Instance *i, double size) {
   double state[N_STATES + 1];
   (void)size;
@@ -59,7 +61,7 @@ static Status backend_step(Instance *i, double size) {
   return STATUS_OK;
 }
 #else
-static const double *advanced_state(Instance *i) { return i->now.memory.state; }
+static const double *state_now(Instance *i, double *room) { return (void)room, i->now.memory.state; }
 
 /* x' at a time since the step began; the inputs move along their slopes. */
 static void rate(Instance *i, double since, const double *state, double *result) {
@@ -105,24 +107,16 @@ static Status backend_step(Instance *i, double size) {
 #endif
 
 static Status backend_outputs(Instance *i) {
-#if FOLLOWS
-  double state[N_STATES + 1];
-  advanced(i, state);
-#else
-  const double *state = advanced_state(i);
-#endif
+  double room[N_STATES + 1];
+  const double *state = state_now(i, room);
   const double elapsed = i->now.time - i->now.start, *arguments[] = {&elapsed, state, i->now.input, i->now.parameter};
   evaluate(i, model_output, arguments, i->output);
   return STATUS_OK;
 }
 
 static Status backend_derivative(Instance *i, const double *by_input, const double *by_parameter, double *output) {
-#if FOLLOWS
-  double state[N_STATES + 1];
-  advanced(i, state);
-#else
-  const double *state = advanced_state(i);
-#endif
+  double room[N_STATES + 1];
+  const double *state = state_now(i, room);
   const double elapsed = i->now.time - i->now.start;
   const double *arguments[] = {&elapsed, state, i->now.input, i->now.parameter, by_input, by_parameter};
   evaluate(i, model_derivative, arguments, output);

@@ -41,12 +41,7 @@ def simulate_capture(model: Model, motion: str | Path | None = None) -> xr.Datas
     from ...models.snare.model import SnareModel, SnareStepError
 
     assert isinstance(model.tree, SnareTree)
-    missing = [key_of(p) for p in model.effects if key_of(p) not in model.values]
-    if missing:
-        raise InputError(
-            f"{model.path}: no value for {missing[0]!r} ({len(missing)} missing); "
-            f"write it under [parameters], or let 'snarelab identify --save-model' do it"
-        )
+    model.demand_values()
     setup, drive, duration, zero, body, sensor = model.tree.setup, None, DURATION, 0.0, "target", "ring"
     if motion is not None:
         (given,) = load_captures(model, [motion])
