@@ -18,6 +18,7 @@ from dataclasses import replace
 from pathlib import Path
 
 os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+sys.path.append(str(Path(__file__).resolve().parents[1]))
 
 import mujoco
 import numpy as np

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+sys.path.append(str(Path(__file__).resolve().parents[1]))
 
 import numpy as np
 import pinocchio as pin
