@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from . import __version__
+from .arguments import positive
 from .cosim.command import add_parser as add_cosim
 from .errors import InputError, one_line
 from .exit_status import status_of
@@ -23,6 +24,8 @@ from .files import written_whole
 from .fmu.command import add_parser as add_export
 from .progress import Progress, start_logging
 from .tolerance.command import add_parser as add_tolerance
+
+JOBS = "processes in which captures are simulated (default: one a core, at most 4); other systems refuse it"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -72,6 +75,7 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("--holdout", metavar="RECORDING", help="recording on which the fit is only evaluated")
     p.add_argument("--json", metavar="OUT.json", help="where to write the result; - for standard output")
     p.add_argument("--save-model", metavar="NEW.toml", help="where to write the model with its values")
+    p.add_argument("--jobs", type=positive, metavar="N", help=JOBS)
     p.set_defaults(run=_identify)
 
     p = commands.add_parser("diagnose", help="find, name and add the physics that a model leaves out")
@@ -84,6 +88,7 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument(
         "--next-experiment", metavar="MOTION", help="where to write the motion that best parts the rivals left"
     )
+    p.add_argument("--jobs", type=positive, metavar="N", help=JOBS)
     p.set_defaults(run=_diagnose)
 
     p = commands.add_parser("simulate", help="what a model would read along a recorded motion")
@@ -110,7 +115,8 @@ def _identify(given: argparse.Namespace) -> None:
     _writable([given.json, given.save_model], [*given.recordings, given.holdout])
     model = load_model(given.model)
     with Progress() as progress:
-        found = identify(model, given.recordings, [given.holdout] if given.holdout else (), progress=progress)
+        held = [given.holdout] if given.holdout else ()
+        found = identify(model, given.recordings, held, progress=progress, jobs=given.jobs)
     result = found.to_json()
     if given.save_model:
         save_model(found.model, given.save_model, f"{model.name}: values from snarelab identify {__version__}")
@@ -137,7 +143,7 @@ def _diagnose(given: argparse.Namespace) -> None:
             "the result says for each rival what would part it"
         )
     with Progress() as progress:
-        answer = diagnose(model, given.recordings, given.holdout, progress=progress)
+        answer = diagnose(model, given.recordings, given.holdout, progress=progress, jobs=given.jobs)
         if given.next_experiment:
             planned = next_experiment(answer.model, answer.diagnosis, given.recordings, progress=progress)
     found = answer.diagnosis

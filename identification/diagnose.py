@@ -23,7 +23,7 @@ from .fitting.assembly import Assembly
 from .fitting.base_parameters import base_parameters
 from .fitting.experiment import Experiment, demand_apart, demand_torque, load_experiments, scales
 from .fitting.fit import Fit, channel_rms, fit
-from .identify import inertial_values, physical
+from .identify import demand_one_process, inertial_values, physical
 from .links.answer import with_links
 from .links.diagnose import diagnose_links
 from .search.forward import Found, Taken, carry, search
@@ -52,6 +52,7 @@ def diagnose(
     *,
     progress: Callable[[str], None] = lambda _: None,
     seed: int = 0,
+    jobs: int | None = None,
 ) -> Answer:
     """Find, name, add and confirm the physics that a model leaves out.
 
@@ -66,15 +67,18 @@ def diagnose(
         Told in a few words what is under way.
     seed : int
         Of bootstraps and nulls.
+    jobs : int or None
+        Processes in which captures are simulated; None: one a core, at most four. For captures only.
 
     Raises
     ------
     InputError
-        Whatever is wrong with the recordings, or a holdout that is one of them.
+        Whatever is wrong with the recordings, a holdout that is one of them, or ``jobs`` for another system.
     """
     demand_apart(recordings, holdout)
     if isinstance(model.tree, SnareTree):
-        return Answer(*diagnose_captures(model, recordings, holdout, progress=progress, seed=seed))
+        return Answer(*diagnose_captures(model, recordings, holdout, progress=progress, seed=seed, jobs=jobs))
+    demand_one_process(model, jobs)
     progress("reading and conditioning the recordings")
     prepare(effects().values())
     body = RigidBody(model.tree)

@@ -35,6 +35,7 @@ def diagnose(
     holdout: RecordingLike,
     progress: Callable[[str], None] = lambda _: None,
     seed: int = 0,
+    jobs: int | None = None,
 ) -> DiagnosisResult:
     """Find, name and add the physics that a model leaves out; confirm it on a recording that the fit never sees.
 
@@ -50,6 +51,8 @@ def diagnose(
         Told in a few words what is under way, for example ``print``.
     seed : int
         Of bootstraps and nulls.
+    jobs : int, optional
+        Processes in which captures are simulated, by default one a core, at most four; other systems refuse it.
 
     Returns
     -------
@@ -82,7 +85,7 @@ def diagnose(
     """
     given = _model(model)
     with _as_files([*_several(recordings), holdout]) as paths:
-        answer = diagnosing.diagnose(given, paths[:-1], paths[-1], progress=progress, seed=seed)
+        answer = diagnosing.diagnose(given, paths[:-1], paths[-1], progress=progress, seed=seed, jobs=jobs)
     return DiagnosisResult(answer.diagnosis, answer.model)
 
 
@@ -93,6 +96,7 @@ def identify(
     holdout: RecordingLike | Sequence[RecordingLike] = (),
     progress: Callable[[str], None] = lambda _: None,
     seed: int = 0,
+    jobs: int | None = None,
 ) -> IdentificationResult:
     """Fit every parameter of a model to all recordings jointly.
 
@@ -108,6 +112,8 @@ def identify(
         Told in a few words what is under way.
     seed : int
         Of the random starts.
+    jobs : int, optional
+        Processes in which captures are simulated, by default one a core, at most four; other systems refuse it.
 
     Returns
     -------
@@ -133,7 +139,8 @@ def identify(
     given = _model(model)
     train, locked = _several(recordings), _several(holdout)
     with _as_files([*train, *locked]) as paths:
-        found = identifying.identify(given, paths[: len(train)], paths[len(train) :], progress=progress, seed=seed)
+        fitted, held = paths[: len(train)], paths[len(train) :]
+        found = identifying.identify(given, fitted, held, progress=progress, seed=seed, jobs=jobs)
         published = found.to_json()
     names = ParameterEstimate.__dataclass_fields__
     parameters = tuple(ParameterEstimate(**{name: p[name] for name in names}) for p in published["parameters"])

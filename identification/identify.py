@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import InputError
 from ..models.floating.tree import channel
 from ..models.inertia import Array
 from ..models.model import Model
@@ -106,6 +107,7 @@ def identify(
     *,
     progress: Callable[[str], None] = lambda _: None,
     seed: int = 0,
+    jobs: int | None = None,
 ) -> Identified | IdentifiedCaptures:
     """Fit all parameters of a model to all recordings jointly.
 
@@ -119,16 +121,20 @@ def identify(
         Told in a few words what is under way.
     seed : int
         Of the random starts.
+    jobs : int or None
+        Processes in which captures are simulated; None: one a core, at most four. For captures only.
 
     Raises
     ------
     InputError
-        Whatever is wrong with a recording, or effects that the identified inertia already holds.
+        Whatever is wrong with a recording, effects that the identified inertia already holds, or ``jobs`` for another
+        system.
     """
     for recording in holdout:
         demand_apart(recordings, recording)
     if isinstance(model.tree, SnareTree):
-        return identify_captures(model, recordings, holdout, progress=progress)
+        return identify_captures(model, recordings, holdout, progress=progress, jobs=jobs)
+    demand_one_process(model, jobs)
     progress("reading and conditioning the recordings")
     body = RigidBody(model.tree)
     train = load_experiments(model, recordings, body)
@@ -141,6 +147,15 @@ def identify(
     found, inertia = physical(found, train)
     values = {**model.values, **assembly.values(found.theta), **inertial_values(model, inertia)}
     return Identified(replace(model, values=values), found, tuple(train), tuple(locked), base, inertia)
+
+
+def demand_one_process(model: Model, jobs: int | None) -> None:
+    """Raise InputError where a number of processes is asked for and nothing is simulated in them."""
+    if jobs is not None:
+        raise InputError(
+            f"{model.path}: jobs = {jobs}; only captures are simulated in several processes, and system = "
+            f"{model.system!r} is computed in one; leave it out"
+        )
 
 
 def physical(found: Fit, experiments: Sequence[Experiment]) -> tuple[Fit, ConsistentInertia | None]:

@@ -101,6 +101,12 @@ def test_a_holdout_that_is_fitted_too_is_refused(call):
         call(BUNDLED / "arm3.toml", frame, holdout=frame)
 
 
+@pytest.mark.parametrize("call", [snarelab.diagnose, snarelab.identify])
+def test_processes_are_for_captures(call):
+    with pytest.raises(snarelab.InputError, match=r"arm3.toml: jobs = 2; only captures .* leave it out"):
+        call(BUNDLED / "arm3.toml", BUNDLED / "train.csv", holdout=BUNDLED / "holdout.csv", jobs=2)
+
+
 def test_a_mistake_names_the_table_and_not_where_it_was_put():
     frame = pd.read_csv(BUNDLED / "train.csv").rename(columns={"q.joint2": "q.joint22"})
     with pytest.raises(snarelab.InputError, match=r"^recording1.parquet.*q\.joint2") as caught:

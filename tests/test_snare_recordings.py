@@ -172,6 +172,11 @@ def test_captures_are_told_by_forces_on_the_same_bodies(tmp_path):
         identify_captures(model, [train, held, other], jobs=1)
 
 
+def test_no_processes_are_none_to_simulate_in(tmp_path):
+    with pytest.raises(InputError, match="jobs = 0; allowed is a whole number from 1"):
+        identify_captures(load_model(written(tmp_path, PLAIN)), [swinging(tmp_path, "train.csv")], jobs=0)
+
+
 def test_simulate_writes_a_recording_that_is_read_back(tmp_path, capsys):
     text = PLAIN + 'effects = ["contact_friction"]\n'
     model = written(tmp_path, text)
@@ -215,13 +220,12 @@ def test_an_umbilical_on_a_pendulum_is_named_and_told_by_its_stiffness(tmp_path)
     assert np.sqrt(np.mean((along["pos.target.z"].values - known) ** 2)) < 1e-3
 
 
-def test_a_pendulum_alone_is_told_well_and_what_would_have_shown(tmp_path, monkeypatch):
+def test_a_pendulum_alone_is_told_well_and_what_would_have_shown(tmp_path):
     model = written(tmp_path, PLAIN + '[capture]\ntarget = "pendulum"\nline_length = 2.0\n')
     train, held = swinging(tmp_path, "train.csv", seed=3), swinging(tmp_path, "held.csv", direction=1.2, seed=4)
     out, page = tmp_path / "out.json", tmp_path / "out.html"
-    monkeypatch.setenv("SNARELAB_JOBS", "1")
     asked = ["diagnose", str(model), str(train), "--holdout", str(held), "--json", str(out), "--report", str(page)]
-    assert main(asked) == 0
+    assert main([*asked, "--jobs", "1"]) == 0
     answer = json.loads(out.read_text())
     assert answer["verdict"] == "adequate"
     assert answer["effects"] == []

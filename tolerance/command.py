@@ -3,6 +3,8 @@
 import argparse
 import sys
 
+from ..arguments import positive
+
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
     """Add the command to the command line."""
@@ -14,7 +16,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     p.add_argument(
         "--scheduler", metavar="ADDRESS", help="a running Dask scheduler; without it, processes of this machine"
     )
-    p.add_argument("--jobs", type=_positive, default=2, metavar="N", help="processes of this machine (default 2)")
+    p.add_argument("--jobs", type=positive, default=2, metavar="N", help="processes of this machine (default 2)")
     p.set_defaults(run=run)
 
 
@@ -37,10 +39,3 @@ def run(given: argparse.Namespace) -> None:
         print(f"snarelab: interrupted; {len(results)} cases are kept, the same command goes on", file=sys.stderr)
         sys.exit(130)
     print(f"{content['sentence']}\nReport: {results.folder / 'report.html'}")
-
-
-def _positive(text: str) -> int:
-    value = int(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"{value}; allowed is a whole number from 1")
-    return value

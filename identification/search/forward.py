@@ -117,9 +117,8 @@ def search(
         progress("fitting the baseline")
         assembly = assemble(model, base, scales)
         first = found = fit(assembly, fitted(assembly, experiments), progress=progress, seed=seed)
-        progress("round 1: screening every effect at every place")
         instruments = planned(found, experiments)
-        opening = result = screen(model, found, experiments, instruments, None, seed)
+        opening = result = screen(model, found, experiments, instruments, None, seed, _in_round(1, progress))
     else:
         first = found = before.first
         opening = result = before.opening
@@ -147,10 +146,14 @@ def search(
         # What rings has a local optimum at many a frequency; the screening's columns leave its damping where it is.
         rings = any(j.placed.effect.at == "base" and j.placed.effect.states for j in chosen)
         found = fit(assembly, fitted(assembly, experiments), start=carry(found, assembly), multi_start=rings, seed=seed)
-        progress(f"round {number}: screening every effect at every place")
         instruments = planned(found, experiments, instruments)
-        result = screen(model, found, experiments, instruments, opening.noise, seed)
+        result = screen(model, found, experiments, instruments, opening.noise, seed, _in_round(number, progress))
     return Found(first, model, found, tuple(taken), opening, result, tuple(instruments))
+
+
+def _in_round(number: int, progress: Callable[[str], None]) -> Callable[[str], None]:
+    """Progress that says in which round."""
+    return lambda words: progress(f"round {number}: {words}")
 
 
 def carry(found: Fit, assembly: Assembly) -> Array:

@@ -1,8 +1,9 @@
 """One screening: every effect at every place and shape judged on top of a fit, and the noise they are judged
 against."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from .saturated import Noise, learn
 from .trial import WORTH, Null, Option, source, tried
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
 
 LEVEL = 0.995
 """Quantile of the best score on noise that a candidate must beat, among all that reach the same channels."""
@@ -63,6 +65,7 @@ def screen(
     instruments: Sequence[Experiment],
     noise: Noise | None,
     seed: int,
+    progress: Callable[[str], None],
 ) -> Screening:
     """Judge every candidate on top of a fit.
 
@@ -79,14 +82,20 @@ def screen(
         From the first screening; None learns it.
     seed : int
         Of the sign-flipped nulls.
+    progress : callable
+        Told how far it is.
     """
     along = readings(found, experiments, instruments)
-    pool = [[(v, source(along, p.effect).columns(v)) for v in variants(found.assembly, p)] for p in library(model)]
+    pool = [
+        [(v, source(along, p.effect).columns(v)) for v in variants(found.assembly, p)]
+        for p in _told(library(model), "simulating each effect at each place", progress)
+    ]
     if noise is None:
         noise = learn(along.measured.experiments, along.measured.residuals(), _saturated(along, pool))
     ground = grounds(along, noise, seed)
     null = Null({(c,): np.zeros(NULLS) for c in range(len(model.joints))})
-    trials = [t for options in pool if (t := tried(ground, options, null)) is not None]
+    judging = _told(pool, "judging each effect at each place", progress)
+    trials = [t for options in judging if (t := tried(ground, options, null)) is not None]
     threshold = {channels: float(np.quantile(x, LEVEL)) for channels, x in null.scores.items()}
     judged = sorted((t.best for t in trials), key=lambda j: -j.score)
     evidence = ground.asked.evidence
@@ -106,6 +115,14 @@ def screen(
         tuple(limits),
         noise,
     )
+
+
+def _told(items: Sequence[T], words: str, progress: Callable[[str], None]) -> Iterator[T]:
+    """The items, with a word at every tenth of them."""
+    for number, item in enumerate(items):
+        if number % -(-len(items) // 10) == 0:
+            progress(f"{words}, {number} of {len(items)}")
+        yield item
 
 
 class _Free:

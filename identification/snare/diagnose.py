@@ -33,7 +33,7 @@ def diagnose_captures(
     seed : int
         Of the bootstrap.
     jobs : int or None
-        Processes; None: what SNARELAB_JOBS says, else one a core, at most four.
+        Processes; None: one a core, at most four.
 
     Returns
     -------

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from ...errors import InputError
 from ...models.model import Model
 from .handles import values_of
 from .library import start_of
@@ -35,17 +36,14 @@ def sets_of(
 
     Each has its force sensor where its sign says, in a simulation of the model as it comes.
     """
+    if jobs is not None and jobs < 1:
+        raise InputError(f"jobs = {jobs}; allowed is a whole number from 1")
     captures = load_captures(model, [*recordings, *holdout])
     check_sensors(captures)
-    with Runs(captures, jobs or _workers()) as runs:
+    with Runs(captures, jobs or min(4, os.cpu_count() or 1)) as runs:
         values = values_of(model.effects, start_of(model))
         tracks = runs([(n, values) for n in range(len(captures))])
         captures = [sensed_by(c, track) for c, track in zip(captures, tracks, strict=True)]
         check_sensors(captures)
         n = len(recordings)
         yield CaptureSet(runs, range(n), captures[:n]), CaptureSet(runs, range(n, len(captures)), captures[n:])
-
-
-def _workers() -> int:
-    given = os.environ.get("SNARELAB_JOBS", "")
-    return max(1, int(given)) if given.isdigit() else max(1, min(4, os.cpu_count() or 1))
