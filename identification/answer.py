@@ -15,7 +15,7 @@ from .fitting.fit import Fit, channel_rms
 from .fitting.floating_terms import momentum_floor
 from .reliability import probability as reliability
 from .search.bursts import bursts
-from .search.forward import Found, Taken
+from .search.forward import MATERIAL, Found, Taken
 from .search.locate import locate
 from .wording import evidence_sentence, experiment_sentence, percent, verdict_sentence
 
@@ -25,11 +25,9 @@ NAMELESS = 0.1
 """Smooth curves that explain this share of a channel's residual, in blocks they did not see, mean a nameless effect
 ..."""
 
-MATERIAL = 0.015
-"""... if they also amount to this share of the channel's RMS torque, ..."""
-
 PLAIN = 0.5
-"""... or if they are this much of the residual: on a joint that carries a lot, plain and yet a small share of it."""
+"""... if they also amount to `MATERIAL` of the channel's RMS torque, or if they are this much of the residual: on a
+joint that carries a lot, plain and yet a small share of it."""
 
 
 def report_on(

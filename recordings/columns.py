@@ -17,7 +17,7 @@ from ..errors import InputError, nearest
 LARGEST = 4 << 30
 """Most bytes of numbers that are read from a recording, and of a file that is read at once."""
 
-MOST = 10_000
+MOST_COLUMNS = 10_000
 """Most columns of a recording; some of what is done to one looks at all the others."""
 
 _ELEMENT = re.compile(r"(?P<name>.+)\[(?P<index>\d+)\]")
@@ -34,9 +34,11 @@ def check_size(path: Path, size: int) -> None:
 
 
 def check_count(path: Path, count: int) -> None:
-    """Raise InputError where a recording has more than `MOST` columns."""
-    if count > MOST:
-        raise InputError(f"{path}: has {count} columns and at most {MOST} are read; leave out what is no signal")
+    """Raise InputError where a recording has more than `MOST_COLUMNS` columns."""
+    if count > MOST_COLUMNS:
+        raise InputError(
+            f"{path}: has {count} columns and at most {MOST_COLUMNS} are read; leave out what is no signal"
+        )
 
 
 def split_header(header: str) -> tuple[str, str | None]:

@@ -129,6 +129,35 @@ def test_many_starts_reach_the_best_makkar_curve(body):
         assert np.sqrt(np.mean((curve - wanted) ** 2)) < 0.01 * np.sqrt(np.mean(wanted**2))
 
 
+@pytest.mark.parametrize(("steep", "fade", "extra"), [(0.01, 0.06, 2.0), (0.01, 0.12, 4.0), (0.03, 0.12, 2.0)])
+def test_the_best_makkar_curve_is_found_for_a_bump_that_is_none_of_its_own(body, steep, fade, extra):
+    """A bell-shaped bump, as LuGre friction has; scipy looks for the best curve from many random starts."""
+
+    def friction(qd):
+        share = qd / np.abs(qd).max(axis=0)
+        return (4.0 + extra * np.exp(-((share / fade) ** 2))) * np.tanh(share / steep) + qd
+
+    run = recording(body, friction)
+    model = assembly(body, run, "makkar_friction")
+    found = fit(model, [run])
+    motion, rng = run.motion, np.random.default_rng(2)
+    rigid = body.torque(motion.q, motion.qd, motion.qdd)
+    for joint in range(2):
+        top = np.abs(motion.qd[:, joint]).max()
+        low, high = (bound[6 * joint : 6 * joint + 6] for bound in (model.low, model.high))
+
+        def residual(x, j=joint):
+            left = (motion.tau - rigid)[:, j] - makkar(motion.qd[:, j], x)
+            return motion.to_band(left[:, None])[:, 0]
+
+        costs = []
+        for _ in range(12):
+            shape = top * 10 ** rng.uniform(-2, -1), 10 ** rng.uniform(0.1, 1.0), top * 10 ** rng.uniform(-2, -1)
+            start = [2 * extra, shape[0], shape[1], 4.0, shape[2], 1.0]
+            costs.append(scipy.optimize.least_squares(residual, start, bounds=(low, high), x_scale="jac").cost)
+        assert 0.5 * found.sigma[joint] ** 2 * len(run.measured) <= 1.01 * min(costs)
+
+
 def test_standard_deviations_cover_the_truth_under_coloured_noise(body):
     """Noise that remembers 40 ms: deviations of the estimates over 20 recordings are what the fit says they are."""
     truth = np.array([1.5, 0.8, 3.0, 2.0])  # viscous of both joints, Coulomb of both

@@ -19,9 +19,10 @@ Array = NDArray[np.float64]
 MOST_VARIANTS = 36
 """Grid points of one effect at one place; a finer grid is thinned evenly."""
 
-
 MOST_OF_WHOLE = 1.6
 """Most that a law's whole contribution at a point of its grid is multiplied by: beyond, another point is meant."""
+
+SLIDE = "slide_friction"
 
 MOST_COMBINED = 4
 """Most columns of a link effect of which every combination is tried."""
@@ -66,10 +67,9 @@ class Variant:
 def library(model: Model) -> list[Placed]:
     """Every effect at every place that the model does not have yet and its kind of inertia leaves room for."""
     have = {p.key for p in model.effects}
-    if f"slide_friction.{model.joints[0]}" in have:
+    if f"{SLIDE}.{model.joints[0]}" in have:
         # The first joint's slides act on it alone, so that the same law at the joint is the same column.
-        makkar = effects()["makkar_friction"]
-        have |= {f"{name}.{model.joints[0]}" for name in (makkar.name, *makkar.contains)}
+        have |= {f"{name}.{model.joints[0]}" for name in _makkar()}
     found = []
     for effect in effects().values():
         if effect.at == "link" and model.inertia == "free":
@@ -82,6 +82,18 @@ def library(model: Model) -> list[Placed]:
             spots = tuple(at for at in other if f"{effect.name}.{other[at]}" not in have)
         found += [Placed(effect, at) for at in spots if f"{effect.name}.{at}" not in have]
     return found
+
+
+def refines(model: Model, placed: Placed) -> bool:
+    """Is an effect all in a whole friction law that the model has at its place, and only changes that law's shape?"""
+    there = {p.effect.name for p in model.effects if p.at == placed.at and not p.hold}
+    return placed.effect.name in _makkar() and not there.isdisjoint((SLIDE, "makkar_friction"))
+
+
+def _makkar() -> tuple[str, ...]:
+    """Makkar's law and what it contains; the law of slides is the same."""
+    law = effects()["makkar_friction"]
+    return law.name, *law.contains
 
 
 def variants(assembly: Assembly, placed: Placed) -> list[Variant]:

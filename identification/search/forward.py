@@ -18,7 +18,8 @@ from ...models.model import Model, Placed
 from ..fitting.assembly import Assembly
 from ..fitting.base_parameters import BaseParameters
 from ..fitting.experiment import Experiment, Scales
-from ..fitting.fit import Fit, fit
+from ..fitting.fit import Fit, channel_rms, fit
+from .candidates import refines
 from .closed_loop import DRIVEN, planned
 from .evidence import ABSORBED
 from .judged import Judged
@@ -39,6 +40,9 @@ AS_GOOD = 0.1
 
 AHEAD = 1.15
 """Ratio of scores up to which a special case is preferred to what contains it."""
+
+MATERIAL = 0.015
+"""Share of a channel's RMS torque below which a change of a law's shape, or something without a name, is not told."""
 
 MOST_ROUNDS = 8
 BOOTSTRAPS = 400
@@ -113,6 +117,7 @@ def search(
     seed : int
     """
     taken: list[Taken] = []
+    given = model
     if before is None:
         progress("fitting the baseline")
         assembly = assemble(model, base, scales)
@@ -125,6 +130,7 @@ def search(
         instruments = before.instruments
     for number in range(2, MOST_ROUNDS + 2):
         passing = [j for j in _passing(result, model.joints) if j.placed.key not in barred]
+        passing = [j for j in passing if not refines(given, j.placed) or _share(j, found, experiments) > MATERIAL]
         news = [(j, wide) for j in _choose(result, passing) if (wide := _widest(j, taken)) is not None]
         if not news:
             break
@@ -190,6 +196,12 @@ def _passes(result: Screening, j: Judged) -> bool:
     if j.score <= result.threshold[j.channels] or j.explained < (DRIVEN if late else WORTH):
         return False
     return reliably_positive(j.case.fresh_gains())
+
+
+def _share(j: Judged, found: Fit, experiments: Sequence[Experiment]) -> float:
+    """What a candidate explains, as a share of the RMS torque of the channel where that is most."""
+    left, measured = channel_rms(found.assembly, experiments, found.theta)
+    return float(np.sqrt(j.explained) * np.max((left / measured)[list(j.channels)]))
 
 
 def _as_measured(result: Screening, j: Judged) -> bool:

@@ -37,7 +37,7 @@ EFFECT = Effect(
             zero=0.01,
             low=1e-3,
             high=0.5,
-            grid=(0.01, 0.05),
+            grid=(0.01, 0.03, 0.1),
             relative_to="speed",
         ),
         Parameter(
@@ -45,9 +45,9 @@ EFFECT = Effect(
             "1",
             "speed over which the bump fades, as a multiple of that over which it rises",
             zero=5.0,
-            low=1.0,
+            low=1.05,
             high=200.0,
-            grid=(2.0, 10.0),
+            grid=(1.1, 2.0, 10.0),
         ),
         Parameter("coulomb_level", "T", "level at which friction saturates", low=0.0),
         Parameter(

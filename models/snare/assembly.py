@@ -231,16 +231,18 @@ class Assembly:
     def _add_contact(self) -> None:
         nodes = list(self.cable_nodes) + ([self.target_node] if self.n_pin else [])
         reference = np.concatenate([self.nodes.ravel(), self._target_reference()])
+        data = self.system.systemData  # the same state as arrays: lists, as handed over, cost as much as contact
 
-        def forces(_system: Any, time: float, _item: int, q: Any, rates: Any) -> np.ndarray:
+        def forces(_system: Any, time: float, _item: int, _q: Any, _rates: Any) -> np.ndarray:
             self.place(time)
-            return system_forces(np.asarray(q), np.asarray(rates), self.fixed, self.moving)
+            return system_forces(data.GetODE2Coordinates(), data.GetODE2Coordinates_t(), self.fixed, self.moving)
 
         def jacobian(
-            _system: Any, time: float, _item: int, q: Any, rates: Any, factor: float, rate_factor: float
+            _system: Any, time: float, _item: int, _q: Any, _rates: Any, factor: float, rate_factor: float
         ) -> exudyn.MatrixContainer:
             self.place(time)
-            triplets = system_jacobian(np.asarray(q), np.asarray(rates), self.fixed, self.moving, factor, rate_factor)
+            state = data.GetODE2Coordinates(), data.GetODE2Coordinates_t()
+            triplets = system_jacobian(*state, self.fixed, self.moving, factor, rate_factor)
             matrix = exudyn.MatrixContainer()
             matrix.SetWithSparseMatrix(triplets, len(reference), len(reference), useDenseMatrix=False)
             return matrix
