@@ -16,7 +16,7 @@ demo: study-emps ## set up, then the main job: name the physics that a viscous m
 $(STUDIES:%=study-%): study-%: .venv/installed ## run one study: report and numbers in build/studies/NAME
 	$(BIN)/python -m snarelab.studies.$(subst -,_,$*)
 
-studies: $(filter-out study-tolerance,$(STUDIES:%=study-%)) ## every study but the tolerances, one after the other: a quarter of an hour
+studies: $(filter-out study-tolerance,$(STUDIES:%=study-%)) ## every study but the tolerances, one after the other: a quarter of an hour; CI runs them
 
 test: .venv/installed ## set up, then the tests
 	$(BIN)/python -m pytest -n 2

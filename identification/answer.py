@@ -15,8 +15,9 @@ from .fitting.fit import Fit, channel_rms
 from .fitting.floating_terms import momentum_floor
 from .reliability import probability as reliability
 from .search.bursts import bursts
-from .search.forward import MATERIAL, Found, Taken
+from .search.forward import Found, Taken
 from .search.locate import locate
+from .search.trial import MATERIAL
 from .wording import evidence_sentence, experiment_sentence, percent, verdict_sentence
 
 Array = NDArray[np.float64]

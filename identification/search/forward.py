@@ -18,8 +18,7 @@ from ...models.model import Model, Placed
 from ..fitting.assembly import Assembly
 from ..fitting.base_parameters import BaseParameters
 from ..fitting.experiment import Experiment, Scales
-from ..fitting.fit import Fit, channel_rms, fit
-from .candidates import refines
+from ..fitting.fit import Fit, fit
 from .closed_loop import DRIVEN, planned
 from .evidence import ABSORBED
 from .judged import Judged
@@ -40,9 +39,6 @@ AS_GOOD = 0.1
 
 AHEAD = 1.15
 """Ratio of scores up to which a special case is preferred to what contains it."""
-
-MATERIAL = 0.015
-"""Share of a channel's RMS torque below which a change of a law's shape, or something without a name, is not told."""
 
 MOST_ROUNDS = 8
 BOOTSTRAPS = 400
@@ -117,7 +113,6 @@ def search(
     seed : int
     """
     taken: list[Taken] = []
-    given = model
     if before is None:
         progress("fitting the baseline")
         assembly = assemble(model, base, scales)
@@ -130,7 +125,6 @@ def search(
         instruments = before.instruments
     for number in range(2, MOST_ROUNDS + 2):
         passing = [j for j in _passing(result, model.joints) if j.placed.key not in barred]
-        passing = [j for j in passing if not refines(given, j.placed) or _share(j, found, experiments) > MATERIAL]
         news = [(j, wide) for j in _choose(result, passing) if (wide := _widest(j, taken)) is not None]
         if not news:
             break
@@ -193,15 +187,10 @@ def _passes(result: Screening, j: Judged) -> bool:
     """Does a candidate pass every test?"""
     # What a disturbance drives is let into the motion up to a share, and looks like a late sensor.
     late = j.placed.effect.at == "sensor" and bool(j.placed.effect.states)
-    if j.score <= result.threshold[j.channels] or j.explained < (DRIVEN if late else WORTH):
+    worth = DRIVEN if late else result.worth.get(j.placed.key, WORTH)
+    if j.score <= result.threshold[j.channels] or j.explained < worth:
         return False
     return reliably_positive(j.case.fresh_gains())
-
-
-def _share(j: Judged, found: Fit, experiments: Sequence[Experiment]) -> float:
-    """What a candidate explains, as a share of the RMS torque of the channel where that is most."""
-    left, measured = channel_rms(found.assembly, experiments, found.theta)
-    return float(np.sqrt(j.explained) * np.max((left / measured)[list(j.channels)]))
 
 
 def _as_measured(result: Screening, j: Judged) -> bool:

@@ -12,14 +12,14 @@ from ...models.model import Model
 from ..diagnosis import Limit
 from ..fitting.assembly import Assembly
 from ..fitting.experiment import Experiment
-from ..fitting.fit import Fit
-from .candidates import library, variants
+from ..fitting.fit import Fit, channel_rms
+from .candidates import library, refines, variants
 from .curves import nameless_columns, smooth_columns
 from .evidence import Evidence
 from .grounds import NULLS, Grounds, Readings, grounds, readings
 from .judged import Judged, Samples
 from .saturated import Noise, learn
-from .trial import WORTH, Null, Option, source, tried
+from .trial import MATERIAL, WORTH, Null, Option, source, tried
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
@@ -54,6 +54,8 @@ class Screening:
     threshold: Mapping[tuple[int, ...], float]
     nameless: Mapping[int, Nameless]
     """The best curve of each channel that has one."""
+    worth: Mapping[str, float]
+    """Of what only changes the shape of a law that is there: the share of the residual that is worth a name."""
     limits: tuple[Limit, ...]
     noise: Noise
 
@@ -99,10 +101,13 @@ def screen(
     threshold = {channels: float(np.quantile(x, LEVEL)) for channels, x in null.scores.items()}
     judged = sorted((t.best for t in trials), key=lambda j: -j.score)
     evidence = ground.asked.evidence
+    worth = _worth(model, found, experiments, judged)
     limits = [
         limit
         for j in (t.best for t in trials)
-        for limit in _limits(found.assembly, evidence, j, threshold[j.channels] + j.price)
+        for limit in _limits(
+            found.assembly, evidence, j, threshold[j.channels] + j.price, worth.get(j.placed.key, WORTH)
+        )
     ]
     return Screening(
         evidence,
@@ -112,6 +117,7 @@ def screen(
         {t.asked.placed.key: t.asked for t in trials if t.asked is not None},
         threshold,
         _nameless(ground, threshold),
+        worth,
         tuple(limits),
         noise,
     )
@@ -152,7 +158,15 @@ def _nameless(ground: Grounds, threshold: Mapping[tuple[int, ...], float]) -> di
     return found
 
 
-def _limits(assembly: Assembly, evidence: Evidence, j: Judged, needed: float) -> list[Limit]:
+def _worth(model: Model, found: Fit, experiments: Sequence[Experiment], judged: Sequence[Judged]) -> dict[str, float]:
+    """Share of its channel's residual at which a part of a law that is there amounts to `MATERIAL` of the torque."""
+    left, measured = channel_rms(found.assembly, experiments, found.theta)
+    share = (MATERIAL * measured / np.maximum(left, 1e-300)) ** 2
+    parts = [j for j in judged if refines(model, j.placed)]
+    return {j.placed.key: max(WORTH, float(share[list(j.channels)].min())) for j in parts}
+
+
+def _limits(assembly: Assembly, evidence: Evidence, j: Judged, needed: float, worth: float) -> list[Limit]:
     """The smallest amplitude of an effect that would have passed; none where it has no single amplitude."""
     parameters, amplitudes = j.placed.effect.parameters, j.variant.amplitudes
     if not len(amplitudes) or not all(parameters[i].grid for i in amplitudes[1:]):
@@ -160,7 +174,7 @@ def _limits(assembly: Assembly, evidence: Evidence, j: Judged, needed: float) ->
     p = parameters[int(amplitudes[0])]
     # Both bars count: a score above noise, and a share of the residual worth a name.
     energy = sum(float(np.sum(evidence.channels[c].residual ** 2)) for c in j.channels)
-    value = evidence.smallest(evidence.products(list(j.columns.items())), max(needed, 0.5 * WORTH * energy))
+    value = evidence.smallest(evidence.products(list(j.columns.items())), max(needed, 0.5 * worth * energy))
     return [Limit(j.placed.effect.name, j.placed.at, p.name, value, assembly.unit(j.placed, p))]
 
 

@@ -15,6 +15,9 @@ Array = NDArray[np.float64]
 Option = tuple[Variant, dict[int, Parts]]
 """A point of the grid over an effect's shapes, and its columns."""
 
+MATERIAL = 0.015
+"""Share of a channel's RMS torque below which a change of a law's shape, or something without a name, is not told."""
+
 WORTH = 0.05
 """Least share of its channels' residual energy that an effect must explain to be named."""
 
