@@ -97,7 +97,7 @@ class Assembly:
         rows = np.concatenate([6 * end + np.arange(3) for end in range(6)])
 
         def residual(_system: Any, time: float, _item: int, q: Any, _rates: Any, _level: bool) -> np.ndarray:
-            return np.asarray(q)[rows] - self.ends_at(time)  # this marker's q includes the reference
+            return (np.asarray(q)[rows] - self.ends_at(time)).tolist()  # this marker's q includes the reference
 
         def derivative(*_: Any) -> Any:
             return jacobian
@@ -235,7 +235,7 @@ class Assembly:
 
         def forces(_system: Any, time: float, _item: int, _q: Any, _rates: Any) -> np.ndarray:
             self.place(time)
-            return system_forces(data.GetODE2Coordinates(), data.GetODE2Coordinates_t(), self.fixed, self.moving)
+            return system_forces(data.GetODE2Coordinates(), data.GetODE2Coordinates_t(), self.fixed, self.moving).tolist()
 
         def jacobian(
             _system: Any, time: float, _item: int, _q: Any, _rates: Any, factor: float, rate_factor: float
