@@ -96,7 +96,7 @@ class Assembly:
             jacobian[3 * end : 3 * end + 3, 6 * end : 6 * end + 3] = np.eye(3)
         rows = np.concatenate([6 * end + np.arange(3) for end in range(6)])
 
-        def residual(_system: Any, time: float, _item: int, q: Any, _rates: Any, _level: bool) -> np.ndarray:
+        def residual(_system: Any, time: float, _item: int, q: Any, _rates: Any, _level: bool) -> list[float]:
             return (np.asarray(q)[rows] - self.ends_at(time)).tolist()  # this marker's q includes the reference
 
         def derivative(*_: Any) -> Any:
@@ -233,9 +233,10 @@ class Assembly:
         reference = np.concatenate([self.nodes.ravel(), self._target_reference()])
         data = self.system.systemData  # the same state as arrays: lists, as handed over, cost as much as contact
 
-        def forces(_system: Any, time: float, _item: int, _q: Any, _rates: Any) -> np.ndarray:
+        def forces(_system: Any, time: float, _item: int, _q: Any, _rates: Any) -> list[float]:
             self.place(time)
-            return system_forces(data.GetODE2Coordinates(), data.GetODE2Coordinates_t(), self.fixed, self.moving).tolist()
+            state = data.GetODE2Coordinates(), data.GetODE2Coordinates_t()
+            return system_forces(*state, self.fixed, self.moving).tolist()  # the engine reads arrays number by number
 
         def jacobian(
             _system: Any, time: float, _item: int, _q: Any, _rates: Any, factor: float, rate_factor: float
