@@ -10,13 +10,14 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from .errors import one_line
 
 LOG = logging.getLogger("snarelab")
 _COUNT = re.compile(r"(\d+) of (?:at most )?(\d+)")
+_NUMBER = re.compile(r"(?<!round )(?<![\d.])[\d.]+")
 _INTERRUPTED = threading.Event()
 _RARELY = 0.2
 """Least time between two rewritten lines of the same kind [s]."""
@@ -44,7 +45,7 @@ class Progress:
         if _INTERRUPTED.is_set():
             raise KeyboardInterrupt
         text, now = one_line(text), time.monotonic()
-        wording = re.sub(r"[\d.]+", "", text)
+        wording = _NUMBER.sub("", text)
         if share is None and (count := _COUNT.search(text)):
             share = int(count[1]) / max(int(count[2]), 1)
         if wording != self._wording:
@@ -66,6 +67,19 @@ class Progress:
         """Leave the line empty."""
         if self._shown:
             print("\r\x1b[2K", end="", file=sys.stderr, flush=True)
+
+
+def stages(say: Callable[[str], None]) -> Callable[[str], None]:
+    """Progress in lines: a text is said where its wording is new, indented, without the count that will change."""
+    last = ""
+
+    def told(text: str) -> None:
+        nonlocal last
+        before, last = last, _NUMBER.sub("", text)
+        if last != before:
+            say(f"  {_COUNT.sub('', text).rstrip(', ')}")
+
+    return told
 
 
 def duration(seconds: float) -> str:

@@ -20,6 +20,7 @@ from ..identification.identify import identify
 from ..identification.report.page import write_report
 from ..models.model_file import load_model
 from ..models.model_write import save_model
+from ..progress import stages
 from ..recordings import find_recording
 
 HERE = Path(__file__).parent
@@ -85,7 +86,7 @@ def _say(text: str) -> None:
 
 def _diagnose(model: Path, train: Path, holdout: Path) -> Answer:
     _say(f"Diagnosing {model.stem} against {train.name}, with {holdout.name} locked away ...")
-    return diagnose(load_model(model), [train], holdout, progress=lambda text: _say(f"  {text}"))
+    return diagnose(load_model(model), [train], holdout, progress=stages(_say))
 
 
 def _published(train: Path, holdout: Path) -> list[dict[str, Any]]:

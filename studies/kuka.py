@@ -10,6 +10,7 @@ import json
 import sys
 import time
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,7 @@ from ..models.model import Placed
 from ..models.model_file import load_model
 from ..models.model_write import save_model
 from ..models.rigid_body import RigidBody
+from ..progress import stages
 from ..recordings import find_recording
 from .kuka_figures import MDEG, differences, left_over, pattern, rms, without
 from .outcome import FOLDER, Quantity, table, write_result
@@ -56,7 +58,7 @@ def main() -> int:
         load_model(HERE / "kuka" / "kr300.toml"),
         recordings,
         holdout,
-        progress=lambda text: print(f"  {text}", flush=True),
+        progress=stages(partial(print, flush=True)),
     )
     quantities, sections = compare(answer, recordings, holdout)
     folder = FOLDER / "kuka"

@@ -18,7 +18,7 @@ from bench.kills import kill_all, words, write_inputs
 from snarelab import cli
 from snarelab.errors import InputError
 from snarelab.files import written_whole
-from snarelab.progress import Progress, duration, start_logging
+from snarelab.progress import Progress, duration, stages, start_logging
 
 IDENTIFY = ["identify", "arm3.toml", "train.csv"]
 DIAGNOSE = ["diagnose", "arm3.toml", "train.csv", "--holdout", "holdout.csv", "--json", "out.json"]
@@ -191,6 +191,14 @@ def test_progress_on_a_terminal_is_rewritten_and_gone_at_the_end(folder):
     assert b"reading and conditioning the recordings" in shown
     assert b"\n" not in shown
     assert shown.endswith(b"\r\x1b[2K")
+
+
+def test_stages_are_told_once_and_rounds_by_their_number():
+    told = []
+    show = stages(told.append)
+    for text in ("reading", "round 1: judging, 0 of 190", "round 1: judging, 19 of 190", "round 2: judging, 0 of 189"):
+        show(text)
+    assert told == ["  reading", "  round 1: judging", "  round 2: judging"]
 
 
 class Terminal(io.StringIO):

@@ -20,6 +20,7 @@ from ...identification.report.page import write_report
 from ...models.model_file import load_model
 from ...models.model_write import save_model
 from ...models.rig.rig import built_in_rig
+from ...progress import stages
 from ..outcome import FOLDER, Quantity, table, write_result
 from ..page import Clock, Section, write_page
 from . import figures
@@ -46,9 +47,9 @@ def main() -> int:
     say(f"What it conceals is sealed; SHA-256 {digest}")
     train, holdout = folder / "train.parquet", folder / "holdout.parquet"
     model = load_model(MODEL)
-    friction = friction_study(model, train, holdout, lambda text: say(f"  {text}"))
+    friction = friction_study(model, train, holdout, stages(say))
     say(f"{error_table(friction)}\nDiagnosing what is left, with {holdout.name} locked away ...")
-    answer = diagnose(model, [train], holdout, progress=lambda text: say(f"  {text}"))
+    answer = diagnose(model, [train], holdout, progress=stages(say))
     found = answer.diagnosis
     boom = suspected_boom(built_in_rig(), found)
     pairs = tell_apart(built_in_rig(), friction, boom)
