@@ -70,14 +70,15 @@ class Progress:
 
 
 def stages(say: Callable[[str], None]) -> Callable[[str], None]:
-    """Progress in lines: a text is said where its wording is new, indented, without the count that will change."""
+    """Progress in lines: a text is said where its wording is new, indented and cut before its count."""
     last = ""
 
     def told(text: str) -> None:
         nonlocal last
         before, last = last, _NUMBER.sub("", text)
         if last != before:
-            say(f"  {_COUNT.sub('', text).rstrip(', ')}")
+            count = _COUNT.search(text)
+            say(f"  {text[: count.start()].rstrip(', ') if count else text}")
 
     return told
 

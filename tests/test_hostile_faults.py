@@ -196,9 +196,11 @@ def test_progress_on_a_terminal_is_rewritten_and_gone_at_the_end(folder):
 def test_stages_are_told_once_and_rounds_by_their_number():
     told = []
     show = stages(told.append)
-    for text in ("reading", "round 1: judging, 0 of 190", "round 1: judging, 19 of 190", "round 2: judging, 0 of 189"):
+    for text in ("reading", "starting values, 1 of 7 independent parts", "starting values, 2 of 7 independent parts"):
         show(text)
-    assert told == ["  reading", "  round 1: judging", "  round 2: judging"]
+    for text in ("round 1: judging, 0 of 190", "round 1: judging, 19 of 190", "round 2: judging, 0 of 189"):
+        show(text)
+    assert told == ["  reading", "  starting values", "  round 1: judging", "  round 2: judging"]
 
 
 class Terminal(io.StringIO):

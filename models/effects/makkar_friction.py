@@ -2,7 +2,7 @@
 
 The paper's gamma_1 ... gamma_6 are ``stribeck_level``, 1 / ``stribeck_speed``, 1 / (``stribeck_ratio`` *
 ``stribeck_speed``), ``coulomb_level``, 1 / ``coulomb_speed``, ``viscous_coefficient``. Speeds stand for the paper's
-slopes [s/S] because they scale with the joint; the ratio, at least 1, makes the law dissipate for every value inside
+slopes [s/S] because they scale with the joint; the ratio, above 1, makes the law dissipate for every value inside
 the bounds. A ``coulomb_speed`` near the joint's own speed bends the curve: concave friction that saturates slowly.
 """
 
