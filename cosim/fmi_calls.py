@@ -13,7 +13,7 @@ from typing import Any
 from weakref import WeakValueDictionary
 
 import numpy as np
-from fmpy import fmi2, fmi3
+from fmpy import fmi1, fmi2, fmi3
 
 from .fmi_variables import Slot
 from .participant import StepError
@@ -97,7 +97,7 @@ class Instance:
                 instanceName=name,
             )
             self._instantiate()
-        except Exception as error:  # FMPy raises bare exceptions; whatever it is, the FMU is named with it
+        except Exception as error:  # no library, no instance: FMPy raises plain Exception
             raise StepError(f"{name}: cannot be started: {error}{self._said()}") from None
         self.component = ctypes.c_void_p(self._fmu.component)
         self._time, self._size = ctypes.c_double(), ctypes.c_double()
@@ -193,11 +193,8 @@ class Instance:
         """The status of a call through FMPy, which raises instead."""
         try:
             call()
-        except Exception as error:  # FMPy raises bare exceptions; those without a status go on
-            status = getattr(error, "status", None)
-            if status is None:
-                raise
-            return int(status)
+        except fmi1.FMICallException as error:
+            return int(error.status)
         return 0
 
     def _instantiate(self) -> None:

@@ -82,7 +82,7 @@ class Participant(ABC):
 
         Called after each `set_inputs` where `input_order` is 1 (``second`` is then zero) or 2, and then only.
         """
-        raise NotImplementedError(f"{self.name}: takes no input derivatives")  # optional in FMI: see `input_order`
+        raise NotImplementedError(f"{self.name}: takes no input derivatives")  # optional: given if `input_order` > 0
 
     def begin(self, time: float, size: float) -> None:
         """Start a step that `finish` waits for; the default takes the whole step here, as nothing runs beside it."""
@@ -97,11 +97,11 @@ class Participant(ABC):
 
     def save(self) -> Any:
         """Everything that decides the future; to be treated as opaque."""
-        raise NotImplementedError(f"{self.name}: cannot save its state")  # optional in FMI: see `can_restore`
+        raise NotImplementedError(f"{self.name}: cannot save its state")  # optional: asked only if `can_restore`
 
     def restore(self, state: Any) -> None:
         """Return to a saved state, exactly."""
-        raise NotImplementedError(f"{self.name}: cannot restore a state")  # optional in FMI: see `can_restore`
+        raise NotImplementedError(f"{self.name}: cannot restore a state")  # optional: asked only if `can_restore`
 
     def compiled_calls(self) -> Any:
         """What `snarelab.cosim.compiled_loop` needs to drive it from C; None where only Python can."""

@@ -128,7 +128,7 @@ def test_public_names_are_typed_documented_and_listed():
                 assert parameter.annotation is not inspect.Parameter.empty
                 assert f"    {parameter.name} : " in (value.__doc__ or ""), f"{name}: {parameter.name} not described"
     with pytest.raises(AttributeError, match="no attribute 'diagnosis'; it has"):
-        snarelab.diagnosis  # noqa: B018
+        snarelab.diagnosis  # noqa: B018  the look-up alone must raise
 
 
 @pytest.mark.parametrize("code", ["import snarelab", "import sys; from snarelab.cli import main; main(['--help'])"])

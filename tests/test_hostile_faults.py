@@ -58,7 +58,7 @@ def test_disk_full_while_a_result_is_written(folder):
 def test_a_file_that_cannot_be_finished_leaves_what_was_there(tmp_path, fault):
     path = tmp_path / "out.json"
     path.write_text("before")
-    with pytest.raises((InputError, KeyboardInterrupt)), written_whole(path) as part:  # noqa: PT012
+    with pytest.raises((InputError, KeyboardInterrupt)), written_whole(path) as part:  # noqa: PT012  the file is written inside
         part.write_text("half")
         raise fault
     assert path.read_text() == "before"
