@@ -4,6 +4,8 @@
 
 1. The ground captures of one Sobol study (N cases, the same ones), run to the end by one worker and by two on two
    cores, each warmed up first; by the clock, so the machine has to be quiet: its load before and after is printed.
+   Beside it the same captures in one bare process and in two, without an engine: what the cores can give at all.
+   Engine and bare take turns, twice; the medians count.
 2. What a capture costs: the median processor time of several, in one process and one thread.
 3. The engine's own time a case, over that of a ground capture: an adaptive study in five axes whose captures cost
    nothing. It holds scheduling, recording on disk, and the choice of the next cases.
@@ -14,6 +16,7 @@
 
 import argparse
 import json
+import multiprocessing
 import os
 import platform
 import sys
@@ -63,6 +66,24 @@ def clock(study: Study, jobs: int, warm: Any) -> float:
         address: Any = client.scheduler_info()["address"]
         begun = time.perf_counter()
         run_study(study, Results(Path(folder) / "out", study), scheduler=address)
+        return time.perf_counter() - begun
+
+
+def ready(barrier: Any, study: Study, warm: Any) -> None:
+    """What a bare process does before the clock starts."""
+    run_case(study.capture, warm)
+    barrier.wait()
+
+
+def bare(study: Study, jobs: int, warm: Any) -> float:
+    """Time by the clock of the same captures in so many processes that only share out the cases [s]."""
+    context = multiprocessing.get_context("spawn")
+    barrier = context.Barrier(jobs + 1)
+    points = study.scaled(qmc.Sobol(len(study.ranges), rng=study.seed).random(study.cases))
+    with context.Pool(jobs, ready, (barrier, study, warm)) as pool:
+        barrier.wait()
+        begun = time.perf_counter()
+        pool.starmap(run_case, [(study.capture, study.values(point)) for point in points], chunksize=1)
         return time.perf_counter() - begun
 
 
@@ -148,10 +169,13 @@ def main() -> int:
     ground = replace(study, sampling="sobol", cases=options.cases, batch=options.cases)
     nominal = ground.values(ground.scaled(np.full((1, len(ground.ranges)), 0.5))[0])
     load = os.getloadavg()[0]
-    one, two = clock(ground, 1, nominal), clock(ground, 2, nominal)
+    turns = [[timed(ground, jobs, nominal) for timed in (clock, bare) for jobs in (1, 2)] for _ in range(2)]
+    one, two, bare_one, bare_two = (float(t) for t in np.median(turns, axis=0))
     loads = load, os.getloadavg()[0]
     print(f"{options.cases} ground captures: one worker {one:.1f} s, two {two:.1f} s: {one / two:.2f} x "
-          f"(goal {SPEEDUP_GOAL:g}); load {loads[0]:.1f} before, {loads[1]:.1f} after", flush=True)  # fmt: skip
+          f"(goal {SPEEDUP_GOAL:g}); load {loads[0]:.1f} before, {loads[1]:.1f} after\n"
+          f"the same in bare processes: one {bare_one:.1f} s, two {bare_two:.1f} s: {bare_one / bare_two:.2f} x",
+          flush=True)  # fmt: skip
 
     seconds, processor = case_seconds(load_study(GROUND), min(options.cases, 8))
     inspection = case_seconds(load_study(GROUND.with_name("inspection.toml")), min(options.cases, 4))[1]
@@ -176,6 +200,7 @@ def main() -> int:
     result = {
         "bench": "tolerance", "machine": platform.machine(), "cases": options.cases, "one_worker": one,
         "two_workers": two, "speedup": one / two, "goal_speedup": SPEEDUP_GOAL, "load": loads,
+        "bare_speedup": bare_one / bare_two, "turns": turns,
         "ground_capture_cpu_seconds": processor,
         "inspection_capture_cpu_seconds": inspection,
         "engine_seconds_a_case": own, "overhead": own / seconds, "goal_overhead": OVERHEAD_GOAL, "width": WIDTH,
