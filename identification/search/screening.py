@@ -19,7 +19,7 @@ from .evidence import Evidence
 from .grounds import NULLS, Grounds, Readings, grounds, readings
 from .judged import Judged, Samples
 from .saturated import Noise, learn
-from .trial import MATERIAL, WORTH, Null, Option, source, tried
+from .trial import IDEALISED, MATERIAL, WORTH, Null, Option, source, tried
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
@@ -55,7 +55,7 @@ class Screening:
     nameless: Mapping[int, Nameless]
     """The best curve of each channel that has one."""
     worth: Mapping[str, float]
-    """Of what only changes the shape of a law that is there: the share of the residual that is worth a name."""
+    """Share of its channels' residual that each candidate must explain to be worth a name."""
     limits: tuple[Limit, ...]
     noise: Noise
 
@@ -105,9 +105,7 @@ def screen(
     limits = [
         limit
         for j in (t.best for t in trials)
-        for limit in _limits(
-            found.assembly, evidence, j, threshold[j.channels] + j.price, worth.get(j.placed.key, WORTH)
-        )
+        for limit in _limits(found.assembly, evidence, j, threshold[j.channels] + j.price, worth[j.placed.key])
     ]
     return Screening(
         evidence,
@@ -159,11 +157,30 @@ def _nameless(ground: Grounds, threshold: Mapping[tuple[int, ...], float]) -> di
 
 
 def _worth(model: Model, found: Fit, experiments: Sequence[Experiment], judged: Sequence[Judged]) -> dict[str, float]:
-    """Share of its channel's residual at which a part of a law that is there amounts to `MATERIAL` of the torque."""
+    """`WORTH`, or more beside what is there: `IDEALISED` of what slings and booms do, and for what only changes the shape
+    of a law `MATERIAL` of the torque."""
     left, measured = channel_rms(found.assembly, experiments, found.theta)
-    share = (MATERIAL * measured / np.maximum(left, 1e-300)) ** 2
-    parts = [j for j in judged if refines(model, j.placed)]
-    return {j.placed.key: max(WORTH, float(share[list(j.channels)].min())) for j in parts}
+    left = np.maximum(left, 1e-300)
+    idealised = (IDEALISED * _hung(found, experiments) / left) ** 2
+    material = (MATERIAL * measured / left) ** 2
+    worth = {}
+    for j in judged:
+        reached = list(j.channels)
+        part = float(material[reached].min()) if refines(model, j.placed) else 0.0
+        worth[j.placed.key] = max(WORTH, part, float(idealised[reached].mean()))
+    return worth
+
+
+def _hung(found: Fit, experiments: Sequence[Experiment]) -> Array:
+    """RMS torque of what slings and booms do in the analysis band, one beside the other (J,)."""
+    assembly = found.assembly
+    energy = np.zeros(len(assembly.tree.joints))
+    for p in assembly.placed:
+        if p.effect.at in ("sling", "boom"):
+            bare = assembly.keep([x for x in assembly.placed if x is not p], found.theta)
+            parts = [e.all_to_band(assembly.torque(e, found.theta) - bare.torque(e, bare.start)) for e in experiments]
+            energy += np.mean(np.concatenate(parts) ** 2, axis=0)
+    return np.sqrt(energy)
 
 
 def _limits(assembly: Assembly, evidence: Evidence, j: Judged, needed: float, worth: float) -> list[Limit]:

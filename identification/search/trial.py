@@ -18,6 +18,10 @@ Option = tuple[Variant, dict[int, Parts]]
 MATERIAL = 0.015
 """Share of a channel's RMS torque below which a change of a law's shape, or something without a name, is not told."""
 
+IDEALISED = 0.05
+"""Share of what slings and booms do to a channel that their laws may have wrong: a carriage that follows is no lag of
+first order, a boom no spring without mass. What explains no more than that is not told from it."""
+
 WORTH = 0.05
 """Least share of its channels' residual energy that an effect must explain to be named."""
 
