@@ -157,8 +157,8 @@ def _nameless(ground: Grounds, threshold: Mapping[tuple[int, ...], float]) -> di
 
 
 def _worth(model: Model, found: Fit, experiments: Sequence[Experiment], judged: Sequence[Judged]) -> dict[str, float]:
-    """`WORTH`, or more beside what is there: `IDEALISED` of what slings and booms do, and for what only changes the shape
-    of a law `MATERIAL` of the torque."""
+    """`WORTH`, or more beside what is there: `IDEALISED` of what slings and booms do, and for what only changes the
+    shape of a law `MATERIAL` of the torque."""
     left, measured = channel_rms(found.assembly, experiments, found.theta)
     left = np.maximum(left, 1e-300)
     idealised = (IDEALISED * _hung(found, experiments) / left) ** 2
