@@ -78,7 +78,7 @@ def rig_torque(
     rig: Rig,
     motion: tuple[Array, Array, Array],
     friction: Mapping[str, Callable[[float], float]],
-    pull: Callable[[str, Array], float],
+    pull: Callable[[str, Array], ArrayLike],
     *,
     under_gravity: bool,
 ) -> Array:
@@ -91,7 +91,8 @@ def rig_torque(
     friction : mapping of joint to callable
         Force at each slide contact that the joint moves [N], of the joint's speed.
     pull : callable
-        ``(sling, velocity of its hang point) -> N``, upward, beyond the weight that it carries in balance.
+        ``(sling, velocity of its hang point) -> N``, upward or (3,), beyond the weight that it carries in balance;
+        asked sample after sample.
     under_gravity : bool
         Gravity and the slings' whole weights, or neither.
     """
@@ -102,9 +103,10 @@ def rig_torque(
         drake.move(q, qd)
         pushes: list[Push] = []
         for sling in rig.slings:
-            lift = pull(sling.name, drake.velocity(sling.link, sling.point)) + under_gravity * sling.weight
-            if lift:
-                pushes.append((sling.link, sling.point, lift * up))
+            beyond = np.asarray(pull(sling.name, drake.velocity(sling.link, sling.point)))
+            force = (beyond if beyond.shape else beyond * up) + under_gravity * sling.weight * up
+            if force.any():
+                pushes.append((sling.link, sling.point, force))
             joint = rig.joints[sling.link]
             for contact in sling.slide if joint.name in friction else ():
                 way = np.cross(joint.axis, contact) if joint.kind == "revolute" else joint.axis

@@ -39,9 +39,17 @@ def travel(seed, n=700):
 
 
 def recorded(path, seed, friction, pull, cells=()):
-    """Write what Drake gives for a travel, with noise; ``cells`` are slings whose tension is recorded."""
+    """Write what Drake gives for a travel, with noise; ``cells`` are slings whose tension is recorded.
+
+    ``pull`` gives a sling's force, or what makes one of its hang point's velocities, sample after sample.
+    """
     motion, rng = travel(seed), np.random.default_rng(seed + 100)
-    tau = rig_torque(RIG, motion, friction, lambda name, velocity: pull.get(name, 0.0), under_gravity=True)
+
+    def pulled(name, velocity):
+        force = pull.get(name, 0.0)
+        return force(velocity) if callable(force) else force
+
+    tau = rig_torque(RIG, motion, friction, pulled, under_gravity=True)
     tau += NOISE * rng.normal(size=tau.shape)
     columns = {f"q.joint{j + 1}": motion[0][:, j] + 1e-8 * rng.normal(size=len(tau)) for j in range(7)}
     columns |= {f"tau.joint{j + 1}": tau[:, j] for j in range(7)}
@@ -127,3 +135,26 @@ def test_diagnose_names_a_slide_and_a_sling(tmp_path):
     again = simulate(load_model(tmp_path / "found.toml"), tmp_path / "run1.csv")
     assert float(np.std(again["tau.joint2"])) > 0
     assert np.all(residual(load_model(tmp_path / "found.toml"), tmp_path / "run1.csv") < 5 * NOISE)
+
+
+def carriage(tension, lag, length=10.0, damping=0.8):
+    """Pull of a sling whose carriage follows as a servo of second order, and not of first as the tool's law."""
+    bandwidth = 2 * damping / lag
+    lead, speed = np.zeros(2), np.zeros(2)
+
+    def pull(velocity):
+        nonlocal lead, speed
+        steps = 50
+        for _ in range(steps):
+            speed = speed + PERIOD / steps * (bandwidth**2 * lead - 2 * damping * bandwidth * speed)
+            lead = lead + PERIOD / steps * (velocity[:2] - speed)
+        return np.append(-tension / length * lead, 0.0)
+
+    return pull
+
+
+def test_what_a_law_of_sway_has_wrong_is_given_no_name(tmp_path):
+    for k in range(2):
+        recorded(tmp_path / f"run{k}.csv", k, {}, {"sling9": carriage(500.0, 1.0)})
+    answer = diagnose(model(tmp_path, ""), [tmp_path / "run0.csv"], tmp_path / "run1.csv")
+    assert [(f.name, f.at) for f in answer.diagnosis.effects] == [("suspension_sway", "sling9")]

@@ -186,7 +186,7 @@ def _passes(result: Screening, j: Judged) -> bool:
     """Does a candidate pass every test?"""
     # What a disturbance drives is let into the motion up to a share, and looks like a late sensor.
     late = j.placed.effect.at == "sensor" and bool(j.placed.effect.states)
-    worth = DRIVEN if late else result.worth[j.placed.key]
+    worth = max(result.worth[j.placed.key], DRIVEN if late else 0.0)
     if j.score <= result.threshold[j.channels] or j.explained < worth:
         return False
     return reliably_positive(j.case.fresh_gains())
