@@ -15,6 +15,7 @@ from .fitting.fit import Fit, channel_rms
 from .fitting.floating_terms import momentum_floor
 from .reliability import probability as reliability
 from .search.bursts import bursts
+from .search.candidates import has_whole_law
 from .search.forward import Found, Taken
 from .search.locate import locate
 from .search.trial import MATERIAL
@@ -28,7 +29,7 @@ NAMELESS = 0.1
 
 PLAIN = 0.5
 """... if they also amount to `MATERIAL` of the channel's RMS torque, or if they are this much of the residual: on a
-joint that carries a lot, plain and yet a small share of it."""
+joint that carries a lot, plain and yet a small share of it. With a whole friction law there, that may be its form."""
 
 
 def report_on(
@@ -88,7 +89,9 @@ def report_on(
         )
         for c, b in unsteady.items()
     ]
-    loud = {c for c, x, _ in said if size(c, x) >= MATERIAL} | {c for c, x in nameless.items() if x.share > PLAIN}
+    plain = {c for c, x in nameless.items() if x.share > PLAIN}
+    formed = {c for c in plain if has_whole_law(final.assembly.placed, model.joints[c])}
+    loud = {c for c, x, _ in said if size(c, x) >= MATERIAL} | (plain - formed)
     description = "; ".join(text for c, _, text in said if c in loud)
     if findings:
         verdict = "missing_physics"

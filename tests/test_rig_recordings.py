@@ -1,6 +1,7 @@
 """Recordings of a suspension rig that Drake made: what identify and diagnose find in them."""
 
 import json
+from typing import Any
 
 import numpy as np
 import pytest
@@ -45,7 +46,7 @@ def recorded(path, seed, friction, pull, cells=()):
     """
     motion, rng = travel(seed), np.random.default_rng(seed + 100)
 
-    def pulled(name, velocity):
+    def pulled(name: str, velocity: np.ndarray) -> Any:
         force = pull.get(name, 0.0)
         return force(velocity) if callable(force) else force
 

@@ -19,11 +19,12 @@ from snarelab.recordings.write import write_recording
 from snarelab.studies.zero_g_rig.alike import compare
 from snarelab.studies.zero_g_rig.explain import (
     DRIFT,
-    MEASUREMENTS,
     PAYLOAD,
+    SETS,
     TENSION,
     TOGETHER,
     TWIST,
+    after,
     alike_in_words,
     explanations,
     remedy,
@@ -108,9 +109,15 @@ def test_what_is_told_apart_is_said_with_its_share(study: Friction):
     by = {(p.name, p.other): p.mimicked for p in pairs}
     for alone in (TENSION, PAYLOAD, DRIFT):
         assert by[TWIST, alone] <= by[TWIST, TOGETHER] + 1e-9
-    for measured in MEASUREMENTS:
-        assert by[TWIST, f"{TOGETHER}, with {measured}"] <= by[TWIST, TOGETHER] + 1e-9
-    assert f"{100 * by[TWIST, TENSION]:.0f} % by {TENSION}" in remedy(pairs, "link3")
+    for some in SETS:
+        assert by[TWIST, after(some)] <= by[TWIST, TOGETHER] + 1e-9
+    both = "load cells on the slings and the payload weighed"
+    assert by[TWIST, f"{TOGETHER}, with {both}"] == pytest.approx(by[TWIST, DRIFT])  # nothing else is left
+    assert by[TWIST, DRIFT] < 0.5 < by[TWIST, TENSION]
+    words = remedy(pairs, "link3")
+    assert f"{100 * by[TWIST, TENSION]:.0f} % by {TENSION}" in words
+    assert f"{100 * by[TWIST, DRIFT]:.0f} % with {both}" in words
+    assert "track the twist of link3" in words
     assert all(" can pose as " in text for text in alike_in_words(pairs))
 
 

@@ -1,5 +1,6 @@
 """Which effects could be missing, at which places, and the columns each would add to the torque."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, product
 
@@ -84,10 +85,15 @@ def library(model: Model) -> list[Placed]:
     return found
 
 
+def has_whole_law(effects: Sequence[Placed], at: str) -> bool:
+    """Is there a whole friction law among effects at a place, free in every parameter?"""
+    return any(p.effect.name in (SLIDE, "makkar_friction") and p.at == at and not p.hold for p in effects)
+
+
 def refines(model: Model, placed: Placed) -> bool:
-    """Is an effect all in a whole friction law that the model has at its place, and only changes that law's shape?"""
-    there = {p.effect.name for p in model.effects if p.at == placed.at and not p.hold}
-    return placed.effect.name in _makkar() and not there.isdisjoint((SLIDE, "makkar_friction"))
+    """Is an effect a curve over the joint's speed, where the model has a whole friction law whose shape it changes?"""
+    curve = placed.effect.name in (*_makkar(), "quadratic_friction")
+    return curve and has_whole_law(model.effects, placed.at)
 
 
 def _makkar() -> tuple[str, ...]:

@@ -1,6 +1,7 @@
 """What the paper's own data could not have told apart, and which extra measurement would."""
 
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,10 @@ MEASUREMENTS = {
     "the payload weighed": PAYLOAD,
     "the sensors' zeros checked at the end": DRIFT,
 }
-"""An extra measurement, and the explanation that it settles."""
+"""An extra measurement, and the explanation that it rules out."""
+
+SETS = [some for size in range(1, len(MEASUREMENTS)) for some in combinations(MEASUREMENTS, size)]
+"""Measurements that leave something to be told apart, single ones first."""
 
 ALIKE = 0.8
 """Two explanations are told apart badly where one can take this share of the other's energy."""
@@ -60,13 +64,19 @@ def explanations(rig: Rig, boom: str) -> dict[str, list[Placed]]:
 
 
 def tell_apart(rig: Rig, friction: Friction, boom: str) -> list[Alike]:
-    """Every pair of explanations, and what all but the first can do together, with and without each measurement."""
+    """Every pair of explanations, and what all but the first can do together, with and without measurements."""
     named = explanations(rig, boom)
     others = {name: placed for name, placed in named.items() if name != TWIST}
     named[TOGETHER] = [p for placed in others.values() for p in placed]
-    for measured, known in MEASUREMENTS.items():
-        named[f"{TOGETHER}, with {measured}"] = [p for name, placed in others.items() if name != known for p in placed]
+    for some in SETS:
+        known = [MEASUREMENTS[measured] for measured in some]
+        named[after(some)] = [p for name, placed in others.items() if name not in known for p in placed]
     return compare(friction.fit, named, friction.experiments, np.full(rig.n_joints, NOISE))
+
+
+def after(some: Sequence[str]) -> str:
+    """What is left of all explanations but the first after some measurements."""
+    return f"{TOGETHER}, with {' and '.join(some)}"
 
 
 def alike_in_words(pairs: Sequence[Alike]) -> list[str]:
@@ -80,14 +90,14 @@ def alike_in_words(pairs: Sequence[Alike]) -> list[str]:
 
 
 def remedy(pairs: Sequence[Alike], boom: str) -> str:
-    """What torques and joint angles alone could not have settled, and the measurement that would help most."""
+    """What torques and joint angles alone could not have settled, and the fewest measurements that would."""
     taken = {p.other: p.mimicked for p in pairs if p.name == TWIST}
     shares = ", ".join(f"{100 * taken[other]:.0f} % by {other}" for other in (TENSION, PAYLOAD, DRIFT))
-    left = {measured: taken[f"{TOGETHER}, with {measured}"] for measured in MEASUREMENTS}
-    best = min(left, key=lambda measured: left[measured])
-    settles = "what would help most is" if left[best] < ALIKE else "no single measurement settles it, not even"
+    best = [min((some for some in SETS if len(some) == n), key=lambda some: taken[after(some)]) for n in (1, 2)]
+    steps = "; ".join(f"{100 * taken[after(some)]:.0f} % with {' and '.join(some)}" for some in best)
+    direct = get_effect("link_torsion").experiment.format(at=boom)
     return (
         f"From torques and joint angles alone, as the paper had them, {TWIST} ({boom}) can be mimicked to {shares}, "
-        f"and to {100 * taken[TOGETHER]:.0f} % by all of these; {settles} {best}, with which {100 * left[best]:.0f} % "
-        "remain."
+        f"and to {100 * taken[TOGETHER]:.0f} % by all of these. The best of further measurements leave {steps}. "
+        f"What settles it directly: {direct}."
     )

@@ -1,0 +1,63 @@
+"""The order in which a held-out recording rules effects out: the one missed least goes first, with few trials."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from snarelab.identification import confirm as module
+from snarelab.identification.confirm import _Missed, confirm
+
+N = 6
+
+
+def eager(rise) -> set[int]:
+    """What is left when every effect is tried again after each that went."""
+    left = set(range(N))
+    while left:
+        weakest = min(left, key=lambda k: rise(k, left))
+        if rise(weakest, left) > 1:
+            break
+        left.remove(weakest)
+    return left
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_trying_few_again_rules_out_what_trying_all_again_would(seed, monkeypatch):
+    """Effects that stand in for each other are missed more once the other is gone: then the least missed is found
+    without trying all."""
+    rng = np.random.default_rng(seed)
+    alone, stands_in = rng.uniform(0.0, 1.3, N), rng.uniform(0.0, 0.7, (N, N))
+    tried = []
+
+    def rise(key: int, left: set[int]) -> float:
+        return float(alone[key] + sum(stands_in[key, k] for k in range(N) if k not in left))
+
+    def missed(taken: Any, final: Any, *_: Any) -> _Missed:
+        tried.append(taken.judged.placed.key)
+        return _Missed(rise(tried[-1], final), (0.0, 1.0), final - {tried[-1]})
+
+    monkeypatch.setattr(module, "_missed", missed)
+    taken = tuple(SimpleNamespace(judged=SimpleNamespace(placed=SimpleNamespace(key=k))) for k in range(N))
+    found: Any = SimpleNamespace(fit=frozenset(range(N)), taken=taken)
+    done = confirm(found, [], [], lambda _: None)
+    left = {t.judged.placed.key for t in done.confirmed}
+    assert left == eager(rise) == done.final
+    assert {t.judged.placed.key for t in done.rejected} == set(range(N)) - left
+    assert set(done.trials) == left
+    rounds = len(done.rejected)
+    assert len(tried) <= N + sum(range(N - rounds, N))  # no more than trying all again
+
+
+def test_of_two_twins_one_stays(monkeypatch):
+    def missed(taken: Any, final: Any, *_: Any) -> _Missed:
+        key = taken.judged.placed.key
+        return _Missed(0.2 if len(final) == 2 else 5.0, (0.1, 0.4), final - {key})
+
+    monkeypatch.setattr(module, "_missed", missed)
+    taken = tuple(SimpleNamespace(judged=SimpleNamespace(placed=SimpleNamespace(key=k))) for k in "ab")
+    found: Any = SimpleNamespace(fit=frozenset("ab"), taken=taken)
+    done = confirm(found, [], [], lambda _: None)
+    assert len(done.confirmed) == len(done.rejected) == 1
+    assert done.trials == {done.confirmed[0].judged.placed.key: (0.1, 0.4)}
