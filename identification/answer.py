@@ -19,7 +19,7 @@ from .search.candidates import has_whole_law
 from .search.forward import Found, Taken
 from .search.locate import locate
 from .search.trial import MATERIAL
-from .wording import evidence_sentence, experiment_sentence, percent, verdict_sentence
+from .wording import evidence_sentence, experiment_sentence, listed, percent, verdict_sentence
 
 Array = NDArray[np.float64]
 
@@ -95,7 +95,9 @@ def report_on(
     description = "; ".join(text for c, _, text in said if c in loud)
     if findings:
         verdict = "missing_physics"
-        remainder = f" Still unnamed: {description}." if description else ""
+        remainder = (
+            f" Part of what is left on {listed([channels[c] for c in sorted(loud)])} has no name." if loud else ""
+        )
     else:
         verdict = "unknown_effect" if description else "adequate"
         remainder = f" {description[:1].upper()}{description[1:]}." if description else ""

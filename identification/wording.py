@@ -46,9 +46,9 @@ def verdict_sentence(findings: Sequence[Finding], fit: Sequence[ChannelFit], rem
         by_name: dict[str, list[str]] = {}
         for f in findings:
             by_name.setdefault(f.name, []).append(f.at)
-        named = [f"{words(name)} at {_listed(places)}" for name, places in by_name.items()]
+        named = [f"{words(name)} at {listed(places)}" for name, places in by_name.items()]
         return (
-            f"The model leaves out {_listed(named)}. With that added, the error of {worst.channel} on the "
+            f"The model leaves out {listed(named)}. With that added, the error of {worst.channel} on the "
             f"recording that "
             f"the fit never saw falls from {before} to {after}.{remainder}"
         )
@@ -60,7 +60,8 @@ def verdict_sentence(findings: Sequence[Finding], fit: Sequence[ChannelFit], rem
     )
 
 
-def _listed(items: Sequence[str]) -> str:
+def listed(items: Sequence[str]) -> str:
+    """``a, b and c``."""
     if len(items) < 2:
         return "".join(items)
     return ", ".join(items[:-1]) + " and " + items[-1]

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from diagnoses import missing_physics, spelt
 
 from snarelab.identification.report.curves import binned
+from snarelab.identification.report.findings import missing
 from snarelab.identification.report.words import chance, number, percent, spans, unit_words, with_std, words
 from snarelab.report.drawing import thinned
 
@@ -69,3 +71,10 @@ def test_numbers_and_units_in_print() -> None:
     assert [unit_words(u) for u in ("N*m*s/rad", "kg*m**2", "s^-1")] == ["N·m·s/rad", "kg·m²", "s⁻¹"]
     assert [words(n) for n in ("coulomb_friction", "joint_elasticity")] == ["Coulomb friction", "joint elasticity"]
     assert spans(((80.1, 96.44), (100.0, 101.0))) == "80.1–96.4, 100.0–101.0 s"
+
+
+def test_what_has_no_name_stands_below_what_has() -> None:
+    title, content = missing(spelt("a < b"))[1:]
+    assert title == "What is missing"
+    assert content.index("at a &lt; b</h3>") < content.index("<h3>Without a name</h3>\n<p>a &lt; b</p>")
+    assert "Without a name" not in missing(missing_physics())[2]

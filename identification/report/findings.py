@@ -37,10 +37,13 @@ def missing(diagnosis: Diagnosis) -> tuple[str, str, str]:
     """What is missing, one card an effect; the detection limits or the description where there is nothing to name."""
     if diagnosis.verdict == "adequate":
         return "missing", "What would have been seen", detection_limits(diagnosis)
+    text = paragraph(diagnosis.description)
     if diagnosis.verdict == "unknown_effect":
-        text = paragraph(diagnosis.description)
         return "missing", "What is known about it", f'<article class="card">{text}</article>\n'
-    return "missing", "What is missing", "".join(_card(finding) for finding in diagnosis.effects)
+    cards = "".join(_card(finding) for finding in diagnosis.effects)
+    if diagnosis.description:
+        cards += f'<article class="card"><h3>Without a name</h3>\n{text}</article>\n'
+    return "missing", "What is missing", cards
 
 
 def where(diagnosis: Diagnosis) -> tuple[str, str, str]:
