@@ -18,7 +18,11 @@ _KINDS = {
     "reference": "Ours alone; there is no number to compare with.",
 }
 
-_PLAYBACK = """<p class="on-paper">The playback moves in the HTML file only: open it on a screen.</p>
+# Where there is room, the playback stays in sight beside the plots that it moves.
+_PLAYBACK = """<style>@media screen and (min-width:90rem){body>*{max-width:120rem}
+main{display:grid;grid-template-columns:minmax(40rem,1fr) minmax(36rem,1fr);column-gap:2rem}
+main>section{grid-column:1}#playback{grid-column:2;grid-row:1/span 99;position:sticky;top:0;align-self:start}}</style>
+<p class="on-paper">The playback moves in the HTML file only: open it on a screen.</p>
 <figure class="on-screen"><div class="plate"><iframe id="playback-frame" title="3-D playback"
 style="display:block;width:100%;height:min(38rem,85vh);border:0"></iframe></div>
 <figcaption>CAPTION</figcaption></figure>

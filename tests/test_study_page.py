@@ -109,3 +109,21 @@ def test_page_unpacks_its_playback_in_a_browser(
     # The view goes right by 20 pixels a key, and what is in it goes left.
     assert extent(shifted[700:], 0)[0] - extent(shown[700:], 0)[0] == pytest.approx(-0.1, abs=0.02)
     assert all(np.isfinite(extent(shown[700:], channel)[0]) for channel in range(3))
+
+
+@pytest.mark.parametrize(("width", "beside"), [(1500, True), (1200, False)])
+def test_on_a_wide_window_the_playback_stays_beside_the_plots(
+    browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, width: int, beside: bool
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    sections = [Section(name, (), [picture()] * 3) for name in ("One", "Two")]
+    path = write_page("demo", "Test", "It moves.", QUANTITIES, sections, moving().html(1.0))
+    with opened(browser, path, size=(width, 900)) as page:
+        last = page.locator(".plate img").last
+        last.scroll_into_view_if_needed()
+        frame, plot = page.locator("#playback-frame").bounding_box(), last.bounding_box()
+        assert frame is not None
+        assert plot is not None
+        assert (0 <= frame["y"] <= frame["y"] + frame["height"] <= 900) == beside
+        assert (frame["x"] > plot["x"] + plot["width"]) == beside
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
