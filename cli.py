@@ -112,7 +112,7 @@ def _identify(given: argparse.Namespace) -> None:
     from .models.model_file import load_model
     from .models.model_write import save_model
 
-    _writable([given.json, given.save_model], [*given.recordings, given.holdout])
+    _writable(given.json, [given.save_model], [*given.recordings, given.holdout])
     model = load_model(given.model)
     with Progress() as progress:
         held = [given.holdout] if given.holdout else ()
@@ -132,16 +132,18 @@ def _diagnose(given: argparse.Namespace) -> None:
     from .identification.search.next_experiment import next_experiment
     from .models.model_file import load_model
     from .models.model_write import save_model
-    from .recordings import write_recording
+    from .recordings import demand_suffix, write_recording
 
-    outputs = [given.json, given.report, given.save_model, given.next_experiment]
-    _writable(outputs, [*given.recordings, given.holdout])
+    outputs = [given.report, given.save_model, given.next_experiment]
+    _writable(given.json, outputs, [*given.recordings, given.holdout])
     model, planned = load_model(given.model), None
-    if given.next_experiment and model.system == "snare_capture":
-        raise InputError(
-            f"{given.model}: no motion is planned for a capture, leave --next-experiment out; "
-            "the result says for each rival what would part it"
-        )
+    if given.next_experiment:
+        demand_suffix(given.next_experiment)
+        if model.system != "arm":
+            raise InputError(
+                f"{given.model}: system = {model.system!r}; a motion is planned for system = 'arm' only, leave "
+                "--next-experiment out; the result says for each rival what would part it"
+            )
     with Progress() as progress:
         answer = diagnose(model, given.recordings, given.holdout, progress=progress, jobs=given.jobs)
         if given.next_experiment:
@@ -168,23 +170,29 @@ def _diagnose(given: argparse.Namespace) -> None:
 def _simulate(given: argparse.Namespace) -> None:
     from .identification.simulate import simulate
     from .models.model_file import load_model
-    from .recordings import write_recording
+    from .recordings import demand_suffix, write_recording
 
-    _writable([given.out], [given.motion])
+    _writable(None, [given.out], [given.motion])
+    demand_suffix(given.out)
     write_recording(simulate(load_model(given.model), given.motion), given.out)
 
 
-def _writable(outputs: Sequence[str | None], recordings: Sequence[str | None]) -> None:
-    """Refuse a place that cannot be written, or holds what is read, before any long work starts."""
+def _writable(numbers: str | None, outputs: Sequence[str | None], recordings: Sequence[str | None]) -> None:
+    """Refuse a place that cannot be written, or holds what is read, before any long work starts.
+
+    ``numbers`` is where the JSON goes; only that may be ``-``, standard output.
+    """
     taken = {Path(r).resolve(): "a recording that is read" for r in recordings if r}
-    for path in outputs:
-        if not path or path == "-":
+    for path in (numbers if numbers != "-" else None, *outputs):
+        if not path:
             continue
+        if path == "-":
+            raise InputError("-: only --json goes to standard output; name a file")
         place = Path(path).resolve()
         if not (place.parent.is_dir() and os.access(place.parent, os.W_OK)):
             raise InputError(f"{path}: its folder does not exist or cannot be written; make it first")
         if place.exists() and not place.is_file():
-            raise InputError(f"{path}: is there and no plain file; name a file, or - for standard output")
+            raise InputError(f"{path}: is there and no plain file; name a file")
         if place in taken:
             raise InputError(f"{path}: is also {taken[place]}; write somewhere else")
         taken[place] = "another output"

@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -33,16 +34,15 @@ def run(given: argparse.Namespace) -> None:
     """
     from dataclasses import replace
 
-    from ..recordings import write_recording
+    from ..recordings import demand_suffix, write_recording
     from .setup import Hosting, load_setup
 
     out = Path(given.out)
-    if out.suffix.lower() not in (".csv", ".parquet"):
-        raise InputError(f"{out}: a recording is written as .csv or .parquet, not {out.suffix!r}; change the suffix")
+    demand_suffix(out)
     if not out.parent.is_dir():
         raise InputError(f"{out}: its folder does not exist; make it first")
-    if not given.timeout > 0:
-        raise InputError(f"--timeout {given.timeout}: must be positive")
+    if not 0 < given.timeout < inf:
+        raise InputError(f"--timeout {given.timeout}: must be positive and finite")
     setup = load_setup(given.system, Hosting(not given.same_process, given.timeout))
     try:
         changes = {"step": given.step, "stop": given.until}

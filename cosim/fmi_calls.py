@@ -181,6 +181,8 @@ class Instance:
 
     def failed(self, name: str, status: int, when: str) -> None:
         """Raise StepError with what the FMU said last."""
+        if status < 0:
+            raise StepError(f"{self.name}: the FMU asks to end the simulation{when}")
         label = _STATUS[status] if status < len(_STATUS) else str(status)
         if status >= 4 or status == 3:
             self.dead = "fatal" if status == 4 else "error"

@@ -7,6 +7,7 @@ go back to the start of the step until the outputs that were assumed at its end 
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from types import TracebackType
 from typing import Literal, Self
 
@@ -104,7 +105,11 @@ class Master:
         self._record.add(self.time, self._past[0], self._bonds.residual)
 
     def step(self) -> float:
-        """Take one macro step; the time [s] reached. Raises StepError, and stays at the last good step."""
+        """Take one macro step; the time [s] reached.
+
+        Raises StepError. Where steps are repeated (iteration, step control) participants are then back at the last good
+        step; otherwise only the recording is.
+        """
         self._advance(self.size)
         return self.time
 
@@ -114,7 +119,7 @@ class Master:
         ``progress`` is called with the time after each step. Raises StepError where a participant fails; `result` then
         gives what there is up to the last good step.
         """
-        if not until >= self.time:
+        if not self.time <= until < math.inf:
             raise InputError(f"cannot run to {until} s: the time is {self.time:.9g} s already; give a later one")
         steps = (until - self.time) / self.size
         if self._fixed and abs(steps - round(steps)) > 1e-6:
@@ -174,6 +179,9 @@ class Master:
                 error = self._error(outputs, size) if self._control else 0.0
             except StepError as failure:
                 if self._control is None or size <= self._control.smallest:
+                    if states:
+                        with suppress(StepError):  # what failed may be past putting back; its own fault is told
+                            self._restore(states)
                     raise StepError(f"{failure}; last good step ended at {self.time:.9g} s") from failure
                 error, outputs = math.inf, None
                 reason = str(failure)

@@ -80,7 +80,8 @@ class Participant(ABC):
     def set_input_derivatives(self, first: np.ndarray, second: np.ndarray) -> None:
         """Derivatives of every input at the start of the step [unit/s, unit/s²], each shape (n_inputs,).
 
-        Called after each `set_inputs` where `input_order` is 1 (``second`` is then zero) or 2, and then only.
+        Called after each `set_inputs` where `input_order` is 1 (``second`` is then zero) or 2, and then only. Where it
+        is not called after one, inputs are those of the step's middle.
         """
         raise NotImplementedError(f"{self.name}: takes no input derivatives")  # optional: given if `input_order` > 0
 

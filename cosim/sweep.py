@@ -204,7 +204,7 @@ class Sweep:
         participant, order = self._participants[i], self._orders[i]
         participant.set_inputs(values)
         mean[:] = values
-        if participant.input_order:
+        if participant.input_order and not self._hold.middle:
             slopes = [factor * row[source] for row in held[1 : order + 1]]
             first, second = (*slopes, still, still)[:2]
             participant.set_input_derivatives(first, second)

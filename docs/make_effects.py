@@ -7,19 +7,6 @@ from pathlib import Path
 from snarelab.models.effect import Effect, Parameter
 from snarelab.models.effects import FAMILIES, effects
 
-PLANNED = {
-    "free-floating base": ("external_torque", "flexible_appendage", "propellant_slosh", "wheel_friction"),
-    "snare and contact": (
-        "contact_friction",
-        "contact_damping",
-        "contact_stiffness",
-        "cable_damping",
-        "cable_pretension",
-        "umbilical_stiffness",
-    ),
-}
-"""Names that the vocabulary reserves. One that has become an effect is no longer shown as planned."""
-
 HEAD = """\
 # Effects
 
@@ -75,28 +62,20 @@ def page() -> str:
     parts = [HEAD]
     for family in FAMILIES:
         members = [e for e in effects().values() if e.family == family]
-        planned = [f"`{name}`" for name in PLANNED.get(family, ()) if name not in effects()]
         parts.append(f"## {family[:1].upper()}{family[1:]}\n")
-        if members:
-            heads = "| effect | where | law | parameters | source |\n| --- | --- | --- | --- | --- |"
-            parts.append("\n".join([heads, *map(_row, members)]) + "\n")
-        if planned:
-            parts.append(f"Not yet: {', '.join(planned)}.\n")
+        heads = "| effect | where | law | parameters | source |\n| --- | --- | --- | --- | --- |"
+        parts.append("\n".join([heads, *map(_row, members)]) + "\n")
     parts.append(CONFUSIONS + "\n".join(_confusions()) + "\n")
     parts.append(EXPERIMENTS + "\n".join(map(_experiment, effects().values())) + "\n")
     return "\n".join(parts)
 
 
 def families() -> str:
-    """The README's table: what can be named, and which names are kept for later."""
-    rows = []
-    for family in FAMILIES:
-        now = [f"`{e.name}`" for e in effects().values() if e.family == family]
-        later = [f"`{name}`" for name in PLANNED.get(family, ()) if name not in effects()]
-        rows.append([family, " ".join(now), " ".join(later)])
-    heads = ["family", "can be named", "not yet"][: 3 if any(row[2] for row in rows) else 2]
-    lines = [_cells(*heads), _cells(*["---"] * len(heads)), *(_cells(*row[: len(heads)]) for row in rows)]
-    return "\n".join(lines) + "\n"
+    """The README's table: what can be named."""
+    rows = [
+        _cells(family, " ".join(f"`{e.name}`" for e in effects().values() if e.family == family)) for family in FAMILIES
+    ]
+    return "\n".join([_cells("family", "can be named"), _cells("---", "---"), *rows]) + "\n"
 
 
 def _row(effect: Effect) -> str:

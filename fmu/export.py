@@ -49,6 +49,8 @@ def export(what: str, version: int, out: str | Path, inverse: bool = False, stif
         raise InputError(f"{out}: its folder does not exist or cannot be written; make it first")
     if what.endswith(".toml") or Path(what).is_file():
         model = load_model(what)
+        if stiff is not None and (inverse or isinstance(model.tree, SnareTree)):
+            raise InputError(f"{what}: nothing is integrated that --integrator could be for; leave it out")
         if isinstance(model.tree, SnareTree):
             _export_capture(model, model.tree, version, out, inverse)
             return
@@ -56,6 +58,8 @@ def export(what: str, version: int, out: str | Path, inverse: bool = False, stif
         return
     if inverse:
         raise InputError(f"{what}: --inverse is for model files (.toml)")
+    if stiff is not None:
+        raise InputError(f"{what}: --integrator is for the arms of model files (.toml); leave it out")
     if what in ELEMENTS:
         write_fmu(ELEMENTS[what](), out, version)
     elif what in participant_names():

@@ -62,7 +62,7 @@ def diagnose(
     recordings : sequence of path
         Fitted and searched.
     holdout : path
-        Opened for the proof only.
+        For the proof only: nothing that is fitted or chosen before step 6 depends on it.
     progress : callable
         Told in a few words what is under way.
     seed : int
@@ -108,7 +108,7 @@ def diagnose(
         assembly = final.assembly.keep([p for p in final.assembly.placed if p.key not in gone], final.theta)
         final = fit(assembly, fitted(assembly, train), start=carry(final, assembly), multi_start=False)
     found = replace(found, taken=(*confirmed, *rejected.values()))
-    final, inertia = physical(final, train)
+    final, inertia = physical(final, fitted(final.assembly, train))
     steps = _steps(found, confirmed, final, train, locked)
     diagnosis = report_on(model, found, confirmed, doubtful, final, trials, steps, train, locked)
     values = {**model.values, **final.assembly.values(final.theta), **inertial_values(model, inertia)}

@@ -151,7 +151,7 @@ class Diagnosis:
     model : str
         Model's name.
     effects : tuple of Finding
-        Ordered by how much each explains.
+        In the order in which the search took them: what explained most of what was left, first.
     location : tuple of Location
     fit : tuple of ChannelFit
     steps : tuple of Step

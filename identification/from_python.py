@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 import pandas as pd
+import pyarrow as pa
 import xarray as xr
 
 from ..errors import InputError
@@ -205,15 +206,21 @@ def _as_files(recordings: Sequence[RecordingLike]) -> Iterator[list[str | Path]]
                 written[id(recording)] = recording
                 continue
             path = Path(folder) / f"recording{k}.parquet"
-            if isinstance(recording, pd.DataFrame):
-                recording.to_parquet(path)
-            elif isinstance(recording, xr.Dataset):
-                write_recording(recording, path)
-            else:
-                raise InputError(
-                    f"recording {k}: is a {type(recording).__name__}; give a path, an xarray.Dataset or a "
-                    "pandas.DataFrame"
-                )
+            try:
+                if isinstance(recording, pd.DataFrame):
+                    recording.to_parquet(path)
+                elif isinstance(recording, xr.Dataset):
+                    write_recording(recording, path)
+                else:
+                    raise InputError(
+                        f"recording {k}: is a {type(recording).__name__}; give a path, an xarray.Dataset or a "
+                        "pandas.DataFrame"
+                    )
+            except InputError:
+                raise
+            except (ValueError, TypeError, pa.ArrowException) as error:
+                said = " ".join(str(error).split())
+                raise InputError(f"recording {k}: is no table of numbers: {said}; give a column a signal") from None
             written[id(recording)] = path
         try:
             yield [written[id(recording)] for recording in recordings]

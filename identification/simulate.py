@@ -25,8 +25,8 @@ def simulate(model: Model, motion: str | Path | None) -> xr.Dataset:
     model : Model
         Its file must hold values of all parameters that its effects have; `identify` or `diagnose` saves such a file.
     motion : path or None
-        Recording with the position of every joint; its torque is only used to choose the analysis band. A capture
-        needs none (`simulate_capture`).
+        Recording with the position of every joint; a recorded torque is not used. A capture needs none
+        (`simulate_capture`).
 
     Returns
     -------
@@ -44,7 +44,7 @@ def simulate(model: Model, motion: str | Path | None) -> xr.Dataset:
         return simulate_capture(model, motion)
     if motion is None:
         raise InputError(f"{model.path}: system = {model.system!r} follows a motion; give --motion RECORDING")
-    read = [] if isinstance(tree, FloatingTree) else load_experiments(model, [motion], RigidBody(tree))
+    read = [] if isinstance(tree, FloatingTree) else load_experiments(model, [motion], RigidBody(tree), torque=False)
     inertial = [f"inertia.{link.name}.{name}" for link in model.tree.links for name in INERTIAL]
     model.demand_values(*(inertial if model.inertia == "free" else ()))
     if isinstance(tree, FloatingTree):

@@ -71,9 +71,12 @@ def find_compiler(named: str, search_path: str) -> tuple[tuple[str, ...], str]:
     if named == "none":
         raise OSError("SNARELAB_CC is 'none'")
     for candidate in [named] if named else ["cc", "gcc", "clang"]:
-        program, *options = shlex.split(candidate)
-        found = shutil.which(program, path=search_path)
-        if found:
-            run = subprocess.run([found, "--version"], capture_output=True, text=True, check=True)
-            return (found, *options), run.stdout
+        try:
+            program, *options = shlex.split(candidate)
+            found = shutil.which(program, path=search_path)
+            if found:
+                run = subprocess.run([found, "--version"], capture_output=True, text=True, check=True)
+                return (found, *options), run.stdout
+        except (ValueError, subprocess.SubprocessError) as error:
+            raise OSError(f"the C compiler '{candidate}' cannot be run: {error}") from None
     raise OSError(f"SNARELAB_CC is '{named}', which is not found" if named else "no cc, gcc or clang on PATH")

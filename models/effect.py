@@ -38,8 +38,8 @@ class Parameter:
     name : str
         Field's word, snake_case; with the effect's name and place it is unique in a model.
     unit : str
-        Unit with ``T`` for the joint's torque unit (N·m or N) and ``S`` for its position unit (rad or m),
-        for example ``"T*s/S"`` for a viscous coefficient; pint's spelling otherwise.
+        Unit with ``T`` for the joint's torque unit (N·m or N), ``S`` for its position unit (rad or m) and ``U`` for the
+        unit of a sensor's channel, for example ``"T*s/S"`` for a viscous coefficient; pint's spelling otherwise.
     zero : float
         The value at which the effect vanishes (an amplitude), or a usual value (a shape).
     low, high : float

@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..files import toml_table
 from ..recordings.signals import FORMS, Signal, is_signal, joint_of
 from .effects import get_effect
-from .floating.tree import read_floating
+from .floating.tree import n_carriers, read_floating
 from .model import Model, Placed, places
 from .rig.file import read_slings
 from .rig.rig import Rig, built_in_rig
@@ -155,12 +155,12 @@ def _placed(path: Path, entries: Any, tree: Tree) -> tuple[Placed, ...]:
         if extra:
             raise InputError(f"{path}: effects: {name} has {sorted(extra)[0]!r}; allowed are name, at, hold")
         at = entry.get("at") if isinstance(entry, dict) else None
-        allowed = everywhere
+        allowed, encoded = everywhere, tree.joints[n_carriers(tree) :]
         if effect.at == "sensor" and effect.states:
             # A late position shows as an early torque; what else an encoder does would be read as torque.
-            allowed += tuple(f"q.{j.name}" for j in tree.joints)
+            allowed += tuple(f"q.{j.name}" for j in encoded)
         if effect.at == "sensor":
-            allowed += tuple(f"q_link.{j.name}" for j in tree.joints)
+            allowed += tuple(f"q_link.{j.name}" for j in encoded)
         if at is not None and at not in allowed:
             raise InputError(f"{path}: {name} at {at!r}; this model has {', '.join(allowed)}")
         hold = entry.get("hold", []) if isinstance(entry, dict) else []

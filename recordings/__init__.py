@@ -5,7 +5,7 @@ from .read import read_recording
 from .signals import JointKind, Signal, default_unit
 from .timebase import Sampling, sampling
 from .units import UNITS
-from .write import write_recording
+from .write import demand_suffix, write_recording
 
 __all__ = [
     "UNITS",
@@ -13,6 +13,7 @@ __all__ = [
     "Sampling",
     "Signal",
     "default_unit",
+    "demand_suffix",
     "find_recording",
     "read_recording",
     "sampling",

@@ -109,8 +109,9 @@ def condition(dataset: xr.Dataset, joints: Sequence[str], band: float | None = N
     joints : sequence of str
         Joint names, in the model's order.
     band : float, optional
-        Edge of the analysis band [Hz]. By default the lowest of 40 Hz, half the sample rate over 1.25, and the band in
-        which the noise of the derived acceleration stays below a tenth of its signal on every moving joint.
+        Edge of the analysis band [Hz], lowered to a whole number of samples for one: a quarter of the sample rate at
+        most. By default the lowest of 40 Hz, that, and the band in which the noise of the derived acceleration stays
+        below a tenth of its signal on every moving joint.
 
     Raises
     ------

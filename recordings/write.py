@@ -10,14 +10,20 @@ from ..errors import InputError
 from ..files import written_whole
 
 
+def demand_suffix(path: str | Path) -> None:
+    """Refuse a name that no recording is written under (InputError), before there is anything to write."""
+    suffix = Path(path).suffix
+    if suffix.lower() not in (".csv", ".parquet"):
+        raise InputError(f"{path}: a recording is written as .csv or .parquet, not {suffix!r}; change the suffix")
+
+
 def write_recording(dataset: xr.Dataset, path: str | Path) -> None:
     """Write a recording as CSV or Parquet, by the suffix of ``path``: time first, plain names, SI units, all digits.
 
     The file appears whole or not at all. Raises InputError for another suffix, or where the file cannot be written.
     """
+    demand_suffix(path)
     path = Path(path)
-    if path.suffix.lower() not in (".csv", ".parquet"):
-        raise InputError(f"{path}: a recording is written as .csv or .parquet, not {path.suffix!r}; change the suffix")
     table = dataset.to_dataframe().reset_index()
     with written_whole(path) as part:
         if path.suffix.lower() == ".csv":

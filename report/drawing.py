@@ -9,9 +9,11 @@ import numpy as np
 from matplotlib import style
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
-from ..identification.diagnosis import Array
 from .time_axes import is_over_time, over_time, with_time_axes
+
+Array = NDArray[np.float64]
 
 # Okabe & Ito (2008), Color universal design.
 MEASURED = "#000000"

@@ -6,11 +6,9 @@ name what is missing; then diagnoses the model that came out. Recordings: Janot,
 engine than ours, is diagnosed instead.
 """
 
-import json
 import sys
 import time
 from pathlib import Path
-from typing import Any
 
 from ..errors import InputError
 from ..exit_status import status_of
@@ -22,9 +20,10 @@ from ..models.model_file import load_model
 from ..models.model_write import save_model
 from ..progress import stages
 from ..recordings import find_recording
+from .outcome import FOLDER, Quantity, write_json, write_result
 
 HERE = Path(__file__).parent
-OUT = Path("build/studies/emps")
+OUT = FOLDER / "emps"
 
 PUBLISHED = {
     "mass": (95.1089, "kg"),
@@ -42,7 +41,7 @@ def main() -> int:
     """Run the study; leaves report, numbers and the improved model in ``build/studies/emps``."""
     begun = time.monotonic()
     OUT.mkdir(parents=True, exist_ok=True)
-    quantities: list[dict[str, Any]] = []
+    quantities: list[Quantity] = []
     try:
         train, holdout = find_recording("DATA_EMPS.mat"), find_recording("DATA_EMPS_PULSES.mat")
         model = HERE / "emps" / "viscous.toml"
@@ -60,21 +59,14 @@ def main() -> int:
     _say(f"  {again.sentence}")
     last = found.steps[-1]
     quantities += [
-        _quantity("relative_error_fitted", "1", None, last.train),
-        _quantity("relative_error_held_out", "1", None, last.holdout),
-        _quantity("named", "", None, [f"{e.name} at {e.at}" for e in found.effects]),
-        _quantity("second_verdict", "", None, again.verdict),
+        Quantity("relative_error_fitted", "1", last.train, "reference"),
+        Quantity("relative_error_held_out", "1", last.holdout, "reference"),
+        Quantity("named", "", [f"{e.name} at {e.at}" for e in found.effects], "reference"),
+        Quantity("second_verdict", "", again.verdict, "reference"),
     ]
-    result = {
-        "study": "emps",
-        "command": "make study-emps",
-        "recording": train.name,
-        "seconds": round(time.monotonic() - begun, 1),
-        "quantities": quantities,
-        "steps": [vars(s) for s in found.steps],
-    }
-    for name, content in (("diagnosis.json", found.to_json()), ("result.json", result)):
-        (OUT / name).write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    write_json(OUT / "diagnosis.json", found.to_json())
+    more = {"recording": train.name, "steps": [vars(s) for s in found.steps]}
+    write_result("emps", quantities, time.monotonic() - begun, more)
     write_report(found, OUT / "report.html")
     _say(f"\n{found.sentence}\nReport: {(OUT / 'report.html').resolve()}")
     return 0
@@ -89,26 +81,20 @@ def _diagnose(model: Path, train: Path, holdout: Path) -> Answer:
     return diagnose(load_model(model), [train], holdout, progress=stages(_say))
 
 
-def _published(train: Path, holdout: Path) -> list[dict[str, Any]]:
-    """Fit the published model and set its parameters beside the published ones."""
+def _published(train: Path, holdout: Path) -> list[Quantity]:
+    """Fit the published model and set its parameters beside the published ones; nothing is tuned to meet these."""
     found = identify(load_model(HERE / "emps" / "published.toml"), [train], [holdout]).to_json()
     _say(f"The published model, fitted here:\n  {'':<14}{'published':>12}{'ours':>12}{'difference':>12}")
     quantities = []
     for p in found["parameters"]:
         paper, unit = PUBLISHED[p["name"]]
-        quantities.append(_quantity(p["name"], unit, paper, p["value"]))
+        quantities.append(Quantity(p["name"], unit, p["value"], "predicted", paper))
         _say(f"  {p['name']:<14}{paper:>12.4f}{p['value']:>12.4f}{100 * (p['value'] / paper - 1):>11.2f} % {unit}")
     for role, paper in PUBLISHED_ERROR.items():
         ours = found["fit"]["tau.slide"][role]["relative"]
-        quantities.append(_quantity(f"relative_error_{role}", "1", paper, ours))
+        quantities.append(Quantity(f"relative_error_{role}", "1", ours, "predicted", paper))
         _say(f"  error, {role:<8}{100 * paper:>10.2f} %{100 * ours:>10.2f} %")
     return quantities
-
-
-def _quantity(name: str, unit: str, paper: float | None, ours: float | str | list[str]) -> dict[str, Any]:
-    """One line of result.json; nothing here is tuned to meet a published number."""
-    kind = "reference" if paper is None else "predicted"
-    return {"name": name, "unit": unit, "paper": paper, "ours": ours, "low": None, "high": None, "kind": kind}
 
 
 def _table(found: Diagnosis) -> str:

@@ -6,7 +6,6 @@ makers' own model. Recordings: Weigand et al. (2021), looked for in ``$SNARELAB_
 their publisher.
 """
 
-import json
 import sys
 import time
 from collections.abc import Sequence
@@ -32,7 +31,7 @@ from ..models.rigid_body import RigidBody
 from ..progress import stages
 from ..recordings import find_recording
 from .kuka_figures import MDEG, differences, left_over, pattern, rms, without
-from .outcome import FOLDER, Quantity, table, write_result
+from .outcome import FOLDER, Quantity, table, write_json, write_result
 from .page import Picture, Section, write_page
 
 HERE = Path(__file__).parent
@@ -66,7 +65,7 @@ def main() -> int:
     found = answer.diagnosis
     save_model(answer.model, folder / "model.toml", found.sentence)
     write_report(found, folder / "diagnosis.html")
-    (folder / "diagnosis.json").write_text(json.dumps(found.to_json(), indent=1) + "\n", encoding="utf-8")
+    write_json(folder / "diagnosis.json", found.to_json())
     write_result("kuka", quantities, time.monotonic() - begun, {"steps": [vars(s) for s in found.steps]})
     page = write_page("kuka", "KUKA KR 300: motor and link encoders", found.sentence, quantities, sections)
     print(f"{table(quantities)}\n\n{found.sentence}\nReport: {page.resolve()}")

@@ -48,7 +48,11 @@ def write_result(
         "quantities": [asdict(q) for q in quantities],
         **(extra or {}),
     }
-    path = folder / "result.json"
+    return write_json(folder / "result.json", content)
+
+
+def write_json(path: Path, content: Mapping[str, Any]) -> Path:
+    """Write a file of JSON, whole or not at all; returns its path."""
     with written_whole(path) as part:
         part.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     return path

@@ -12,6 +12,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..exit_status import status_of
+from ..files import written_whole
 from ..progress import Progress
 from ..report.html import page, paragraph
 from ..report.html import table as markup_table
@@ -21,7 +22,8 @@ from ..tolerance.run import run_study
 from ..tolerance.study import Study, load_study
 from .outcome import FOLDER, Quantity, table, write_result
 
-STUDIES = ("ground", "inspection")
+STUDIES = {"ground": "ground_", "inspection": ""}
+"""And what stands before the names of their quantities: without another word they are of the inspection case."""
 _FILES = Path(__file__).parents[1] / "tolerance"
 
 
@@ -31,15 +33,16 @@ def main() -> int:
     folder = FOLDER / "tolerance"
     folder.mkdir(parents=True, exist_ok=True)
     quantities, found = [], []
-    for name in STUDIES:
+    for name, prefix in STUDIES.items():
         results, content, seconds = _run(folder, load_study(_FILES / f"{name}.toml"))
-        quantities += _quantities(name, content)
+        quantities += _quantities(prefix, content)
         if seconds is not None:
-            quantities.append(Quantity(f"{name}_seconds_per_case", "s", seconds, "reference"))
+            quantities.append(Quantity(f"{prefix}seconds_per_case", "s", seconds, "reference"))
         found.append((content, results.folder.name))
         print(f"  {content['sentence']}", flush=True)
     sentences = " ".join(content["sentence"] for content, _ in found)
-    (folder / "report.html").write_text(_page(quantities, found), encoding="utf-8")
+    with written_whole(folder / "report.html") as part:
+        part.write_text(_page(quantities, found), encoding="utf-8")
     write_result("tolerance", quantities, time.monotonic() - begun, {"found": sentences})
     print(f"{table(quantities)}\n\n{sentences}\nReport: {(folder / 'report.html').resolve()}")
     return 0
@@ -57,13 +60,13 @@ def _run(folder: Path, study: Study) -> tuple[Results, dict[str, Any], float | N
     return results, summarise(study, results), seconds
 
 
-def _quantities(name: str, content: dict[str, Any]) -> list[Quantity]:
+def _quantities(prefix: str, content: dict[str, Any]) -> list[Quantity]:
     return [
-        _quantity(f"{name}_probability_at_paper", "1", content["probability_box"]),
-        _quantity(f"{name}_envelope_radial", "m", content["envelope_radial"]),
-        _quantity(f"{name}_envelope_angle", "rad", content["envelope_angle"]),
-        Quantity(f"{name}_undecided", "1", content["width"], "reference"),
-        Quantity(f"{name}_cases", "1", content["cases"], "reference"),
+        _quantity(f"{prefix}probability_at_paper", "1", content["probability_box"]),
+        _quantity(f"{prefix}envelope_radial", "m", content["envelope_radial"]),
+        _quantity(f"{prefix}envelope_angle", "rad", content["envelope_angle"]),
+        Quantity(f"{prefix}undecided", "1", content["width"], "reference"),
+        Quantity(f"{prefix}cases", "1", content["cases"], "reference"),
     ]
 
 
@@ -84,8 +87,8 @@ def _page(quantities: list[Quantity], found: list[tuple[dict[str, Any], str]]) -
         for q in quantities
     ]
     numbers = markup_table(
-        "Intervals of probabilities are exact at 95 % (Clopper and Pearson); those of an envelope run from the last "
-        "capture outwards that succeeded to the first that did not.",
+        "Of the inspection case, where no other is named. Intervals of probabilities are exact at 95 % (Clopper and "
+        "Pearson); those of an envelope run from the last capture outwards that succeeded to the first that did not.",
         ["quantity", "ours", "interval", "unit"],
         rows,
         numeric=(1, 2),

@@ -114,6 +114,11 @@ def test_a_mistake_names_the_table_and_not_where_it_was_put():
     assert len(str(caught.value).splitlines()) == 1
     with pytest.raises(snarelab.InputError, match="recording 1: is a int; give a path"):
         snarelab.identify(BUNDLED / "arm3.toml", [3])  # pyright: ignore[reportArgumentType]
+    with pytest.raises(snarelab.InputError, match="recordings: none is given"):
+        snarelab.identify(BUNDLED / "arm3.toml", [])
+    mixed = pd.DataFrame({"time": [0.0, 0.1], "q.joint1": [1.0, "stuck"]})
+    with pytest.raises(snarelab.InputError, match=r"recording 1: is no table of numbers.*stuck"):
+        snarelab.identify(BUNDLED / "arm3.toml", mixed)
 
 
 def test_public_names_are_typed_documented_and_listed():

@@ -205,3 +205,22 @@ def test_a_command_that_is_not_complete(arm_folder, capfd, given):
     said = capfd.readouterr().err
     assert said.count("\n") == 1
     assert said.endswith("--help\n")
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (["--next-experiment", "motion.txt"], ("motion.txt", ".csv or .parquet")),
+        (["--report", "-"], ("-: only --json goes to standard output",)),
+        (["--save-model", "-"], ("-: only --json goes to standard output",)),
+    ],
+)
+def test_an_output_that_cannot_be_is_refused_before_the_work(capfd, arm_folder, more, words):
+    given = ["diagnose", "arm.toml", "train.csv", "--holdout", "hold.csv", "--json", "out.json", *more]
+    refused(capfd, given, *words)
+
+
+def test_no_motion_is_planned_for_a_rig_and_that_is_said_first(capfd, arm_folder):
+    Path("rig.toml").write_text('system = "zero_g_rig"\n')
+    given = ["diagnose", "rig.toml", "train.csv", "--holdout", "hold.csv", "--next-experiment", "n.csv"]
+    refused(capfd, given, "rig.toml", "'zero_g_rig'", "leave --next-experiment out")

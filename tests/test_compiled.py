@@ -51,9 +51,9 @@ def check_doubled():
     assert doubled()(np.empty((0, 2)), np.array([0.5]))[1].shape == (0, 2, 3)
 
 
-@pytest.mark.parametrize("fault", ["absent", "cannot say its version", "cannot compile", "no cache"])
+@pytest.mark.parametrize("fault", ["absent", "no words", "cannot say its version", "cannot compile", "no cache"])
 def test_without_a_working_compiler_there_is_a_notice_and_the_same_answer(tmp_path, monkeypatch, fault):
-    name = {"absent": "no-such-compiler", "cannot say its version": "false"}.get(fault, "")
+    name = {"absent": "no-such-compiler", "no words": "'cc", "cannot say its version": "false"}.get(fault, "")
     if fault == "cannot compile":
         script = tmp_path / "broken-cc"
         script.write_text('#!/bin/sh\n[ "$1" = --version ] && exit 0\necho "no licence" >&2\nexit 1\n')

@@ -259,3 +259,43 @@ def test_program_keeps_its_own_period_whatever_the_macro_step():
 
     for step in (0.001, 0.005, 0.02, 0.05):
         np.testing.assert_allclose(counted(step), [0.02, 0.04, 0.06, 0.08, 0.1], atol=1e-12)
+
+
+def test_a_failed_iteration_leaves_everybody_at_the_last_good_step():
+    def breaks(x, v):
+        if x < 0.2:
+            raise ValueError("too close")
+        return 0.0 * v
+
+    parts = {"mass": LeftOscillator(), "part": formula(["x", "v"], ["force"], breaks)}
+    joined = [("part.force", "mass.force"), ("mass.x", "part.x"), ("mass.v", "part.v")]
+    master = Master(System(parts, joined), 0.01, iterate=True)
+    with pytest.raises(StepError, match="too close"):
+        master.run(1.0)
+    mass = master.system.participants["mass"]
+    assert master.value("mass.x") == mass.outputs()[mass.names("output").index("x")]
+
+
+class Bare(LeftOscillator):
+    """Takes derivatives, and notes what it is told of a step."""
+
+    input_order = 2
+
+    def __init__(self):
+        super().__init__()
+        self.told = []
+
+    def set_inputs(self, values):
+        self.told.append("inputs")
+        super().set_inputs(values)
+
+    def set_input_derivatives(self, first, second):
+        self.told.append("derivatives")
+
+
+@pytest.mark.parametrize(("hold", "told"), [("midpoint", False), ("constant", True), ("linear", True)])
+def test_who_takes_derivatives_is_told_none_of_the_middle_of_a_step(hold, told):
+    """Without them inputs are the middle's: where a body will be is then half a step ahead, not a whole one."""
+    mass = Bare()
+    Master(System({"left": mass, "right": RightOscillator()}, CONNECTIONS), 0.01, hold=hold).run(0.05)
+    assert ("derivatives" in mass.told) == told

@@ -103,6 +103,16 @@ def test_what_is_simulated_is_a_recording(folder):
         assert fit["train"]["relative"] < 2e-3
 
 
+def test_a_motion_without_torque_gives_the_same(folder):
+    lines = [line.split(",") for line in (folder / "train.csv").read_text().splitlines()]
+    kept = [i for i, name in enumerate(lines[0]) if not name.startswith("tau.")]
+    (folder / "motion.csv").write_text("\n".join(",".join(line[i] for i in kept) for line in lines) + "\n")
+    given = load_model(folder / "plain_found.toml")
+    with_torque, without = (simulate(given, folder / name) for name in ("train.csv", "motion.csv"))
+    for name in with_torque.data_vars:
+        np.testing.assert_array_equal(without[name], with_torque[name])
+
+
 def test_bounds_of_the_training_recording_do_not_bend_values_on_another_motion(folder):
     """The Stribeck speed is bounded by the joint's peak speed in training; a crawl has a lower one."""
     model = load_model(folder / "more_found.toml")

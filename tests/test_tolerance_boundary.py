@@ -1,12 +1,18 @@
 """The boundary of success against a shape that is known in closed form."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
 from scipy.stats import beta, qmc
 
+from snarelab.errors import InputError
 from snarelab.tolerance.boundary import fit_boundary
 from snarelab.tolerance.capture import Axis, Capture, Outcome
+from snarelab.tolerance.report import summarise
+from snarelab.tolerance.results import Results
+from snarelab.tolerance.run import run_case, space_boundary
 from snarelab.tolerance.study import Study, Success
 from snarelab.tolerance.summary import sensitivities, success_probability
 
@@ -82,3 +88,30 @@ def test_clopper_pearson_against_the_beta_quantiles(won, total):
     low = beta.ppf(0.025, won, total - won + 1) if won else 0.0
     high = beta.ppf(0.975, won + 1, total - won) if won < total else 1.0
     assert (found.low, found.high) == pytest.approx((low, high), abs=1e-9)
+
+
+@pytest.mark.parametrize("error", [0.0, 1.0])
+def test_a_study_in_which_all_succeed_or_all_fail_has_a_summary(tmp_path, error):
+    capture = Capture("all", make_study(tmp_path).capture.axes, lambda values: Outcome(True, error, 2.6, 5.0, 100.0))
+    study = replace(make_study(tmp_path), capture=capture, sampling="sobol", cases=32, envelope=False)
+    results = Results(tmp_path / "out", study)
+    for number, point in enumerate(study.scaled(np.random.default_rng(0).random((32, 3)))):
+        results.add("space", number, study.values(point), run_case(capture, study.values(point)))
+    content = summarise(study, results)
+    results.write("result.json", content)  # JSON has no NaN
+    assert not np.any(sensitivities(study, space_boundary(study, results)))
+
+
+def test_a_capture_that_gives_no_outcome_is_a_mistake_and_one_without_numbers_has_none(tmp_path):
+    axes = make_study(tmp_path).capture.axes
+    with pytest.raises(InputError, match=r"^mine: run gives a dict; give an Outcome$"):
+        run_case(Capture("mine", axes, lambda values: {"radial_error": 0.0}), {})  # pyright: ignore[reportArgumentType]
+    found = run_case(Capture("mine", axes, lambda values: Outcome(True, np.nan, 2.6, 5.0, 100.0)), {})
+    assert not found.enclosed
+    assert "not finite" in found.reason
+
+
+def test_a_cube_of_more_cases_is_another_study(tmp_path):
+    cube = replace(make_study(tmp_path), sampling="latin_hypercube")
+    assert cube.identity() != replace(cube, cases=cube.cases + 1).identity()
+    assert make_study(tmp_path).identity() == replace(make_study(tmp_path), cases=7).identity()

@@ -149,7 +149,7 @@ def _page(
     if study.box:
         words = why_the_box_fails(study, results.table("box"))
         sections.insert(1 if limits else 0, ("box", "The box", paragraph(words)))
-    header = f"<h1>{content['sentence']}</h1>"
+    header = f"<h1>{escape(content['sentence'])}</h1>"
     return page(f"{study.name}: capture tolerance", header, sections, f"Written by snarelab {__version__}.")
 
 

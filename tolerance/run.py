@@ -86,9 +86,14 @@ def space_boundary(
 def run_case(capture: Capture, values: Mapping[str, float]) -> Outcome:
     """One case, in a worker: a simulation that breaks down is an outcome with its reason, not an error."""
     try:
-        return capture.run(values)
+        found = capture.run(values)
     except (ArithmeticError, RuntimeError, ValueError) as error:
         return Outcome.failed(" ".join(str(error).split())[:200] or type(error).__name__)
+    if not isinstance(found, Outcome):
+        raise InputError(f"{capture.name}: run gives a {type(found).__name__}; give an Outcome")
+    if found.enclosed and not np.isfinite([found.radial_error, found.peak_tension]).all():
+        return Outcome.failed(f"radial error {found.radial_error:g} m, tension {found.peak_tension:g} N: not finite")
+    return found
 
 
 class _Runner:
@@ -135,6 +140,8 @@ class _Runner:
             try:
                 for future in as_completed(list(futures), timeout=WATCH):
                     error = future.exception()
+                    if isinstance(error, InputError):
+                        raise error
                     if error is not None and not isinstance(error, KilledWorker):
                         raise InputError(f"a worker cannot run a case: {error}; has it the same snarelab installed?")
                     yield futures.pop(future), future.result() if error is None else None

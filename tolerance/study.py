@@ -124,6 +124,8 @@ class Study:
             "version": self.capture.version,
             "seed": self.seed,
             "sampling": self.sampling,
+            # A cube of more cases is another cube; of the other samplings it goes on.
+            **({"cases": self.cases} if self.sampling == "latin_hypercube" else {}),
             "batch": self.batch,
             "ranges": {k: list(v) for k, v in self.ranges.items()},
             "fixed": dict(self.fixed),

@@ -1,5 +1,6 @@
 """What the cases say: probabilities with exact intervals, and which axes matter."""
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,25 +36,27 @@ def sensitivities(study: Study, boundary: Boundary, samples: int = 4096) -> pd.D
     """Sobol indices of the probability of success over the ranges, with bootstrap intervals.
 
     Columns ``first`` and ``total`` (Saltelli et al. 2010), each with ``_low`` and ``_high``; one row a varied axis.
-    They are computed on the fitted boundary, not by further captures.
+    They are computed on the fitted boundary, not by further captures; zero where it has success, or failure,
+    everywhere.
     """
 
     def probability(unit: np.ndarray) -> np.ndarray:
         return boundary.probability(unit.T)[None, :]
 
-    found = sobol_indices(
-        func=probability, n=samples, dists=[uniform()] * len(study.ranges), rng=np.random.default_rng(study.seed)
-    )
-    spread = found.bootstrap(confidence_level=0.95, n_resamples=200)
+    with warnings.catch_warnings(action="ignore", category=RuntimeWarning):  # there may be no variance to divide by
+        found = sobol_indices(
+            func=probability, n=samples, dists=[uniform()] * len(study.ranges), rng=np.random.default_rng(study.seed)
+        )
+        spread = found.bootstrap(confidence_level=0.95, n_resamples=200)
     columns = {}
     for name, index, interval in (
         ("first", found.first_order, spread.first_order.confidence_interval),
         ("total", found.total_order, spread.total_order.confidence_interval),
     ):
         columns |= {
-            name: np.ravel(index),
-            f"{name}_low": np.ravel(interval.low),
-            f"{name}_high": np.ravel(interval.high),
+            name: np.nan_to_num(np.ravel(index)),
+            f"{name}_low": np.nan_to_num(np.ravel(interval.low)),
+            f"{name}_high": np.nan_to_num(np.ravel(interval.high)),
         }
     return pd.DataFrame(columns, index=pd.Index(list(study.ranges), name="axis"))
 

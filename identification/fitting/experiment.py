@@ -148,17 +148,33 @@ class Scales:
 
 
 def load_experiments(
-    model: Model, paths: Sequence[str | Path], body: RigidBody, band: float | None = None
+    model: Model, paths: Sequence[str | Path], body: RigidBody, band: float | None = None, *, torque: bool = True
 ) -> list[Experiment]:
     """Read and condition recordings for a model; all in one analysis band, the narrowest that any of them carries.
+
+    With different sample rates that is about one band: each takes a whole number of its samples for one.
+
+    Parameters
+    ----------
+    model : Model
+    paths : sequence of path
+    body : RigidBody
+    band : float, optional
+        Edge of the analysis band [Hz].
+    torque : bool
+        Whether recorded torque counts; a motion needs none.
 
     Raises
     ------
     InputError
-        Whatever is wrong with a recording.
+        None is given, or whatever is wrong with one.
     """
+    if not paths:
+        raise InputError("recordings: none is given; give one or more")
     kinds: dict[str, JointKind] = {j.name: j.kind for j in model.tree.joints}
     datasets = [read_recording(path, model.signals, kinds) for path in paths]
+    if not torque:
+        datasets = [d.assign({f"tau.{j}": ("time", np.ones(d.sizes["time"])) for j in model.joints}) for d in datasets]
     measured = [_tensions(d, model) for d in datasets]
     tree = model.tree
     if isinstance(tree, FloatingTree):

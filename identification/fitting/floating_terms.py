@@ -58,8 +58,11 @@ def with_twist(dataset: xr.Dataset, tree: FloatingTree) -> xr.Dataset:
     good = np.asarray(np.isfinite(quaternion).all(1))
     size = np.linalg.norm(np.where(good[:, None], quaternion, 1.0), axis=1)
     if np.any(np.abs(size - 1) > 0.1):
-        row = int(np.argmax(np.abs(size - 1)))
-        raise InputError(f"{path}: quat.{body} in row {row} has length {size[row]:.3g}; give unit quaternions, w first")
+        worst = int(np.argmax(np.abs(size - 1)))
+        raise InputError(
+            f"{path}: quat.{body} at t = {dataset['time'].values[worst]:g} s has length {size[worst]:.3g}; give unit "
+            "quaternions, w first"
+        )
     back = Rotation.from_quat(np.where(good[:, None], quaternion, [1.0, 0, 0, 0]), scalar_first=True).inv()
     twist = np.hstack([back.apply(velocity), back.apply(spin)])
     twist[~good] = np.nan
@@ -90,10 +93,11 @@ def told(dataset: xr.Dataset) -> Array:
     none = np.zeros(dataset.sizes["time"])
     wheels = np.stack([np.asarray(dataset[name].values, float) if name in dataset else none for name in names], 1)
     if not np.isfinite(wheels).all():
-        row, axis = np.argwhere(~np.isfinite(wheels))[0]
+        sample, axis = np.argwhere(~np.isfinite(wheels))[0]
+        path, when = dataset.attrs.get("path", "recording"), dataset["time"].values[sample]
         raise InputError(
-            f"{dataset.attrs.get('path', 'recording')}: {names[axis]} is missing in row {row}; wheels keep all that "
-            "they were told to give, so that every sample is needed: fill it in, or cut the recording before it"
+            f"{path}: {names[axis]} is missing at t = {when:g} s; wheels keep all that they were told to give, so that "
+            "every sample is needed: fill it in, or cut the recording before it"
         )
     return wheels
 

@@ -170,7 +170,7 @@ def _terms(
 
 
 def free_parameters(assembly: Assembly, experiment: Experiment, state: Evaluation, variant: Variant) -> tuple[str, ...]:
-    """Names of the parameters that matter once the variant's amplitudes in ``low`` are switched on.
+    """Names of the parameters that matter once the variant's amplitudes are switched on.
 
     A shape that only acts through an amplitude left at zero has no derivative, and is not counted.
     """

@@ -96,9 +96,9 @@ def _bands(found: Fit, experiments: Sequence[Experiment]) -> Array:
 
 
 def _directed(experiment: Experiment, joint: int) -> Array:
-    """Direction of motion, and speed and load that turn with it, in the analysis band (n_band, 2)."""
+    """Direction of motion, and speed without it, in the analysis band (n_band, 2); zero for a joint that stands."""
     qd = experiment.motion.qd[:, joint]
-    direction = np.tanh(qd / (0.005 * np.max(np.abs(qd))))
+    direction = np.tanh(qd / max(0.005 * np.max(np.abs(qd)), 1e-300))
     return experiment.motion.to_band(np.stack([direction, qd * direction], axis=1))
 
 

@@ -155,6 +155,8 @@ def rivals(model: Model, diagnosis: Diagnosis) -> list[tuple[Placed, Placed]]:
     """Effects named and what rivals each: those that the data cannot part; where they part all, the likeliest."""
     open_, likely = [], []
     for finding in diagnosis.effects:
+        if finding.at.startswith("q_link."):
+            continue  # of two encoders no torque says which is off
         placed = [p for p in model.effects if (p.effect.name, p.at) == (finding.name, finding.at)]
         for rival in sorted(finding.rivals, key=lambda r: -r.probability):
             if placed:

@@ -24,7 +24,7 @@ MOST_MISSING = 0.5
 class Whitener:
     """Autoregression of one channel: ``coefficients`` (order,) and the innovations' RMS [channel's unit].
 
-    ``order`` samples at the head of each segment are given up, since their past is unknown.
+    ``lead`` samples at the head of each segment are given up, since their past is unknown.
     """
 
     coefficients: Array

@@ -108,7 +108,8 @@ def friction_less(experiment: Experiment, joint: int) -> Array:
     """
     key = ("friction_less", joint)
     if key not in experiment.store:
-        speed = experiment.motion.qd[:, joint] / np.max(np.abs(experiment.motion.qd[:, joint]))
+        speed = experiment.motion.qd[:, joint]
+        speed = speed / max(np.max(np.abs(speed)), 1e-300)
         columns = [-np.sign(speed) * np.exp(-((speed / width) ** 2)) for width in ROUNDING]
         experiment.store[key] = experiment.to_band(np.stack(columns, 1), joint)
     return experiment.store[key]

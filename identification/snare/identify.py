@@ -12,7 +12,7 @@ from .answer import estimates, with_found
 from .channels import channel_errors
 from .fit import Fit, evaluate, fit, normal, with_slopes
 from .recording import Capture
-from .search import start_at
+from .search import demand_simulated, start_at
 from .sets import sets_of
 
 STEPS = 8
@@ -77,5 +77,5 @@ def identify_captures(
     with sets_of(model, recordings, holdout, jobs) as (train, locked):
         progress("fitting the effects' parameters with the simulation in the loop")
         found = with_slopes(train, fit(train, start_at(model, train), STEPS))
-        held = evaluate(locked, found.placed, [found.x])[0] if holdout else None
+        held = demand_simulated(model, evaluate(locked, found.placed, [found.x])[0]) if holdout else None
     return IdentifiedCaptures(with_found(model, found), found, tuple(train.captures), tuple(locked.captures), held)

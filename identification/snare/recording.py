@@ -98,6 +98,17 @@ def _capture(model: Model, path: str | Path, data: xr.Dataset) -> Capture:
     if turn is None:
         turn = np.tile(model.tree.setup.target.orientation, (len(time), 1))
         notes.append(f"quat.{body} is not recorded; its orientation is the model's")
+    known = np.isfinite(turn).all(1)
+    if not np.any(known & start):
+        raise InputError(
+            f"{path}: quat.{body} has no sample in the first {BEFORE:g} s; give its start, or leave it out"
+        )
+    size = np.linalg.norm(np.where(np.isfinite(turn).all(1, keepdims=True), turn, 0.5), axis=1)
+    if np.any(np.abs(size - 1) > 0.1):
+        worst = int(np.argmax(np.abs(size - 1)))
+        raise InputError(
+            f"{path}: quat.{body} at t = {time[worst]:g} s has length {size[worst]:.3g}; give unit quaternions, w first"
+        )
     position, velocity = _start(since[start], place[start])
     if not np.all(np.isfinite(position)):
         raise InputError(f"{path}: pos.{body} has no sample in the first {BEFORE:g} s; give its start")

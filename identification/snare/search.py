@@ -86,7 +86,7 @@ def search(
     """
     progress(f"simulating {len(train.numbers)} captures with the model as given, and fitting its parameters")
     first = found = fit(train, start_at(model, train))
-    held_first = held = evaluate(locked, found.placed, [found.x])[0]
+    held_first = held = demand_simulated(model, evaluate(locked, found.placed, [found.x])[0])
     pool = library(model)
     bar = float(np.log(max(len(pool), 1) / CHANCE))
     named: list[Named] = []
@@ -118,10 +118,14 @@ def search(
 
 def start_at(model: Model, captures: CaptureSet) -> Fit:
     """The model as given, simulated; raises InputError for a capture that cannot be."""
-    start = started(captures, model.effects, start_of(model))
-    if not np.isfinite(start.likelihood):
+    return demand_simulated(model, started(captures, model.effects, start_of(model)))
+
+
+def demand_simulated(model: Model, at: Fit) -> Fit:
+    """The same; raises InputError for a capture that cannot be simulated, fitted or held out."""
+    if not np.isfinite(at.likelihood):
         raise InputError(
             f"{model.path}: the capture cannot be simulated from where the recording starts (the pin inside a cable, "
             "or steps that do not converge); check [capture] against the test's set-up"
         )
-    return start
+    return at

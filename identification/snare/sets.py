@@ -38,6 +38,8 @@ def sets_of(
     """
     if jobs is not None and jobs < 1:
         raise InputError(f"jobs = {jobs}; allowed is a whole number from 1")
+    if not recordings:
+        raise InputError("recordings: none is given; give one or more")
     captures = load_captures(model, [*recordings, *holdout])
     check_sensors(captures)
     with Runs(captures, jobs or min(4, os.cpu_count() or 1)) as runs:

@@ -16,7 +16,7 @@ FREQUENCY = Parameter(
     grid=tuple(round(0.05 * 1.12**k, 4) for k in range(36)),
 )
 
-DAMPING = Parameter("damping", "", "share of critical damping", zero=0.1, low=1e-5, high=1.0, grid=(0.1,))
+DAMPING = Parameter("damping", "1", "share of critical damping", zero=0.1, low=1e-5, high=1.0, grid=(0.1,))
 
 
 def second_rates(s: Symbols, p: Symbols, driven: ca.SX) -> ca.SX:

@@ -2,7 +2,7 @@
 
 The state holds the **momentum** of base and arm in the world frame instead of the base's velocity. Without forces it is
 then constant whatever the step, and the base's twist follows from it: (v, w) = H_b^-1 (momentum - H_bm qd). Joint
-accelerations come from the rest of the equations of motion (`floating_symbols`), with the base's eliminated::
+accelerations come from the rest of the equations of motion (`symbols`), with the base's eliminated::
 
     (H_m - H_bm^T H_b^-1 H_bm + B) qdd = tau - c_m + J_m^T f - H_bm^T H_b^-1 (J_b^T f - c_b)
 

@@ -23,7 +23,7 @@ BASE_MASS = 40e3  # kg; Tian et al., the inspection case
 BASE_LENGTH, BASE_RADIUS = 12.0, 2.1  # m, chosen: a cylinder of uniform density along x, the size of one station module
 MOUNT = (4.0, 0.0, BASE_RADIUS)  # m from the base's centre of mass, chosen: on the hull
 
-LENGTH, MASS, TIP_SPEED = 11.3, 630.0, 0.1  # m, kg, m/s; ESA
+LENGTH, MASS = 11.3, 630.0  # m, kg; ESA
 SPEED = 0.05
 """Speed limit of a joint [rad/s], chosen: a limb of 5 m then swings its end at 2.5 times the tip speed."""
 

@@ -35,7 +35,7 @@ class MonolithicAssembly(Assembly):
     arm : FloatingArm
         Its tip is the end effector.
     start : array (6 + J,)
-        Coordinates of base and joints at the start, see `monolithic_kinematics`.
+        Coordinates of base and joints at the start, see `kinematics`.
     friction : mapping of str to float
         Makkar's parameters, the same for each joint.
     rotor : float

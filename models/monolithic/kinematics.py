@@ -1,7 +1,7 @@
 """Base and arm in one vector of coordinates, as a monolithic capture has them: where tip and pin are and go.
 
 Coordinates c (6 + J,): the base's position, three turns Rx Ry Rz, then the joints. A frame on the tree has the twist
-J(c) ċ in the world, linear before angular; `tree_frames` writes pose and J of the tip and of the arm's mount.
+J(c) ċ in the world, linear before angular; `TreeFrames` writes pose and J of the tip and of the arm's mount.
 """
 
 import casadi as ca

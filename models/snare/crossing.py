@@ -109,7 +109,7 @@ def _across(normal, distance, a):
 
 @compiled
 def add_crossing_jacobian(positions, velocities, size, law, crossings, n_crossings, factors, triplets, count):
-    """Append the triplets of all listed crossings, as `snare_contact_jacobian` does; returns the new count."""
+    """Append the triplets of all listed crossings, as `contact_jacobian` does; returns the new count."""
     for index in range(n_crossings):
         one, two, gap = int(crossings[index, 0]), int(crossings[index, 1]), crossings[index, 4]
         x, y = crossings[index, 2], crossings[index, 3]

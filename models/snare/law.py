@@ -25,7 +25,7 @@ DAMPING = 5
 
 
 def law_constants(parameters: SnareParameters) -> np.ndarray:
-    """K [N/m^1.5], c [s/m], μ, v_s [m/s], 1/(3EI) [1/(N·m²)], and τ EI of `snare_damping` [N·m²·s]: shape (6,)."""
+    """K [N/m^1.5], c [s/m], μ, v_s [m/s], 1/(3EI) [1/(N·m²)], and τ EI of `damping` [N·m²·s]: shape (6,)."""
     p = parameters
     stiffness = p.bending_stiffness
     return np.array(

@@ -16,6 +16,7 @@ from .drive import Pose, fill_path, go_on
 from .history import SnareHistory
 from .parameters import SnareParameters
 from .recorder import Recorder
+from .ring_drive import OPEN
 from .settled import settled
 from .solver import SnareSolver, SolverState
 from .target import Target
@@ -74,14 +75,15 @@ class SnareModel:
     effector : Pose or None
         Where the end effector stands at the start; None: at the origin, at rest.
     time : float
-        Start [s], 0 or later; the ring starts to turn at 0.
+        Start [s], 0 or later, with the snare open: the ring starts to turn at 0, or as ``drive`` says.
     drive : callable or None
         Angle [rad] and rate [rad/s] of the ring at a time, in place of the parameters' ramp; 0 at the start.
 
     Raises
     ------
     InputError
-        For a pin that starts inside a cable, and whatever parameters and target refuse.
+        For a pin that starts inside a cable, a ring that has turned at the start, and whatever parameters and target
+        refuse.
 
     Examples
     --------
@@ -115,6 +117,11 @@ class SnareModel:
         start = Pose(np.zeros(3), start.rotation, start.velocity, start.angular_velocity)
         nodes = settled(parameters, self.accuracy.n_elements) @ start.rotation.T
         self.assembly = Assembly(parameters, near, nodes, start, drive)
+        if abs(turned := self.assembly.ring_at(time)[0]) > OPEN:
+            raise InputError(
+                f"snare: at the start, {time:g} s, the ring has turned by {turned:.3g} rad; start with the snare open, "
+                "at 0 s, or give a drive that turns later"
+            )
         self._check_clear(nodes)
         self._start = time
         self._frames = (start.frame(), self.assembly.pin.copy())  # of effector and moved target, where they are now

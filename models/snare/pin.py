@@ -15,8 +15,6 @@ import numpy as np
 from .parameters import SnareParameters
 from .vector import compiled
 
-SHAFT, KNOB = 0, 1
-
 
 def pin_cylinders(parameters: SnareParameters) -> np.ndarray:
     """Radius, lower and upper end along x in the target's frame [m], of shaft and knob: shape (2, 3)."""

@@ -13,6 +13,8 @@ from scipy.signal import savgol_filter
 from ...errors import InputError
 from .vector import compiled
 
+OPEN = 0.05
+"""Angle up to which a ring counts as open [rad]."""
 SMOOTHED = 0.1
 """[s]"""
 PERIOD = 0.01
@@ -54,15 +56,15 @@ class RingDrive:
         Raises
         ------
         InputError
-            For a ring that is not open at the start, or less than 0.1 s of it.
+            For a ring that is not open at the start, or less than eight samples or 0.2 s of it.
         """
         times, angles = np.asarray(times, float), np.asarray(angles, float)
         known = np.isfinite(angles)
         times, angles = times[known], angles[known]
         if len(times) < 8 or times[-1] - times[0] < 2 * SMOOTHED:
-            raise InputError(f"angle.ring: {len(times)} samples; give {2 * SMOOTHED:g} s of it or more")
+            raise InputError(f"angle.ring: {len(times)} samples; give eight and {2 * SMOOTHED:g} s of it, or more")
         angles = angles * (-1.0 if angles[-1] < angles[0] else 1.0)
-        if abs(angles[0]) > 0.05:
+        if abs(angles[0]) > OPEN:
             raise InputError(
                 f"angle.ring is {angles[0]:.3g} rad at the start; give a recording that starts with the ring open, at 0"
             )

@@ -35,7 +35,7 @@ def settled(parameters: SnareParameters, n_elements: int) -> np.ndarray:
     Raises
     ------
     InputError
-        As `snare_geometry.helices` does.
+        As `geometry.helices` does.
     """
     helix = helices(parameters, n_elements)
     ends = ring_points(parameters)

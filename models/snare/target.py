@@ -86,7 +86,7 @@ class Target:
         for name in ("mass", "line_length", "stiffness"):
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
                 raise InputError(f"target: {name} is {getattr(self, name)}; give a number > 0")
-        for name in ("clearance", "umbilical"):
+        for name in ("damping", "clearance", "umbilical"):
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
                 raise InputError(f"target: {name} is {getattr(self, name)}; give a number >= 0")
         if self.clearance > 0 and not self.hangs:

@@ -8,7 +8,6 @@ from math import sqrt
 
 import numba
 
-Vector = tuple[float, float, float]
 compiled = numba.njit(cache=True, error_model="numpy")
 """Decorator of every compiled function: one source, with or without a C compiler on the machine."""
 

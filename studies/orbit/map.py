@@ -6,16 +6,16 @@ on where it stopped.
 """
 
 import hashlib
-import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
-from pathlib import Path
 
 import numpy as np
 
-from ...files import json_value, written_whole
+from ...files import json_value
 from ...models.snare.parameters import SnareParameters
-from ..outcome import FOLDER
+from ...tolerance.capture import source_version
+from ...tolerance.inspection import SOURCES
+from ..outcome import FOLDER, write_json
 from .ledger import peak_force
 from .setting import END, Setting, capture_of, co_simulate, radial_end, resistance
 
@@ -24,8 +24,6 @@ LEVELS = (1.0, 3.0, 10.0, 30.0, 100.0)
 STIFFNESSES = (0.0, 3000.0)
 """Of a spring at each joint [N·m/rad]."""
 _STEP = 2e-3
-_MODELS = Path(__file__).parents[2] / "models"
-_SOURCES = ("snare/*.py", "floating/*.py", "dormand_prince.py", "effects/makkar*.py")
 
 
 @dataclass(frozen=True)
@@ -49,9 +47,7 @@ def resistance_map(start: Setting, snare: SnareParameters, study: str, say: Call
             if not path.exists():
                 say(f"  map: friction {level:g} N·m, stiffness {stiffness:g} N·m/rad ...")
                 path.parent.mkdir(parents=True, exist_ok=True)
-                cell = asdict(_cell(start, snare, level, stiffness))
-                with written_whole(path) as part:
-                    part.write_text(json.dumps(cell), encoding="utf-8")
+                write_json(path, asdict(_cell(start, snare, level, stiffness)))
             cells.append(Cell(**json_value(path)))
     return cells
 
@@ -65,9 +61,6 @@ def _cell(start: Setting, snare: SnareParameters, level: float, stiffness: float
 
 
 def _key(start: Setting, snare: SnareParameters, level: float, stiffness: float) -> str:
-    """Of everything that a cell follows from, the models' own text included."""
-    digest = hashlib.sha256(repr((start.case, start.target, snare, level, stiffness, _STEP, END)).encode())
-    for pattern in _SOURCES:
-        for source in sorted(_MODELS.glob(pattern)):
-            digest.update(source.read_bytes())
-    return digest.hexdigest()[:20]
+    """Of everything that a cell follows from, the text of models and master included."""
+    given = start.case, start.target, snare, level, stiffness, _STEP, END, source_version(*SOURCES)
+    return hashlib.sha256(repr(given).encode()).hexdigest()[:20]

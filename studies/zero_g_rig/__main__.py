@@ -5,7 +5,6 @@ another engine, with a twisted boom on slings that keep their height; the plant'
 starts, and opened only to score.
 """
 
-import json
 import sys
 import time
 from typing import Any
@@ -21,7 +20,7 @@ from ...models.model_file import load_model
 from ...models.model_write import save_model
 from ...models.rig.rig import built_in_rig
 from ...progress import stages
-from ..outcome import FOLDER, Quantity, table, write_result
+from ..outcome import FOLDER, Quantity, table, write_json, write_result
 from ..page import Clock, Section, write_page
 from . import figures
 from .explain import alike_in_words, remedy, suspected_boom, tell_apart
@@ -59,7 +58,7 @@ def main() -> int:
     quantities = numbers(friction, found, result)
     sentence = f"{found.sentence} {remedy(pairs, boom)}"
     save_model(answer.model, folder / "model.toml", sentence)
-    (folder / "diagnosis.json").write_text(json.dumps(found.to_json(), indent=1) + "\n", encoding="utf-8")
+    write_json(folder / "diagnosis.json", found.to_json())
     write_report(found, folder / "diagnosis.html")
     write_page(
         STUDY,
