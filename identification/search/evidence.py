@@ -8,6 +8,7 @@ block, so that leaving a block out, a block bootstrap, and nulls with signs flip
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -159,20 +160,26 @@ class Evidence:
         """
         ridge = np.eye(len(low)) / spread**2
         gains = np.zeros(self.n_blocks)
-        for b in range(self.n_blocks):
-            out = 1 - KNOWN
-            solver = _Solver(self.matrix.sum(0) - out * self.matrix[b])
-            right = self.right.sum(0) - self.right[b]
-            cross = p.cross.sum(0) - out * p.cross[b]
-            own = p.own.sum(0) - out * p.own[b]
+        cross_of_all, own_of_all, right_of_all = p.cross.sum(0), p.own.sum(0), p.right.sum(0)
+        for b, (solver, right, without) in enumerate(self._left_out):
+            cross = cross_of_all - (1 - KNOWN) * p.cross[b]
+            own = own_of_all - (1 - KNOWN) * p.own[b]
             schur = own + ridge - cross.T @ solver.solve(cross)
             amplitudes = _bounded(
-                schur, own + ridge, p.right.sum(0) - p.right[b] - cross.T @ solver.solve(right), low, high
+                schur, own + ridge, right_of_all - p.right[b] - cross.T @ solver.solve(right), low, high
             )
-            without = solver.solve(right)
             beside = solver.solve(right - cross @ amplitudes)
-            gains[b] = 0.5 * (self._energy(b, without) - self._energy(b, beside, p, amplitudes))
+            gains[b] = 0.5 * (without - self._energy(b, beside, p, amplitudes))
         return gains
+
+    @cached_property
+    def _left_out(self) -> list[tuple["_Solver", Array, float]]:
+        """Of each block: the baseline's solver and products (P,) without it, and the energy that their fit leaves."""
+        matrix, right, found = self.matrix.sum(0), self.right.sum(0), []
+        for b in range(self.n_blocks):
+            solver, others = _Solver(matrix - (1 - KNOWN) * self.matrix[b]), right - self.right[b]
+            found.append((solver, others, self._energy(b, solver.solve(others))))
+        return found
 
     def shares(self, p: Products, amplitudes: Array) -> Array:
         """Log-likelihood gained on each block by the fit to all of them (B,)."""

@@ -147,9 +147,11 @@ def _nameless(ground: Grounds, threshold: Mapping[tuple[int, ...], float]) -> di
             free = _Free(parts[0].shape[1])
             case = ground.asked.case(free, {c: parts})
             score = case.gain().total - 0.5 * len(free.high) * log_size
+            if score <= threshold[(c,)]:
+                continue
             spread = float(sigma[c])  # a curve is no taller than what is left over, before it is seen
             fresh = case.fresh_gains(spread)
-            if score > threshold[(c,)] and reliably_positive(fresh):
+            if reliably_positive(fresh):
                 share = min(ground.asked.foreseen(free, {c: parts}, spread), 1.0)
                 if share > (found[c].share if c in found else 0.0):
                     found[c] = Nameless(words, share, float(fresh.sum()))
