@@ -94,8 +94,8 @@ def write_hosted_class(cls: type, arguments: dict[str, Any], path: str | Path, v
     name : str
         A C identifier.
     """
-    if sys.platform == "win32":
-        raise InputError(f"{name}: FMUs with Python inside need Unix sockets; export it on Linux or macOS")
+    if not sys.platform.startswith("linux"):
+        raise InputError(f"{name}: FMUs with Python inside are built on Linux only; export it there")
     participant = cls(**arguments)
     variables = tuple(
         Variable(
