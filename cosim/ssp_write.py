@@ -22,7 +22,8 @@ def write_ssp(setup: Setup, path: str | Path) -> None:
     """Write a system whose participants are all FMUs.
 
     Parameters are bound to their components, and how the master ran the system is an annotation, which other tools
-    pass over; step control, power bonds and the limits of an iteration stay behind. The file appears whole or not at all. Raises InputError for participants that are no FMUs.
+    pass over; step control, power bonds and the limits of an iteration stay behind. The file appears whole or not at
+    all. Raises InputError for participants that are no FMUs.
     """
     import fmpy
 
