@@ -262,7 +262,7 @@ def test_no_motion_is_planned_for_a_capture(tmp_path, capsys):
     held = swinging(tmp_path, "held.csv", seed=2)
     asked = ["diagnose", str(model), str(train), "--holdout", str(held), "--next-experiment", str(tmp_path / "n.csv")]
     assert main(asked) == 2
-    assert "no motion is planned for a capture" in capsys.readouterr().err
+    assert "a motion is planned for system = 'arm' only" in capsys.readouterr().err
 
 
 def test_a_sensor_reads_the_body_that_its_sign_says(tmp_path):
