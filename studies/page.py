@@ -9,7 +9,7 @@ from html import escape
 from pathlib import Path
 
 from ..files import written_whole
-from ..report.html import figure, page, paragraph, table
+from ..report.html import figure, headline, page, paragraph, table
 from .outcome import FOLDER, Quantity
 
 _KINDS = {
@@ -105,7 +105,7 @@ def write_page(
     title : str
         What was studied, a few words.
     found : str
-        What was found, in one sentence.
+        What was found; its first sentence is the page's heading.
     quantities : sequence of Quantity
         The table.
     sections : sequence of Section
@@ -123,7 +123,7 @@ def write_page(
         parts.append((f"part{number}", section.heading, content))
     if playback is not None:
         parts.append(("playback", "Playback in 3-D", _frame(playback, caption, clock)))
-    header = f'<p class="quiet">{escape(title)}</p>\n<h1>{escape(found)}</h1>\n'
+    header = f'<p class="quiet">{escape(title)}</p>\n{headline(found)}'
     document = page(title, header, parts, f"Written by snarelab: make study-{study}.")
     folder = FOLDER / study
     folder.mkdir(parents=True, exist_ok=True)

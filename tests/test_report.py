@@ -94,7 +94,7 @@ def test_verdicts_without_a_name(reports: dict[str, Path]) -> None:
 )
 def test_opens_in_a_browser(browser: Browser, reports: dict[str, Path], verdict: str, scheme) -> None:
     with opened(browser, reports[verdict], scheme, (1200, 3200)) as page:
-        assert page.locator("h1").inner_text() == VERDICTS[verdict]().sentence
+        assert " ".join(page.locator("h1,h1+p").all_inner_texts()) == VERDICTS[verdict]().sentence
         shown = np.rint(pixels(page) * 255).astype(np.uint8)
     assert shown.shape == (3200, 1200, 3)
     assert (shown[5, 5].max() < 40) if scheme == "dark" else (shown[5, 5].min() > 240)

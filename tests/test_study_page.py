@@ -20,11 +20,12 @@ from snarelab.studies.page import Section, write_page
 def test_page_says_the_finding_first_and_explains_the_kinds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     section = Section("Motion", ["What <it> shows."], [picture()])
-    path = write_page("demo", "Suspended test", "The pin ends 8 mm & less off.", QUANTITIES, [section])
+    found = "The pin ends 8 mm & less off. It took 2.5 s. Nothing else moved."
+    path = write_page("demo", "Suspended test", found, QUANTITIES, [section])
     assert path == Path("build/studies/demo/report.html")
     assert [p.name for p in path.parent.iterdir()] == ["report.html"]
     text = path.read_text(encoding="utf-8")
-    assert "<h1>The pin ends 8 mm &amp; less off.</h1>" in text
+    assert "<h1>The pin ends 8 mm &amp; less off.</h1>\n<p>It took 2.5 s. Nothing else moved.</p>" in text
     assert text.index("<h1>") < text.index("<table>") < text.index("data:image/svg+xml")
     plain = re.sub(r'<span class="said">(.*?)</span>', r"\1", text)  # words may take several lines, numbers not
     rows = [re.findall(r"<t[hd][^>]*>([^<]*)</t[hd]>", row) for row in re.findall(r"<tr>(.*?)</tr>", plain)]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..report.html import figure, page, paragraph, table
+from ..report.html import figure, headline, page, paragraph, table
 from .box import why_the_box_fails
 from .gallery import Miss, play_misses
 from .pictures import envelope_bars, probability_maps, sensitivity_bars, width_curve
@@ -149,8 +149,12 @@ def _page(
     if study.box:
         words = why_the_box_fails(study, results.table("box"))
         sections.insert(1 if limits else 0, ("box", "The box", paragraph(words)))
-    header = f"<h1>{escape(content['sentence'])}</h1>"
-    return page(f"{study.name}: capture tolerance", header, sections, f"Written by snarelab {__version__}.")
+    return page(
+        f"{study.name}: capture tolerance",
+        headline(content["sentence"]),
+        sections,
+        f"Written by snarelab {__version__}.",
+    )
 
 
 def _between(low: float, high: float) -> str:

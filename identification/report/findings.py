@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from datetime import date
 from html import escape
 
-from ...report.html import bar, figure, flag, paragraph, table
+from ...report.html import bar, figure, flag, headline, paragraph, table
 from ..diagnosis import Diagnosis, Finding, Limit, Rival, Trace
 from .figures import residual_over_time
 from .words import chance, number, percent, spans, unit_words, with_std, words
@@ -29,7 +29,7 @@ def verdict(diagnosis: Diagnosis, day: date) -> str:
     rows = "".join(f"<dt>{escape(name)}</dt><dd>{escape(value)}</dd>" for name, value in facts if value)
     return (
         f'<span class="status {diagnosis.verdict}">{STATUS[diagnosis.verdict]}</span>\n'
-        f'<h1>{escape(diagnosis.sentence)}</h1>\n<dl class="facts">{rows}</dl>\n'
+        f'{headline(diagnosis.sentence)}<dl class="facts">{rows}</dl>\n'
     )
 
 
