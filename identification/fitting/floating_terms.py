@@ -25,6 +25,7 @@ from scipy.spatial.transform import Rotation
 
 from ...errors import InputError
 from ...models.floating.tree import CARRIERS, FloatingTree
+from ...recordings.attitude import attitude
 from ...recordings.condition import Motion
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ def with_twist(dataset: xr.Dataset, tree: FloatingTree) -> xr.Dataset:
     Raises
     ------
     InputError
-        Where the base's velocity, angular velocity or attitude is not recorded, or a quaternion is zero.
+        Where the base's velocity, angular velocity or attitude is not recorded, or a quaternion's length is not 1.
     """
     path, body = dataset.attrs.get("path", "recording"), tree.body
     sets = {kind: [f"{kind}.{body}.{a}" for a in axes] for kind, axes in _NEEDED}
@@ -52,18 +53,12 @@ def with_twist(dataset: xr.Dataset, tree: FloatingTree) -> xr.Dataset:
                 f"{path}: no signal {name!r} of the floating base; needed are vel, omega (world frame) and quat of "
                 f"it: add the column, map it under [signals], or name the body by 'base' in the model file"
             )
-    quaternion, velocity, spin = (
-        np.stack([np.asarray(dataset[name].values, float) for name in sets[kind]], 1) for kind in sets
+    velocity, spin = (
+        np.stack([np.asarray(dataset[name].values, float) for name in sets[k]], 1) for k in ("vel", "omega")
     )
-    good = np.asarray(np.isfinite(quaternion).all(1))
-    size = np.linalg.norm(np.where(good[:, None], quaternion, 1.0), axis=1)
-    if np.any(np.abs(size - 1) > 0.1):
-        worst = int(np.argmax(np.abs(size - 1)))
-        raise InputError(
-            f"{path}: quat.{body} at t = {dataset['time'].values[worst]:g} s has length {size[worst]:.3g}; give unit "
-            "quaternions, w first"
-        )
-    back = Rotation.from_quat(np.where(good[:, None], quaternion, [1.0, 0, 0, 0]), scalar_first=True).inv()
+    turns = attitude(dataset, body, path)
+    good = np.asarray(np.isfinite(turns).all(1))
+    back = Rotation.from_quat(np.where(good[:, None], turns, [1.0, 0, 0, 0]), scalar_first=True).inv()
     twist = np.hstack([back.apply(velocity), back.apply(spin)])
     twist[~good] = np.nan
     wrench, wheels = outside(dataset, tree), told(dataset)

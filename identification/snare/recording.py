@@ -19,6 +19,7 @@ from ...models.model import Model
 from ...models.snare.ring_drive import RingDrive
 from ...models.snare.setup import Setup, SnareTree
 from ...recordings import read_recording
+from ...recordings.attitude import attitude
 
 Array = NDArray[np.float64]
 
@@ -94,20 +95,14 @@ def _capture(model: Model, path: str | Path, data: xr.Dataset) -> Capture:
     notes = [*data.attrs["notes"]]
     place = _columns(data, f"pos.{body}", "xyz")
     assert place is not None  # `body_of` saw to it
-    turn = _columns(data, f"quat.{body}", "wxyz")
-    if turn is None:
+    if all(f"quat.{body}.{axis}" in data for axis in "wxyz"):
+        turn = attitude(data, body, path)
+    else:
         turn = np.tile(model.tree.setup.target.orientation, (len(time), 1))
         notes.append(f"quat.{body} is not recorded; its orientation is the model's")
-    known = np.isfinite(turn).all(1)
-    if not np.any(known & start):
+    if not np.any(np.isfinite(turn).all(1) & start):
         raise InputError(
             f"{path}: quat.{body} has no sample in the first {BEFORE:g} s; give its start, or leave it out"
-        )
-    size = np.linalg.norm(np.where(np.isfinite(turn).all(1, keepdims=True), turn, 0.5), axis=1)
-    if np.any(np.abs(size - 1) > 0.1):
-        worst = int(np.argmax(np.abs(size - 1)))
-        raise InputError(
-            f"{path}: quat.{body} at t = {time[worst]:g} s has length {size[worst]:.3g}; give unit quaternions, w first"
         )
     position, velocity = _start(since[start], place[start])
     if not np.all(np.isfinite(position)):
