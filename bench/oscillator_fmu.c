@@ -2,7 +2,7 @@
  *
  * -DFMI=2|3 the standard, -DSIDE=0|1 left (force in) or right (motion in). One classical Runge-Kutta step of order 4 a
  * communication step. The parameter "fault" makes it misbehave from "fault_time" on:
- * 1 error, 2 hang, 3 NaN, 4 ends its process, 5 discard, 6 fatal.
+ * 1 error, 2 hang, 3 NaN, 4 ends its process, 5 discard, 6 fatal, 7 asks to end the simulation (FMI 3.0).
  */
 #include <math.h>
 #include <signal.h>
@@ -275,7 +275,9 @@ CALL(EnterStepMode)(INSTANCE c) REFUSE
 CALL(GetOutputDerivatives)(INSTANCE c, VR, const fmi3Int32 o[], fmi3Float64 v[], size_t k) REFUSE
 CALL(DoStep)(INSTANCE c, fmi3Float64 t, fmi3Float64 h, fmi3Boolean no_return, fmi3Boolean *event, fmi3Boolean *end,
              fmi3Boolean *early, fmi3Float64 *reached) {
-    *event = *end = *early = 0;
+    const double *v = ((Model *)c)->s.value;
+    *event = *early = 0;
+    *end = v[FAULT] == 7 && t + h > v[FAULT_TIME];
     *reached = t + h;
     return advance(c, t, h);
 }

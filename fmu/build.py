@@ -22,7 +22,7 @@ from .page import icon, page
 FLAGS = ("-std=c99", "-O1", "-ffp-contract=off", "-shared", "-fPIC", "-fvisibility=hidden", "-w")
 
 
-def write_fmu(equations: Equations, path: str | Path, version: int, stop: float = 10.0) -> Path:
+def write_fmu(equations: Equations, path: str | Path, version: int) -> Path:
     """Write a self-contained FMU.
 
     Parameters
@@ -32,8 +32,6 @@ def write_fmu(equations: Equations, path: str | Path, version: int, stop: float 
         Where; an FMU that is there is replaced.
     version : 2 or 3
         Of FMI.
-    stop : float
-        End of the default experiment [s].
 
     Raises
     ------
@@ -47,7 +45,7 @@ def write_fmu(equations: Equations, path: str | Path, version: int, stop: float 
         description=equations.description,
         token=token,
         step=1e-3,
-        stop=stop,
+        stop=10.0,
         derivatives=True,
         interpolates=True,
         needs_tool=False,

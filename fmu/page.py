@@ -70,8 +70,9 @@ def _bounds(v: Variable) -> str:
     return f"{low} … {'∞' if v.maximum == np.inf else f'{v.maximum:.4g}'}"
 
 
-def icon(size: int = 128) -> bytes:
+def icon() -> bytes:
     """PNG of a two-link arm reaching for a ring."""
+    size = 128
     y, x = np.mgrid[0:size, 0:size] / (size - 1.0)
     image = np.full((size, size, 3), 255, np.uint8)
     joints = [(0.18, 0.86), (0.34, 0.42), (0.62, 0.56)]

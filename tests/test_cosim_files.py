@@ -137,6 +137,21 @@ def test_command_refuses_a_bad_place_before_it_runs(halves, tmp_path, name):
         command(written(halves), "--out", tmp_path / name)
 
 
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        (["--until", "inf"], "cannot run to inf s"),
+        (["--until", "nan"], "cannot run to nan s"),
+        (["--timeout", "inf"], "--timeout inf: must be positive and finite"),
+        (["--timeout", "0"], "--timeout 0.0: must be positive and finite"),
+    ],
+)
+def test_command_refuses_a_time_without_end(halves, tmp_path, more, message):
+    with pytest.raises(InputError, match=message):
+        command(written(halves), "--out", tmp_path / "run.csv", *more)
+    assert not (tmp_path / "run.csv").exists()
+
+
 def test_command_refuses_other_files(tmp_path):
     (tmp_path / "system.json").write_text("{}")
     for name, message in (("system.json", "is .ssp or .toml"), ("gone.ssp", "is not there")):

@@ -26,7 +26,7 @@ from snarelab.cosim.units import conversion
 from snarelab.errors import InputError
 
 CONNECTIONS = [("right.force", "left.force"), ("left.x", "right.x_left"), ("left.v", "right.v_left")]
-ERROR, HANG, NAN, KILL, DISCARD, FATAL = range(1, 7)
+ERROR, HANG, NAN, KILL, DISCARD, FATAL, END = range(1, 8)
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the test FMUs are built for Linux")
 
@@ -153,6 +153,7 @@ def faulty(files, fmi, fault, make, when=0.5):
         (NAN, "left.x is nan at 0.51 s; take smaller steps"),
         (DISCARD, "left: fmi3DoStep returned discard in the step from 0.5 s"),
         (FATAL, "left: fmi3DoStep returned fatal in the step from 0.5 s (the model is lost)"),
+        (END, "left: the FMU asks to end the simulation in the step from 0.5 s"),
     ],
 )
 def test_failing_fmu_is_named_with_time_and_last_good_step(files, fault, said, compiled):

@@ -112,3 +112,10 @@ def test_bad_input(tmp_path):
         identify(model(tmp_path, base="base"), [train])
     with pytest.raises(InputError, match="nothing to hold it would fall"):
         model(tmp_path, "gravity = [0.0, 0.0, -9.81]")
+
+
+def test_what_carries_the_base_has_no_encoder(tmp_path):
+    for carrier in model(tmp_path).tree.joints[:6]:
+        for kind in ("q", "q_link"):
+            with pytest.raises(InputError, match=rf"at '{kind}\.{carrier.name}'; this model has .*q\.shoulder"):
+                model(tmp_path, f'effects = [{{ name = "sensor_delay", at = "{kind}.{carrier.name}" }}]')

@@ -51,6 +51,10 @@ def test_refusals(tmp_path):
     capture = tmp_path / "capture.toml"
     capture.write_text('system = "snare_capture"\neffects = ["contact_friction"]\n')
     refused(tmp_path, r"no value for 'contact_friction.pin.coefficient'", capture, "--fmi", 2, "--out", out)
+    stiff = "--integrator", "rosenbrock"
+    refused(tmp_path, r"nothing is integrated .*--integrator", path, "--fmi", 2, "--out", out, "--inverse", *stiff)
+    refused(tmp_path, r"nothing is integrated .*--integrator", capture, "--fmi", 2, "--out", out, *stiff)
+    refused(tmp_path, r"--integrator is for the arms", "joint_friction", "--fmi", 2, "--out", out, *stiff)
     refused(tmp_path, r"a capture has none", capture, "--fmi", 2, "--out", out, "--inverse")
 
 

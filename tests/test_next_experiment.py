@@ -2,12 +2,16 @@
 
 import csv
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from snarelab.cli import main
+from snarelab.identification.search.next_experiment import rivals
+from snarelab.models.model_file import load_model
 from snarelab.recordings import read_recording
+from tests.diagnoses import missing_physics
 
 MASS, ARM, INERTIA = 4.0, 0.5, 0.2  # of the link: kg, m, kg m2 about its centre
 VISCOUS, COULOMB, SPRING = 0.8, 1.2, 6.0
@@ -86,3 +90,18 @@ def test_without_a_rival_none_is_written(folder, capsys):
     assert main([*command, "--next-experiment", str(motion)]) == 0
     assert "no rival is left" in capsys.readouterr().out
     assert not motion.exists()
+
+
+def test_of_two_encoders_no_torque_says_which_is_off(folder):
+    told = missing_physics()
+    (finding, *_) = [e for e in told.effects if e.rivals]
+    here = replace(finding, name="viscous_friction", at="joint1")
+    on_link = replace(finding, name="sensor_delay", at="q_link.joint1")
+    (folder / "link.toml").write_text(
+        'urdf = "p.urdf"\neffects = ["viscous_friction", { name = "sensor_delay", at = "q_link.joint1" }]\n'
+    )
+    model = load_model(folder / "link.toml")
+    found = rivals(model, replace(told, effects=(on_link, here)))
+    assert found
+    assert {a.at for a, _ in found} == {"joint1"}
+    assert rivals(model, replace(told, effects=(on_link,))) == []

@@ -21,14 +21,15 @@ JOINT = 1
 LATE = 0.02
 
 
-def motion(seed):
-    """Time (n,), and position, rate and acceleration (n, 3): five harmonics of 0.1 Hz for each joint."""
+def motion(seed, still=()):
+    """Time (n,), and position, rate and acceleration (n, 3): five harmonics of 0.1 Hz for each joint but the still."""
     rng = np.random.default_rng(seed)
     time = np.arange(round(SECONDS * RATE)) / RATE
     k = np.arange(1, 6)[:, None]
     w, size = 2 * np.pi * 0.1 * k, rng.normal(0, 0.35, (5, 3)) / np.sqrt(k)
     angle = np.einsum("k,n->nk", w[:, 0], time)[:, :, None] + rng.uniform(0, 2 * np.pi, (5, 3))
     centre = rng.uniform(-0.4, 0.4, 3)
+    size[:, still] = centre[list(still)] = 0.0
     return (
         time,
         centre + np.sum(size * np.sin(angle), 1),
@@ -42,10 +43,10 @@ def inverse(arm, *motion):
     return np.array([pin.rnea(arm, data, *row) for row in zip(*motion, strict=True)])
 
 
-def recording(path, seed, concealed):
+def recording(path, seed, concealed, still=()):
     """A recording with 1 % of noise on every torque, and one thing that the model leaves out."""
     arm = pin.buildModelFromUrdf(str(ARM))
-    time, q, qd, qdd = motion(seed)
+    time, q, qd, qdd = motion(seed, still)
     if concealed == "inertia_error":
         arm.inertias[3] = pin.Inertia(1.4 * arm.inertias[3].mass, arm.inertias[3].lever, 1.4 * arm.inertias[3].inertia)
     rigid = inverse(arm, q, qd, qdd)
@@ -67,13 +68,14 @@ def recording(path, seed, concealed):
     return path
 
 
-def diagnosed(folder, concealed):
+def diagnosed(folder, concealed, still=()):
     model = folder / "arm.toml"
     model.write_text(
         f'name = "arm"\nsystem = "arm"\nurdf = "{ARM}"\ngravity = [0.0, 0.0, -9.81]\ninertia = "fixed"\n'
         'effects = ["coulomb_friction", "viscous_friction"]\n'
     )
-    train, held = (recording(folder / f"{name}.csv", seed, concealed) for name, seed in (("train", 1), ("held", 2)))
+    parts = (("train", 1), ("held", 2))
+    train, held = (recording(folder / f"{name}.csv", seed, concealed, still) for name, seed in parts)
     return diagnose(load_model(model), [train], held).diagnosis
 
 
@@ -101,3 +103,12 @@ def test_named_placed_and_nothing_else(concealed, name, at, parameter, value, er
     assert only.probability > 0.5
     wanted = value or 0.4 * pin.buildModelFromUrdf(str(ARM)).inertias[3].mass
     assert only.parameters[parameter].value == pytest.approx(wanted, rel=error)
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+@pytest.mark.parametrize("joint", [0, 2])
+def test_a_joint_that_stands_at_exactly_zero_is_no_obstacle(tmp_path, joint):
+    found = diagnosed(tmp_path, "rotor_inertia", [joint])
+    (only,) = found.effects
+    assert (only.name, only.at) == ("rotor_inertia", "joint2"), found.sentence
+    assert only.parameters["inertia"].value == pytest.approx(2.0, rel=0.1)

@@ -162,6 +162,8 @@ def test_a_hanging_target_rests(support):
         (lambda: SnareModel(QUICK, Target("moved", position=(0.2369, 0.126, 0.0))), "mm inside a cable"),
         (lambda: SnareModel(QUICK, Target("free"), "rough"), "accuracy is 'rough'; give one of default, fine"),
         (lambda: SnareModel(QUICK, Target("free"), time=-1.0), "time is -1 s"),
+        (lambda: SnareModel(QUICK, Target("free"), time=2.0), "at the start, 2 s, the ring has turned by .* rad"),
+        (lambda: Target("spring", damping=-1.0), "damping is -1.0; give a number >= 0"),
         (lambda: Target("free", mass=-1), "mass is -1; give a number > 0"),
         (lambda: Target("free", inertia=np.diag([1, 1, 3])), "none above the sum"),
         (lambda: Target("free", orientation=(1, 1, 0, 0)), "give a unit quaternion"),

@@ -38,7 +38,7 @@ def written(folder, text, name="model.toml"):
     return path
 
 
-def swinging(folder, name, columns=None, umbilical=0.0, direction=0.3, seconds=2.5, seed=1):
+def swinging(folder, name, columns=None, umbilical=0.0, direction=0.3, seconds=2.5, seed=1, place=FAR):
     """A pendulum on a long line, with an umbilical, pushed at the start: y, z = v/w sin(w t), w^2 = g/l + k/m."""
     time = np.arange(0, seconds + 1e-9, 0.01)
     rate = np.sqrt(9.81 / LINE + umbilical / MASS)
@@ -46,7 +46,7 @@ def swinging(folder, name, columns=None, umbilical=0.0, direction=0.3, seconds=2
     moved = SPEED / rate * np.sin(rate * time)[:, None] * [0.0, np.cos(direction), np.sin(direction)]
     table = {"time": time, "angle.ring": 0.0 * time}
     noise = 5e-5 * rng.normal(size=moved.shape)
-    table |= {f"pos.target.{a}": (FAR + moved + noise)[:, i] for i, a in enumerate("xyz")}
+    table |= {f"pos.target.{a}": (place + moved + noise)[:, i] for i, a in enumerate("xyz")}
     path = folder / name
     pd.DataFrame(table | (columns or {})).to_csv(path, index=False)
     return path
@@ -243,6 +243,20 @@ def test_identify_finds_a_listed_effect(tmp_path):
     assert 0 < parameter["std"] < 10.0
     assert not parameter["at_bound"]
     assert found.model.values["umbilical_stiffness.target.stiffness"] == parameter["value"]
+
+
+@pytest.mark.parametrize(
+    "use",
+    [lambda m, t, h: identify_captures(m, [t], [h], jobs=1), lambda m, t, h: diagnose_captures(m, [t], h, jobs=1)],
+    ids=["identify", "diagnose"],
+)
+def test_a_held_out_capture_that_starts_inside_a_cable_is_refused(tmp_path, use):
+    model = load_model(written(tmp_path, PLAIN + '[capture]\ntarget = "pendulum"\nline_length = 2.0\n'))
+    inside = np.array([0.2369, 0.126, 0.0])
+    train, held = swinging(tmp_path, "train.csv"), swinging(tmp_path, "held.csv", seed=2, place=inside)
+    with pytest.raises(InputError, match="cannot be simulated from where the recording starts") as caught:
+        use(model, train, held)
+    assert "\n" not in str(caught.value)
 
 
 def test_a_corrected_number_becomes_part_of_the_set_up(tmp_path):

@@ -189,7 +189,7 @@ def load_experiments(
         return [
             _balanced(
                 Experiment(
-                    as_carriers(m, tree), body, impulse=wheel_impulse(d, m), store={"twist_noise": twist_noise(d, tree)}
+                    as_carriers(m), body, impulse=wheel_impulse(d, m), store={"twist_noise": twist_noise(d, tree)}
                 )
             )
             for m, d in zip(motions, datasets, strict=True)

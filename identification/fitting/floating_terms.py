@@ -104,7 +104,7 @@ def _impulse(dataset: xr.Dataset, wheels: Array) -> Array:
 _NEEDED = (("quat", "wxyz"), ("vel", "xyz"), ("omega", "xyz"))
 
 
-def as_carriers(motion: Motion, tree: FloatingTree) -> Motion:
+def as_carriers(motion: Motion) -> Motion:
     """Motion of the carriers that give the base this twist: at zero, their rates are the twist.
 
     Second rates differ from the twist's, since the carriers turn in one another: by the base's spin cross its velocity,

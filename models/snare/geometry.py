@@ -73,14 +73,8 @@ def arc(parameters: SnareParameters) -> Arc:
     return Arc(2 * half, radius, bulge)
 
 
-def ring_points(parameters: SnareParameters, angle: float = 0.0) -> np.ndarray:
-    """Cable ends in the end effector's frame.
-
-    Parameters
-    ----------
-    parameters : SnareParameters
-    angle : float
-        How far the ring has turned, positive as it closes [rad].
+def ring_points(parameters: SnareParameters) -> np.ndarray:
+    """Cable ends at the start, in the end effector's frame.
 
     Returns
     -------
@@ -89,7 +83,7 @@ def ring_points(parameters: SnareParameters, angle: float = 0.0) -> np.ndarray:
     """
     points = np.zeros((N_CABLES, 2, 3))
     for cable, azimuth in enumerate(START_AZIMUTHS):
-        end = azimuth + parameters.ring_direction * (2 * pi / 3 + angle)
+        end = azimuth + parameters.ring_direction * 2 * pi / 3
         points[cable, 0, 1:] = parameters.ring_radius * np.array([cos(azimuth), sin(azimuth)])
         points[cable, 1] = [
             parameters.ring_distance,
