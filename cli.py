@@ -86,7 +86,9 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("--report", metavar="OUT.html", help="where to write the report, one self-contained page")
     p.add_argument("--save-model", metavar="NEW.toml", help="where to write the model with what was found")
     p.add_argument(
-        "--next-experiment", metavar="MOTION", help="where to write the motion that best parts the rivals left (system = 'arm')"
+        "--next-experiment",
+        metavar="MOTION",
+        help="where to write the motion that best parts the rivals left (system = 'arm')",
     )
     p.add_argument("--jobs", type=positive, metavar="N", help=JOBS)
     p.set_defaults(run=_diagnose)

@@ -22,9 +22,9 @@ Finds, names and adds the physics that the model leaves out, and confirms it on 
 one of the others. It prints the verdict and the table of steps: [results](results.md#diagnosis-json). How to start with
 a robot of your own: [guide](own-robot.md).""",
     "simulate": """\
-Writes what the model gives: along the motion of a recording the torque of every joint, on a floating base the base's own
-motion too; of a capture the target's motion, the forces and the ring's angle. The model file must hold the values of all
-parameters: use one that `identify` or `diagnose` saved.""",
+Writes what the model gives: along the motion of a recording the torque of every joint, on a floating base the base's
+own motion too; of a capture the target's motion, the forces and the ring's angle. The model file must hold the values
+of all parameters: use one that `identify` or `diagnose` saved.""",
     "export": "Writes an FMU for co-simulation: [FMUs](fmu.md).",
     "cosim": """\
 Runs a system of FMUs and other participants: [co-simulation](cosimulation.md). A run that fails (status 2) or is
@@ -46,8 +46,8 @@ TAIL = """\
 | 130 | Interrupted: Ctrl-C, or SIGTERM. |
 
 For unusable input, one line on standard error names the file, the column or row, what is wrong, and the mend. Whatever
-the status, a file that is there is whole. `cosim` keeps its recording up to the last good step; run again, it begins anew.
-`tolerance` keeps every finished case; run again, it goes on.
+the status, a file that is there is whole. `cosim` keeps its recording up to the last good step; run again, it begins
+anew. `tolerance` keeps every finished case; run again, it goes on.
 """
 
 

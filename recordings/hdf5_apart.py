@@ -20,7 +20,10 @@ class Refused(Exception):
 
 
 def collect(path: str, most: int, matlab: bool) -> dict[str, np.ndarray]:
-    """All datasets by their path in the file, of ``most`` bytes together; what is no column is an array of object."""
+    """All datasets by their path in the file, of ``most`` bytes together, and the file's own single numbers.
+
+    What is no column is an array of object.
+    """
     found: dict[str, np.ndarray] = {}
     size = 0
     with h5py.File(path, "r") as file:
@@ -41,6 +44,9 @@ def collect(path: str, most: int, matlab: bool) -> dict[str, np.ndarray]:
             unit = _text(item.attrs.get("unit", item.attrs.get("units")))
             values = np.asarray(item[()])
             found[f"{name} [{unit}]" if unit else name] = values.T if matlab else values
+        for name, value in file.attrs.items():  # single numbers are often kept there
+            if np.ndim(value) == 0 and np.asarray(value).dtype.kind in "biuf":
+                found.setdefault(name, np.asarray(value))
     return found
 
 

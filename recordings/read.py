@@ -2,7 +2,9 @@
 
 import math
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pint
@@ -41,8 +43,9 @@ def read_recording(
     signals : mapping of str to Signal
         A model's [signals]: where each signal is found. A mapped signal wins over a column of its own name.
     joint_kinds : mapping of str to "revolute" or "prismatic"
-        Kind of each joint. An unknown kind is taken from the dimension of a unit that the file gives for that joint;
-        where it gives none, the joint is revolute.
+        Kind of each joint of a model. An unknown kind is taken from the dimension of a unit that the file gives for
+        that joint; where it gives none, the joint is revolute. What no fit needs is then left out where it cannot be
+        read, with a note: velocity, acceleration, temperature, and joints that are not among these.
 
     Returns
     -------
@@ -68,28 +71,45 @@ def read_recording(
     check_count(path, len(columns.names))
     headers = _signal_headers(columns, signals)
     time_header, time = _time(columns, signals, headers)
-    raw = {name: columns.column(header, name, len(time)) for name, header in headers.items() if name != "time"}
-    if not raw:
+    del headers["time"]
+    if not headers:
         raise InputError(
             f"{path}: none of its {len(columns.names)} columns is a signal ({_some(columns.names)}); "
             "map them in [signals]"
         )
-    units = {name: _unit(columns, header, signals.get(name)) for name, (header, _) in raw.items()}
+    spared = {name for name in headers if name not in signals and joint_kinds is not None and _idle(name, joint_kinds)}
+    faults: dict[str, str] = {}
+
+    def tried(name: str, take: Callable[[], Any]) -> Any:
+        try:
+            return take()
+        except InputError as error:
+            if name not in spared:
+                raise
+            faults[name] = str(error).removeprefix(f"{path}: ")
+            return None
+
+    raw = {name: tried(name, partial(columns.column, header, name, len(time))) for name, header in headers.items()}
+    units = {
+        name: tried(name, partial(_unit, columns, found[0], signals.get(name))) for name, found in raw.items() if found
+    }
     for name, unit in units.items():
-        joint = joint_of(name)
+        joint = None if name in signals and signals[name].gain is not None else joint_of(name)
         if joint and joint not in kinds and unit is not None and fits(unit, default_unit(name, "prismatic")):
             kinds[joint] = "prismatic"
     variables = {}
-    for name, (header, values) in raw.items():
+    for name in [name for name in raw if name not in faults]:
+        header, values = raw[name]
         wanted = default_unit(name, kinds.get(joint_of(name) or name, "revolute"))
-        values = _in_unit(columns, header, name, values, units[name], wanted, signals.get(name))
-        _check_numbers(columns, header, values)
-        variables[name] = ("time", values, {"unit": wanted, "column": header})
+        take = partial(_numbers, columns, header, name, values, units[name], wanted, signals.get(name))
+        if (values := tried(name, take)) is not None:
+            variables[name] = ("time", values, {"unit": wanted, "column": header})
+    idle = [f"{name} is left out, no fit needs it: {fault}" for name, fault in faults.items()]
     dataset = xr.Dataset(variables, {"time": ("time", time, {"unit": "s", "column": time_header})})
-    used = {"time": time_header} | {name: header for name, (header, _) in raw.items()}
+    used = {"time": time_header} | {name: raw[name][0] if raw[name] else header for name, header in headers.items()}
     gains = {signal.gain for signal in signals.values() if isinstance(signal.gain, str)}
     left_out = _left_out(columns, used, gains | {gain.rpartition("[")[0] for gain in gains})
-    return dataset.assign_attrs(path=str(path), notes=[*columns.notes, *left_out, *_quality(dataset)])
+    return dataset.assign_attrs(path=str(path), notes=[*columns.notes, *idle, *left_out, *_quality(dataset)])
 
 
 def _load(path: Path, signals: Mapping[str, Signal]) -> Columns:
@@ -113,6 +133,12 @@ def _load(path: Path, signals: Mapping[str, Signal]) -> Columns:
             return _READERS[suffix](path)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error}); check the file's permissions") from error
+
+
+def _idle(name: str, joints: Mapping[str, JointKind]) -> bool:
+    """Whether no fit of a model with these joints needs a signal."""
+    family, _, joint = name.partition(".")
+    return family in ("qd", "qdd", "temp") or (joint_of(name) is not None and joint not in joints)
 
 
 def _signal_headers(columns: Columns, signals: Mapping[str, Signal]) -> dict[str, str]:
@@ -182,10 +208,17 @@ def _time_unit(header: str) -> str:
 
 
 def _unit(columns: Columns, header: str, signal: Signal | None) -> pint.Unit | None:
-    """The unit that [signals] or the header gives a column; None where neither does, or a gain settles it."""
+    """The unit that the values are in, as the header or else [signals] says; None where neither does.
+
+    A gain counts per unit that [signals] names, or else as it is.
+    """
+    own, mapped = split_header(header)[1], None if signal is None else signal.unit
     if signal is not None and signal.gain is not None:
-        return None
-    text = signal.unit if signal is not None and signal.unit is not None else split_header(header)[1]
+        if mapped is None:
+            return None
+        raw = parse_unit(mapped, header, columns.path)
+        return raw if own is None or own.isdigit() else parse_unit(own, header, columns.path)  # or "name[1]"
+    text = own if mapped is None else mapped
     return None if text is None else parse_unit(text, header, columns.path)
 
 
@@ -204,6 +237,13 @@ def _in_unit(
             raise InputError(
                 f"{columns.path}: gain {signal.gain!r} of [signals] {name!r} is {gain}; a number but 0 is wanted"
             )
+        if signal.unit is not None and unit is not None:
+            if not fits(unit, str(parse_unit(signal.unit, header, columns.path))):
+                raise InputError(
+                    f"{columns.path}: column {header!r}: its unit does not fit unit = {signal.unit!r} of [signals] "
+                    f"{name!r}, which the gain counts per; correct one of them"
+                )
+            values = convert(values, unit, str(parse_unit(signal.unit, header, columns.path)))
         return values * gain
     if unit is None:
         return values
@@ -215,7 +255,17 @@ def _in_unit(
     return convert(values, unit, wanted)
 
 
-def _check_numbers(columns: Columns, header: str, values: np.ndarray) -> None:
+def _numbers(
+    columns: Columns,
+    header: str,
+    name: str,
+    values: np.ndarray,
+    unit: pint.Unit | None,
+    wanted: str,
+    signal: Signal | None,
+) -> np.ndarray:
+    """In the signal's unit, checked: finite or missing, and not all missing."""
+    values = _in_unit(columns, header, name, values, unit, wanted, signal)
     infinite = np.flatnonzero(np.isinf(values))
     if infinite.size:
         raise InputError(
@@ -227,6 +277,7 @@ def _check_numbers(columns: Columns, header: str, values: np.ndarray) -> None:
             f"{columns.path}: column {header!r}: holds no number in any of its {len(values)} rows; "
             "remove the column or record the channel"
         )
+    return values
 
 
 def _quality(dataset: xr.Dataset) -> list[str]:

@@ -39,7 +39,7 @@ class Signal:
         ``"/topic/field.path"`` in ROS 2 bags.
     unit : str, optional
         The column's unit; the header's own unit, or the signal's default, where it is left out.
-        With a gain it only documents the raw unit.
+        With a gain it is what the gain counts per: a header in another unit of its dimension is converted first.
     gain : float or str, optional
         Signal's default unit (N·m or N for ``tau``) per unit of the column, or the name of a number in the recording.
     """

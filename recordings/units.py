@@ -12,7 +12,9 @@ from ..errors import InputError
 UNITS: pint.UnitRegistry = pint.UnitRegistry(on_redefinition="ignore")
 UNITS.define("newton_meter = newton * meter = Nm")
 
-_DIMENSIONLESS = {"-": "", "–": "", "1": ""}
+_NONE = ("-", "–", "1")
+_WRITTEN = {r"(?<=/)s2\b": "s**2", r"\bN-(?=m)": "N*", r"\bNmm\b": "N*mm", r"\brev\b": "turn", r"^Celsius$": "degC"}
+"""What others write, and how pint reads it."""
 
 
 _POWER = re.compile(r"(?:\*\*|\^)\s*[-+]?\d{1,2}(?:\.\d{1,6})?(?![\d.])(?!\s*(?:\*\*|\^))")
@@ -38,7 +40,9 @@ def parse_unit(text: str, column: str, path: Path) -> pint.Unit:
     """The unit that ``text`` writes; InputError naming the column when pint does not know it."""
     try:
         check_unit(text)
-        return UNITS.Unit(_DIMENSIONLESS.get(text, text))
+        for pattern, spelled in _WRITTEN.items() if re.fullmatch(r"[\w/*^.-]+", text) else ():
+            text = re.sub(pattern, spelled, text)
+        return UNITS.Unit("" if text in _NONE else text)
     except Exception as error:  # pint raises half a dozen kinds, AssertionError among them
         raise InputError(
             f"{path}: column {column!r}: unit {text!r} is unknown to pint; write for example rad, deg/s, N*m or degC"

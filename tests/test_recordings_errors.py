@@ -238,3 +238,45 @@ def test_damaged_parquet(tmp_path):
 def test_nearest():
     assert nearest("Motor_Curent", ["q", "motor_current", "motor_voltage"]) == "motor_current"
     assert nearest("x", []) == ""
+
+
+@pytest.mark.parametrize(
+    ("column", "values", "word"),
+    [
+        ("temp.joint1", ["", "", ""], "no number"),
+        ("temp.joint1", [20, "inf", 20], "infinite"),
+        ("temp.joint1 [C]", [20, 20, 20], "does not fit"),
+        ("qd.joint1", ["nan"] * 3, "no number"),
+        ("qdd.joint1 [parsec]", [1, 2, 3], "does not fit"),
+        ("q.gripper", ["open", "open", "shut"], "open"),
+        ("tau.gripper [A]", [1, 2, 3], "does not fit"),
+    ],
+)
+def test_what_no_fit_of_a_model_needs_is_left_out_with_a_note(tmp_path, column, values, word):
+    rows = "".join(f"{0.1 * k},{k},{2 * k},{x}\n" for k, x in enumerate(values))
+    path = csv(tmp_path, f"time,q.joint1,tau.joint1,{column}\n{rows}")
+    data = read_recording(path, {}, {"joint1": "revolute"})
+    assert sorted(map(str, data.data_vars)) == ["q.joint1", "tau.joint1"]
+    name = column.partition(" ")[0]
+    (note,) = [n for n in data.attrs["notes"] if n.startswith(f"{name} is left out, no fit needs it: ")]
+    assert word in note
+    refused(path, word)  # read for itself, and where a model maps it
+    refused(path, word, signals={name: Signal(column)})
+
+
+def test_a_gain_counts_per_the_unit_beside_it(tmp_path):
+    path = csv(tmp_path, "time,q.j,i [mA]\n0,1,500\n1,2,1500\n")
+    data = read_recording(path, {"tau.j": Signal("i", unit="A", gain=4.0)})
+    np.testing.assert_allclose(data["tau.j"], [2.0, 6.0])
+    np.testing.assert_allclose(read_recording(path, {"tau.j": Signal("i", gain=4.0)})["tau.j"], [2000.0, 6000.0])
+    refused(path, "unknown to pint", "banana", signals={"tau.j": Signal("i", unit="banana", gain=4.0)})
+    refused(path, "does not fit unit = 'V'", signals={"tau.j": Signal("i", unit="V", gain=4.0)})
+
+
+@pytest.mark.parametrize(
+    ("column", "factor"),
+    [("qdd.j [rad/s2]", 1.0), ("tau.j [N-m]", 1.0), ("tau.j [Nmm]", 1e-3), ("q.j [rev]", 2 * np.pi)],
+)
+def test_units_as_they_are_commonly_written(tmp_path, column, factor):
+    data = read_recording(csv(tmp_path, f"time,{column}\n0,1\n1,2\n"))
+    np.testing.assert_allclose(data[column.partition(" ")[0]], [factor, 2 * factor])

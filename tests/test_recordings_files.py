@@ -135,3 +135,11 @@ def test_emps(name):
     np.testing.assert_allclose(data["tau.slide"], 35.15 * volts, rtol=1e-4)  # published rounded
     assert not any(np.isnan(values).any() for values in data.data_vars.values())
     assert not any("gap" in note or "missing" in note for note in data.attrs["notes"])
+
+
+def test_single_numbers_of_an_hdf5_file_serve_as_gains(tmp_path):
+    with h5py.File(tmp_path / "r.h5", "w") as file:
+        file["time"], file["q.j"], file["i"] = np.arange(3.0), np.zeros(3), np.array([1.0, 2.0, 3.0])
+        file.attrs["gtau"], file.attrs["by"] = 35.15, "nobody"
+    data = read_recording(tmp_path / "r.h5", {"tau.j": Signal("i", unit="V", gain="gtau")})
+    np.testing.assert_allclose(data["tau.j"], [35.15, 70.3, 105.45])
