@@ -55,6 +55,8 @@ def run(given: argparse.Namespace) -> None:
                     setup.stop, lambda t: progress(f"{t:.3f} s of {setup.stop:.3f} s", (t - setup.start) / span)
                 )
             except StepError as error:
+                if master.time <= setup.start:
+                    raise InputError(f"{given.system}: {error}; no step was made, nothing is written") from None
                 write_recording(master.result().recording, out)
                 raise InputError(f"{given.system}: {error}; {out} holds the run up to there") from None
             except KeyboardInterrupt:
@@ -66,6 +68,8 @@ def run(given: argparse.Namespace) -> None:
         for participant in setup.system.participants.values():
             participant.close()
     print(f"{result.steps} steps, {result.rejected} rejected, to {master.time:.9g} s")
+    for name in setup.open:
+        print(f"  nothing is connected to {name}: it kept its start value")
     for loop in result.loops:
         print(f"  algebraic loop solved: {loop}")
     for name, joules in result.residual.items():

@@ -24,6 +24,8 @@ class Setup:
         Macro step, first and last time [s].
     scheme, hold, iterate, control
         As `Master` takes them.
+    open : tuple of str
+        Inputs that the file leaves open: they keep their start values.
     """
 
     system: System
@@ -34,6 +36,7 @@ class Setup:
     hold: HoldName = "midpoint"
     iterate: bool | Iteration = False
     control: StepControl | None = None
+    open: tuple[str, ...] = ()
 
     def master(self) -> Master:
         """A master at the start."""

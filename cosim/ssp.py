@@ -1,7 +1,8 @@
 """Systems in SSP 1.0 files (System Structure and Parameterization, Modelica Association 2019): reading.
 
 Read are FMU components, systems inside systems, connections with linear transformations, and parameter sets and
-mappings, inside the description or in files of the archive. A system inside a system is dissolved: its component
+mappings, inside the description or in files of the archive. An input that nothing is connected to keeps the start value
+that its FMU gives, as SSP has it. A system inside a system is dissolved: its component
 ``arm`` becomes the participant ``inner_arm``. What has no counterpart here is refused by name.
 """
 
@@ -93,9 +94,12 @@ def _read(archive: zipfile.ZipFile, path: Path, hosting: Hosting, folder: Path, 
     connections = [_connection(flat, name, c, built) for name, (_, e) in flat.components.items() for c in _inputs(e)]
     parameters = _parameters(flat.values, flat, built)
     found = [c for c in connections if c is not None]
-    system = System(built, found, parameters=parameters, name=root.get("name") or path.stem)
+    bound = {c.target for c in found} | set(parameters)
+    inputs = {f"{name}.{v.name}": v for name, one in built.items() for v in one.variables if v.causality == "input"}
+    loose = {name: v.start for name, v in inputs.items() if name not in bound}
+    system = System(built, found, parameters={**parameters, **loose}, name=root.get("name") or path.stem)
     weakref.finalize(system, shutil.rmtree, folder, True)  # the FMUs' files, should the system be written again
-    return Setup(system, **_run(root))
+    return Setup(system, **_run(root), open=tuple(loose))
 
 
 def parsed(archive: zipfile.ZipFile, entry: str) -> ElementTree.Element:

@@ -41,16 +41,16 @@ class PlacedLaws:
         self._parameters: dict[str, dict[str, ca.SX]] = {}
         self._scales: dict[int, ca.SX] = {}
         self._temperatures: dict[int, ca.SX] = {}
-        speeds = [f"speed_scale.{self._name(p)}" for p in model.effects if "speed_scale" in reads(p.effect)]
-        model.demand_values(*speeds)
+        model.demand_values()
         for p in model.effects:
             self._parameters[p.key] = {x.name: self._parameter(p, x) for x in p.effect.parameters}
             j, read = self.joint_of(p), reads(p.effect)
             if "speed_scale" in read and j not in self._scales:
                 name = f"speed_scale.{self._name(p)}"
                 words = "peak speed in the recordings that the model was fitted to; sets how sharp friction turns over"
-                unit = self.unit(j, "S/s")
-                self._scales[j] = ledger.parameter(name, unit, model.values[name], words, (1e-9, np.inf))
+                limit = self._joints[j].speed
+                start = model.values.get(name, limit if 0 < limit < np.inf else 1.0)
+                self._scales[j] = ledger.parameter(name, self.unit(j, "S/s"), start, words, (1e-9, np.inf))
             if "temperature" in read and j not in self._temperatures:
                 self._temperatures[j] = ledger.input(f"temp.{self._name(p)}", "degC", f"temperature of {self._name(p)}")
 

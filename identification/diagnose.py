@@ -21,7 +21,7 @@ from .confirm import confirm
 from .diagnosis import Diagnosis, Step
 from .fitting.assembly import Assembly
 from .fitting.base_parameters import base_parameters
-from .fitting.experiment import Experiment, demand_apart, demand_torque, load_experiments, scales
+from .fitting.experiment import Experiment, demand_apart, load_experiments, scales, with_silence
 from .fitting.fit import Fit, channel_rms, fit
 from .identify import demand_one_process, inertial_values, physical
 from .links.answer import with_links
@@ -82,10 +82,9 @@ def diagnose(
     progress("reading and conditioning the recordings")
     prepare(effects().values())
     body = RigidBody(model.tree)
-    train = load_experiments(model, recordings, body)
+    train = with_silence(load_experiments(model, recordings, body))
     band = min(e.motion.band for e in train)
-    locked = load_experiments(model, [holdout], body, band)
-    demand_torque([*train, *locked])
+    locked = with_silence(load_experiments(model, [holdout], body, band))
     base = base_parameters(body) if model.inertia == "free" else None
     best = confirm(search(model, base, scales(train), train, progress=progress, seed=seed), train, locked, progress)
     last, rejected = best, {t.judged.placed.key: t for t in best.rejected}

@@ -16,7 +16,7 @@ from ..models.snare.setup import SnareTree
 from .fitting.assembly import Assembly
 from .fitting.base_parameters import INERTIAL, BaseParameters, base_parameters
 from .fitting.consistent_inertia import ConsistentInertia, consistent_inertia
-from .fitting.experiment import Experiment, demand_apart, demand_torque, load_experiments, scales
+from .fitting.experiment import Experiment, demand_apart, load_experiments, scales, with_silence
 from .fitting.fit import Fit, channel_rms, fit
 from .fitting.friction_curve import friction_curves, identifiable
 from .snare.identify import IdentifiedCaptures, identify_captures
@@ -137,10 +137,9 @@ def identify(
     demand_one_process(model, jobs)
     progress("reading and conditioning the recordings")
     body = RigidBody(model.tree)
-    train = load_experiments(model, recordings, body)
+    train = with_silence(load_experiments(model, recordings, body))
     band = min(e.motion.band for e in train)
-    locked = load_experiments(model, holdout, body, band) if holdout else []
-    demand_torque([*train, *locked])
+    locked = with_silence(load_experiments(model, holdout, body, band)) if holdout else []
     base = base_parameters(body) if model.inertia == "free" else None
     assembly = Assembly(model.tree, model.effects, base, scales(train), model.values)
     found = fit(assembly, train, progress=progress, seed=seed)

@@ -23,8 +23,8 @@ from ..models.rigid_body import RigidBody
 from ..recordings import JointKind, read_recording
 from ..recordings.condition import Motion, condition
 from .fitting.assembly import Assembly
-from .fitting.experiment import Experiment, scales
-from .fitting.floating_terms import outside, told, wheel_impulse, with_twist
+from .fitting.experiment import Experiment, motion_signals, scales, without_torque
+from .fitting.floating_terms import outside, told, wheel_impulse, with_base, with_twist
 
 Array = NDArray[np.float64]
 
@@ -39,7 +39,7 @@ def simulate_floating(model: Model, tree: FloatingTree, motion: str | Path) -> x
     tree : FloatingTree
         Its tree.
     motion : path
-        Recording with position and torque of every joint.
+        Recording with the position of every joint; torque is not used.
 
     Returns
     -------
@@ -59,10 +59,10 @@ def simulate_floating(model: Model, tree: FloatingTree, motion: str | Path) -> x
                 "feels; take it out to simulate"
             )
     kinds: dict[str, JointKind] = {j.name: j.kind for j in tree.joints}
-    dataset = read_recording(motion, model.signals, kinds)
+    dataset = with_base(without_torque(read_recording(motion, motion_signals(model), kinds), model), tree)
     recorded = f"vel.{tree.body}.x" in dataset
     known = with_twist(dataset, tree) if recorded else _at_rest(dataset, tree)
-    followed = condition(known, model.joints, model.bandwidth)
+    followed = condition(known, model.joints, model.bandwidth, fitted=False)
     if len(followed.segments) > 1:
         raise InputError(
             f"{motion}: the motion has {len(followed.segments) - 1} gaps, across which nobody knows where the base "

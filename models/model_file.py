@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..files import toml_table
 from ..recordings.signals import FORMS, Signal, is_signal, joint_of
 from .effects import get_effect
-from .floating.tree import n_carriers, read_floating
+from .floating.tree import UNNAMED, n_carriers, read_floating
 from .model import Model, Placed, places
 from .rig.file import read_slings
 from .rig.rig import Rig, built_in_rig
@@ -105,7 +105,7 @@ def _tree(path: Path, raw: Mapping[str, Any], system: str, urdf: Path | None, gr
         return read_setup(path, _text(path, raw, "name", path.stem), raw.get("capture"), list(gravity))
     if system == "free_floating_arm":
         try:
-            return read_floating(urdf, tuple(gravity), _text(path, raw, "base", "base"))
+            return read_floating(urdf, tuple(gravity), _text(path, raw, "base", UNNAMED))
         except InputError as error:
             raise InputError(str(error) if str(error).startswith(str(urdf)) else f"{path}: {error}") from None
     if "base" in raw:

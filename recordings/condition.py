@@ -7,7 +7,9 @@ Three linear-phase FIR filters, so that every sample is either exact or left out
 2. Measured and modelled torques, and every column of the model's Jacobian, pass the *same* low-pass and are thinned to
    twice the band (parallel filtering: Gautier 1997; Janot, Vandanjon, Gautier 2014). What aliases does so alike in
    both.
-3. Samples whose filter window leaves the recording, or touches a gap, are dropped, never padded.
+3. Samples whose filter window leaves the recording, or touches a gap, are dropped, never padded. Where holes of a few
+   samples, or a clock that jitters, would leave little between gaps, cubic splines bridge them and the notes say so;
+   the band then ends where the longest step bridged still carries it.
 """
 
 from collections.abc import Sequence
@@ -17,6 +19,7 @@ from itertools import pairwise
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 from scipy.signal import fftconvolve
 
 from ..errors import InputError, nearest
@@ -36,6 +39,17 @@ MINIMUM_SAMPLES = 50
 MINIMUM_RUN = 16
 """Fewest samples in the analysis band that a run between gaps must leave; a noise model remembers up to 12."""
 
+
+GAP, HOLE = 1.5, 4.5
+"""Steps, in those about them, from which on there is a gap; up to which splines may bridge."""
+
+PLENTY = 0.8
+"""Share of what bridging would leave that must be left without, in runs of `LONG` samples or more."""
+
+LONG = 120
+
+ABOUT = 31
+"""Steps whose median a step is held against: a recording may change its rate."""
 
 FEWEST = 64
 """Samples in the longest run from which on its spectrum tells the encoders' noise."""
@@ -72,6 +86,8 @@ class Motion:
     encoder_noise : array (3, n_joints)
         Standard deviation of position, rate and acceleration in the analysis band that white noise of the encoders,
         steps included, makes [rad or m, per s, per s²].
+    silent : tuple of int
+        Channels whose torque is zero throughout, but for a floor of noise.
     """
 
     path: str
@@ -88,6 +104,7 @@ class Motion:
     thinning: int
     notes: tuple[str, ...]
     encoder_noise: Array
+    silent: tuple[int, ...] = ()
 
     def to_band(self, x: Array) -> Array:
         """Low-pass and thin an array (n_samples, ...) segment by segment: (n_band, ...)."""
@@ -99,7 +116,7 @@ class Motion:
         return tuple(slice(int(a), int(b)) for a, b in pairwise(stops))
 
 
-def condition(dataset: xr.Dataset, joints: Sequence[str], band: float | None = None) -> Motion:
+def condition(dataset: xr.Dataset, joints: Sequence[str], band: float | None = None, *, fitted: bool = True) -> Motion:
     """Bring a recording onto a uniform clock, differentiate it, and choose its analysis band.
 
     Parameters
@@ -112,6 +129,8 @@ def condition(dataset: xr.Dataset, joints: Sequence[str], band: float | None = N
         Edge of the analysis band [Hz], lowered to a whole number of samples for one: a quarter of the sample rate at
         most. By default the lowest of 40 Hz, that, and the band in which the noise of the derived acceleration stays
         below a tenth of its signal on every moving joint.
+    fitted : bool
+        Whether torques will be compared in the band; a motion that is only followed may be shorter.
 
     Raises
     ------
@@ -138,28 +157,39 @@ def condition(dataset: xr.Dataset, joints: Sequence[str], band: float | None = N
         1,
     )
     notes = list(dataset.attrs.get("notes", ()))
-    pieces, period, uniform_note = _uniform_pieces(stamps, q, tau, temperature)
+    period = float(np.median(np.diff(stamps)))
+    pieces, uniform_note, longest = _uniform_pieces(stamps, q, tau, temperature, period, GAP)
+    if _usable(pieces) < PLENTY * (stamps[-1] - stamps[0]):
+        bridged = _uniform_pieces(stamps, q, tau, temperature, period, HOLE)
+        if _usable(pieces) < PLENTY * _usable(bridged[0]):
+            pieces, uniform_note, longest = bridged
     notes += uniform_note
     rate = 1.0 / period
     limit = "as asked"
     positions = max([p[1] for p in pieces], key=len, default=np.zeros((0, len(joints))))
     white = _white_level(positions, period)
     if band is None:
-        edge = min(BAND_CAP, rate / 2.5)
+        edge = min(BAND_CAP, rate / 2.5, 1 / (2 * longest))
         band, limit = _band_from_noise(positions, white, period, edge)
     elif not 0 < band <= rate / 2.5:
         raise InputError(
             f"{path}: bandwidth {band:g} Hz cannot be carried at {rate:.4g} samples a second; "
             f"allowed is 0 < bandwidth <= {rate / 2.5:.4g} Hz: give one in the model file"
         )
+    band = min(band, 1 / (2 * longest))
     thinning = max(1, int(np.ceil(rate / (2 * band) - 1e-9)))
     band = rate / (2 * thinning)
     notes.append(f"analysis band 0 to {band:.3g} Hz ({limit}; every {thinning} samples make one)")
     kernels = derivative_kernels(min(band, rate / 2.5), rate)
     half = len(kernels[0]) // 2
-    shortest = 2 * half + 1 + 2 * thin_half(thinning) + MINIMUM_RUN * thinning
+    shortest = 2 * half + 1 + (2 * thin_half(thinning) + MINIMUM_RUN * thinning if fitted else 0)
     parts, segments, start = [], [], 0
-    for t, pq, ptau, ptemp in pieces:
+    for t, pq, ptau, ptemp, step in pieces:
+        if step > 1 / (2 * band):
+            notes.append(
+                f"{t[0]:.3f} s to {t[-1]:.3f} s is sampled at {1 / step:.3g} Hz, too slow for the band: left out"
+            )
+            continue
         if len(t) < shortest:
             notes.append(f"{len(t)} samples from {t[0]:.3f} s on stand alone between gaps: too few to filter, left out")
             continue
@@ -169,7 +199,7 @@ def condition(dataset: xr.Dataset, joints: Sequence[str], band: float | None = N
         segments.append(slice(start, start + len(t) - 2 * half))
         start = segments[-1].stop
     kept = sum(thinned_length(s.stop - s.start, thinning) for s in segments)
-    if kept < MINIMUM_SAMPLES:
+    if not parts or (fitted and kept < MINIMUM_SAMPLES):
         raise InputError(
             f"{path}: too few samples: {len(stamps)} rows leave {kept} in the {band:.3g} Hz analysis band, at least "
             f"{MINIMUM_SAMPLES} are needed; record longer, or close the gaps"
@@ -194,21 +224,35 @@ def condition(dataset: xr.Dataset, joints: Sequence[str], band: float | None = N
     )
 
 
+def _usable(pieces: Sequence[tuple[Array, Array, Array, Array, float]]) -> float:
+    """Time [s] in runs that are long enough to filter."""
+    return float(sum(p[0][-1] - p[0][0] for p in pieces if len(p[0]) >= LONG))
+
+
 def _uniform_pieces(
-    t: Array, q: Array, tau: Array, temperature: Array
-) -> tuple[list[tuple[Array, Array, Array, Array]], float, list[str]]:
-    """Cut at gaps and missing samples; put jittered stamps on a uniform clock by cubic splines, and say so."""
+    t: Array, q: Array, tau: Array, temperature: Array, period: float, gap: float
+) -> tuple[list[tuple[Array, Array, Array, Array, float]], list[str], float]:
+    """Cut at gaps; put stamps that jitter, or leave holes, on a uniform clock by cubic splines, and say so.
+
+    Pieces are time, position, torque, temperature, and the mean step that was recorded; the last is the longest step.
+    """
     from scipy.interpolate import CubicSpline  # here only: a recording with an even clock never needs it
 
     good = np.isfinite(q).all(1) & np.isfinite(tau).all(1)
-    period = float(np.median(np.diff(t)))
-    jitter, other_rates = 0.0, 0
+    jitter, other_rates, lone, longest = 0.0, 0, 0, period
     index = np.flatnonzero(good)
-    cuts = np.flatnonzero((np.diff(index) > 1) | (np.diff(t[index]) > 1.5 * period)) + 1
-    pieces: list[tuple[Array, Array, Array, Array]] = []
+    steps = np.diff(t[index])
+    local = np.maximum(median_filter(steps, ABOUT, mode="nearest"), period)
+    wide = (
+        (steps > gap * local) | np.r_[False, local[1:] > gap * local[:-1]] | np.r_[local[:-1] > gap * local[1:], False]
+    )
+    cuts = np.flatnonzero(wide | ((np.diff(index) > 1) & (gap < HOLE))) + 1
+    pieces: list[tuple[Array, Array, Array, Array, float]] = []
     for run in np.split(index, cuts):
         if len(run) < 4:
+            lone += len(run)
             continue
+        longest = max(longest, float(np.max(np.diff(t[run])))) if gap == HOLE else longest
         step = (t[run[-1]] - t[run[0]]) / (len(run) - 1)
         even = t[run[0]] + step * np.arange(len(run))
         deviation = float(np.max(np.abs(t[run] - even))) / period
@@ -216,14 +260,22 @@ def _uniform_pieces(
         other_rate = abs(step / period - 1) > 1e-3
         other_rates += other_rate
         if deviation <= 0.02 and not other_rate:
-            pieces.append((t[run], q[run], tau[run], temperature[run]))
+            pieces.append((t[run], q[run], tau[run], temperature[run], period))
             continue
         even = t[run[0]] + period * np.arange(int((t[run[-1]] - t[run[0]]) / period + 1e-9) + 1)
         spline = [CubicSpline(t[run], x[run])(even) for x in (q, tau)]
-        pieces.append((even, *spline, np.stack([np.interp(even, t[run], x) for x in temperature[run].T], 1)))
+        warm = np.stack([np.interp(even, t[run], x) for x in temperature[run].T], 1)
+        pieces.append((even, *spline, warm, float(step)))
     notes = []
     if len(index) < len(t):
         notes.append(f"{len(t) - len(index)} of {len(t)} samples have a missing position or torque and are left out")
+    if lone:
+        notes.append(f"{lone} samples stand alone between gaps, fewer than four side by side: left out")
+    if longest > GAP * period:
+        notes.append(
+            f"steps of up to {1e3 * longest:.3g} ms between samples are bridged by cubic splines, as gaps there would "
+            f"leave little; the analysis band ends at {1 / (2 * longest):.3g} Hz or before"
+        )
     if len(pieces) > 1:
         notes.append(f"{len(pieces)} runs between gaps are fitted side by side; nothing is interpolated across a gap")
     if jitter > 0.02:
@@ -232,9 +284,9 @@ def _uniform_pieces(
             f"an even "
             f"{1 / period:.4g} Hz clock inside each run"
         )
-    if other_rates:
+    if other_rates and longest <= GAP * period:
         notes.append(f"{other_rates} runs are not sampled at {1 / period:.4g} Hz: cubic splines put them there")
-    return pieces, period, notes
+    return pieces, notes, longest
 
 
 def _power(position: Array, period: float) -> tuple[Array, Array]:

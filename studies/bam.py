@@ -114,8 +114,8 @@ def numbers(
     final = named[-1].fit if named else base
     before, after = position_error(held, base.values), position_error(held, final.values)
     quantities = [
-        Quantity("named", "", [t.name for t in named] or ["nothing"], "calibrated"),
-        Quantity("documented", "", [t.name for t in named if t.name in DOCUMENTED] or ["nothing"], "reference"),
+        Quantity("named", "", ", ".join(t.name for t in named) or "nothing", "calibrated"),
+        Quantity("documented", "", ", ".join(t.name for t in named if t.name in DOCUMENTED) or "nothing", "reference"),
         Quantity("error.publishers_parameters", "rad", position_error(held, PUBLISHED), "reference"),
         Quantity("error.coulomb_and_viscous", "rad", before, "predicted", CHECK["coulomb_and_viscous"]),
     ]

@@ -61,7 +61,7 @@ def main() -> int:
     quantities += [
         Quantity("relative_error_fitted", "1", last.train, "reference"),
         Quantity("relative_error_held_out", "1", last.holdout, "reference"),
-        Quantity("named", "", [f"{e.name} at {e.at}" for e in found.effects], "reference"),
+        Quantity("named", "", ", ".join(f"{e.name} at {e.at}" for e in found.effects), "reference"),
         Quantity("second_verdict", "", again.verdict, "reference"),
     ]
     write_json(OUT / "diagnosis.json", found.to_json())

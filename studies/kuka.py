@@ -87,7 +87,7 @@ def compare(answer: Answer, recordings: list[Path], holdout: Path) -> tuple[list
     named = [f"{e.name} at {e.at}" for e in found.effects]
     quantities = [
         Quantity("leads_with", "", found.effects[0].name if found.effects else found.verdict, "predicted"),
-        Quantity("named", "", named, "reference"),
+        Quantity("named", "", ", ".join(named), "reference"),
     ]
     channels = {f.channel: f for f in found.fit}
     felt = springs_of_measured_torque(pairs, train, load_experiments(model, [holdout], body, band))
@@ -136,7 +136,7 @@ def compare(answer: Answer, recordings: list[Path], holdout: Path) -> tuple[list
                     )
                 )
     left = [p.named.trial.placed.key for link in again for p in link.proofs]
-    quantities.append(Quantity("named_in_the_improved_model", "", left or ["nothing"], "reference"))
+    quantities.append(Quantity("named_in_the_improved_model", "", ", ".join(left) or "nothing", "reference"))
     picture = Picture(
         differences(AXES, before, after),
         "Difference of link and motor encoder over time on run C, for three axes, as recorded and with what was named.",

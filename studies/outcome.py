@@ -18,7 +18,8 @@ class Quantity:
     Parameters
     ----------
     name, unit : str
-    ours : float, str or list of str
+    ours : float or str
+        A number, or names, one after the other with commas between.
     kind : "calibrated", "predicted" or "reference"
         Calibrated: a free parameter was set to meet the paper's number. Reference: there is nothing to compare with.
     paper : float or None
@@ -28,7 +29,7 @@ class Quantity:
 
     name: str
     unit: str
-    ours: float | str | list[str]
+    ours: float | str
     kind: Literal["calibrated", "predicted", "reference"]
     paper: float | None = None
     low: float | None = None
@@ -62,13 +63,7 @@ def table(quantities: Sequence[Quantity]) -> str:
     """The quantities for a terminal: name, paper, ours, interval, kind."""
     lines = [f"  {'quantity':<32}{'paper':>12}{'ours':>14}  {'interval':<24}{'unit':<8}kind"]
     for q in quantities:
-        ours = (
-            f"{q.ours:.6g}"
-            if isinstance(q.ours, int | float)
-            else q.ours
-            if isinstance(q.ours, str)
-            else ", ".join(q.ours)
-        )
+        ours = q.ours if isinstance(q.ours, str) else f"{q.ours:.6g}"
         paper = "" if q.paper is None else f"{q.paper:g}"
         interval = "" if q.low is None or q.high is None else f"{q.low:.4g} to {q.high:.4g}"
         lines.append(f"  {q.name:<32}{paper:>12}{ours:>14}  {interval:<24}{q.unit:<8}{q.kind}")

@@ -155,10 +155,8 @@ def _said(words: str) -> str:
     return f'<span class="said">{escape(words)}</span>'
 
 
-def _text(ours: float | str | list[str]) -> str:
-    if isinstance(ours, str):
-        return ours
-    return ", ".join(ours) if isinstance(ours, list) else f"{ours:.4g}"
+def _text(ours: float | str) -> str:
+    return ours if isinstance(ours, str) else f"{ours:.4g}"
 
 
 def _frame(playback: str, caption: str, clock: Clock) -> str:

@@ -12,7 +12,7 @@ from snarelab.studies.page import Picture
 QUANTITIES = [
     Quantity("first_contact", "s", 2.57, "calibrated", paper=2.6, low=2.55, high=2.61),
     Quantity("final_radial_y", "m", 0.00797, "predicted", paper=0.01),
-    Quantity("named", "1", ["joint_elasticity at joint2", "<odd>"], "reference"),
+    Quantity("named", "1", "joint_elasticity at joint2, <odd>", "reference"),
 ]
 TIMES = np.linspace(0, 4, 401)
 

@@ -244,14 +244,13 @@ def test_too_few_samples_are_refused(n, band):
         condition(recording(t, sine(t, 1.0)[0]), ["joint1"], band)
 
 
-@pytest.mark.parametrize("every", [2, 4])
 @pytest.mark.parametrize("band", [None, BAND])
-def test_no_run_long_enough_is_refused(every, band):
+def test_no_run_long_enough_is_refused(band):
     """Two sensors on clocks of their own: each row lacks one or the other."""
     t = clock()
     q, tau = sine(t, 1.0)[0], np.ones(len(t))
-    q[::every] = np.nan
-    tau[1::every] = np.nan
+    q[::2] = np.nan
+    tau[1::2] = np.nan
     with pytest.raises(InputError, match=r"too few samples.*close the gaps"):
         condition(recording(t, q, tau), ["joint1"], band)
 
@@ -289,3 +288,56 @@ def test_an_encoder_without_noise_has_none():
     time = clock(60.0)
     noise = condition(recording(time, sine(time, 0.7)[0]), ["joint1"], BAND).encoder_noise
     assert noise[2, 0] < 1e-6
+
+
+def holed(kind, rng):
+    """Stamps and which samples have a torque: little is left between gaps, though no hole is long."""
+    t, known = clock(20.0), None
+    if kind == "jitter":
+        t = t + rng.uniform(-0.4, 0.4, len(t)) / RATE
+    elif kind == "rows":
+        t = t[rng.random(len(t)) > 0.05]
+    known = np.ones(len(t), bool)
+    if kind == "cells":
+        known = rng.random(len(t)) > 0.03
+    elif kind == "two clocks":
+        known = np.arange(len(t)) % 4 > 1
+    return t, known
+
+
+@pytest.mark.parametrize("kind", ["jitter", "rows", "cells", "two clocks"])
+@pytest.mark.parametrize("band", [None, BAND])
+def test_short_holes_are_bridged_where_little_would_be_left_between_them(kind, band):
+    t, known = holed(kind, np.random.default_rng(3))
+    tau = np.full(len(t), np.nan)
+    tau[known] = sine(t, 2.0)[1][known]
+    motion = condition(recording(t, sine(t, 2.0)[0], tau), ["joint1"], band)
+    longest = np.max(np.diff(t[known]))
+    noted(motion, "bridged by cubic splines", f"{1e3 * longest:.3g} ms")
+    assert motion.band <= 1 / (2 * longest) + 1e-9
+    assert len(motion.time) > 0.95 * (t[-1] - t[0]) * RATE
+    # Cubic splines between samples a step apart: (5/384) step^4 w^4 of the size.
+    error = 5 / 384 * (longest * 4 * np.pi) ** 4
+    np.testing.assert_allclose(motion.q[:, 0], sine(motion.time, 2.0)[0], atol=2 * error + 1e-5)
+    np.testing.assert_allclose(motion.tau[:, 0], sine(motion.time, 2.0)[1], atol=4 * np.pi * (2 * error + 1e-5))
+    np.testing.assert_allclose(motion.qdd[:, 0], sine(motion.time, 2.0)[2], atol=0.01 * (4 * np.pi) ** 2)
+
+
+def test_a_recording_may_change_its_rate():
+    t = np.concatenate([clock(8.0), 8.0 + clock(8.0, RATE / 2)])
+    motion = condition(recording(t, sine(t, 1.0)[0]), ["joint1"], BAND)
+    assert motion.time[-1] > 15.5
+    noted(motion, "1 runs are not sampled at 200 Hz")
+    np.testing.assert_allclose(motion.qdd[:, 0], sine(motion.time, 1.0)[2], atol=1e-3 * (2 * np.pi) ** 2)
+    slow = np.concatenate([clock(8.0), 8.0 + clock(8.0, 30.0)])
+    motion = condition(recording(slow, sine(slow, 1.0)[0]), ["joint1"], BAND)
+    assert motion.time[-1] < 8.0
+    noted(motion, "sampled at 30 Hz, too slow for the band: left out")
+
+
+def test_what_is_only_followed_may_be_short():
+    t = clock()[:80]
+    motion = condition(recording(t, sine(t, 1.0)[0]), ["joint1"], BAND, fitted=False)
+    np.testing.assert_allclose(motion.qd[:, 0], sine(motion.time, 1.0)[1], atol=1e-2)
+    with pytest.raises(InputError, match="too few samples"):
+        condition(recording(t[:8], sine(t[:8], 1.0)[0]), ["joint1"], BAND, fitted=False)

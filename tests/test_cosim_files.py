@@ -118,6 +118,13 @@ def test_failed_run_keeps_its_recording(halves, tmp_path):
     assert len(pd.read_csv(tmp_path / "run.csv")) == 51
 
 
+def test_a_run_that_fails_in_its_first_step_leaves_nothing(halves, tmp_path):
+    text = TOML.replace("mass = 2", "mass = 2, fault = 1, fault_time = 0.0")
+    with pytest.raises(InputError, match="no step was made, nothing is written"):
+        command(written(halves, text, "bad.toml"), "--out", tmp_path / "run.csv")
+    assert not (tmp_path / "run.csv").exists()
+
+
 def test_interrupted_run_keeps_its_recording(halves, tmp_path, monkeypatch, capsys):
     def stopped(participant, time, size):
         if time > 0.1:

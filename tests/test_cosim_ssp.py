@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from bench.oscillator_fmu import build
+from snarelab.cli import main
 from snarelab.cosim.participants.fmu import Fmu
 from snarelab.cosim.participants.oscillator import LeftOscillator
 from snarelab.cosim.setup import Hosting, Setup, load_setup
@@ -202,6 +203,19 @@ def test_mistakes_in_ssp_are_named_with_the_file(halves, tmp_path, old, new, mes
         load_setup(path, HERE)
     assert message in str(caught.value)
     assert str(caught.value).startswith(str(path))
+
+
+def test_inputs_that_an_ssp_leaves_open_keep_their_start_values(halves, tmp_path, capsys):
+    lone = HAND.replace(
+        '<Connection startElement="inner" startConnector="place" endElement="right" endConnector="x_left"/>', ""
+    )
+    setup = load_setup(by_hand(halves, tmp_path / "open.ssp", lone), HERE)
+    assert setup.open == ("right.x_left",)
+    assert setup.system.given["right.x_left"] == 0.0
+    for participant in setup.system.participants.values():
+        participant.close()
+    assert main(["cosim", str(tmp_path / "open.ssp"), "--out", str(tmp_path / "run.csv"), "--same-process"]) == 0
+    assert "nothing is connected to right.x_left: it kept its start value" in capsys.readouterr().out
 
 
 def test_unconverted_units_are_refused_only_where_they_differ(halves, tmp_path):

@@ -29,9 +29,13 @@ JOINTS = ("shoulder", "elbow")
 NOISE = {"q": 1e-6, "tau": 0.02, "vel": 2e-6, "omega": 2e-6}
 
 
-def recorded(path, seed, torque=(0.0, 0.0, 0.0), friction=0.0, hub=RIGID):
-    """Servo both joints along sines, with a torque on the base in its own axes and Coulomb friction in the shoulder."""
-    plant = mujoco.MjModel.from_xml_string(MJCF.format(step=STEP, hub=hub))
+def recorded(path, seed, torque=(0.0, 0.0, 0.0), friction=0.0, hub=RIGID, planar=False, name="hub"):
+    """Servo both joints along sines, with a torque on the base in its own axes and Coulomb friction in the shoulder.
+
+    ``planar`` keeps all motion in a plane, exactly.
+    """
+    text = MJCF.format(step=STEP, hub=hub)
+    plant = mujoco.MjModel.from_xml_string(in_a_plane(text) if planar else text)
     data, rng = mujoco.MjData(plant), np.random.default_rng(seed)
     at = [plant.joint(name).qposadr[0] for name in JOINTS], [plant.joint(name).dofadr[0] for name in JOINTS]
     periods, phases = rng.uniform(5, 9, (2, 2)), rng.uniform(0, 2 * np.pi, (2, 2))
@@ -57,13 +61,27 @@ def recorded(path, seed, torque=(0.0, 0.0, 0.0), friction=0.0, hub=RIGID):
             rows.append(np.concatenate([[data.time], q, (last + drive) / 2, data.qvel[:3], omega, data.qpos[3:7]]))
         mujoco.mj_step(plant, data)
     names = [f"q.{j}" for j in JOINTS] + [f"tau.{j}" for j in JOINTS]
-    names += [f"{kind}.hub.{a}" for kind in ("vel", "omega") for a in "xyz"] + [f"quat.hub.{a}" for a in "wxyz"]
+    names += [f"{kind}.{name}.{a}" for kind in ("vel", "omega") for a in "xyz"] + [f"quat.{name}.{a}" for a in "wxyz"]
     table = np.array(rows)
+    still = np.ptp(table[:, 1:], axis=0) < 1e-12 if planar else np.zeros(len(names), bool)
     columns = {}
-    for name, x in zip(names, table[:, 1:].T, strict=True):
-        columns[name] = ("time", x + NOISE.get(name.split(".")[0], 0.0) * rng.normal(size=len(x)))
+    for signal, x, rests in zip(names, table[:, 1:].T, still, strict=True):
+        noise = 0.0 if rests else NOISE.get(signal.split(".")[0], 0.0)
+        columns[signal] = ("time", (np.round(x, 12) if rests else x) + noise * rng.normal(size=len(x)))
     write_recording(xr.Dataset(columns, coords={"time": table[:, 0]}), path)
     return path
+
+
+def in_a_plane(text):
+    """A description, MuJoCo's or a URDF, with nothing above or below the plane, and every axis upright."""
+    for old, new in (
+        ('axis="0 1 0"', 'axis="0 0 1"'),
+        ('axis xyz="0 1 0"', 'axis xyz="0 0 1"'),
+        ("0.1 0 0.05", "0.1 0 0"),
+        ("0.6 0.2 0.1", "0.6 0.2 0"),
+    ):
+        text = text.replace(old, new)
+    return text
 
 
 def test_external_torque_is_named(tmp_path):
@@ -73,7 +91,7 @@ def test_external_torque_is_named(tmp_path):
     assert [(e.name, e.at) for e in found.effects] == [("external_torque", "base")]
     got = found.effects[0].parameters
     np.testing.assert_allclose([got[a].value for a in "xyz"], torque, atol=1e-3)
-    assert {place.channel for place in found.location} <= {f"torque.base.{a}" for a in "xyz"}
+    assert {place.channel for place in found.location} <= {f"torque.hub.{a}" for a in "xyz"}
 
 
 def test_rigid_body_is_adequate_and_reads_back(tmp_path):
@@ -81,7 +99,7 @@ def test_rigid_body_is_adequate_and_reads_back(tmp_path):
     believed = model(tmp_path)
     assert diagnose(believed, [train], held).diagnosis.verdict == "adequate"
     fits = identify(believed, [train]).to_json()["fit"]
-    assert all(fits[f"torque.base.{a}"]["train"]["relative"] < 2e-3 for a in "xyz")
+    assert all(fits[f"torque.hub.{a}"]["train"]["relative"] < 2e-3 for a in "xyz")
     save_model(believed, tmp_path / "again.toml", "")
     again = load_model(tmp_path / "again.toml")
     assert again.joints == believed.joints
@@ -108,8 +126,8 @@ def test_bending_panels_are_named(tmp_path):
 
 def test_bad_input(tmp_path):
     train = recorded(tmp_path / "1.csv", 1)
-    with pytest.raises(InputError, match=r"no signal 'quat.base.w' of the floating base"):
-        identify(model(tmp_path, base="base"), [train])
+    with pytest.raises(InputError, match=r"no signal 'quat.craft.w' of the floating base"):
+        identify(model(tmp_path, base="craft"), [train])
     with pytest.raises(InputError, match="nothing to hold it would fall"):
         model(tmp_path, "gravity = [0.0, 0.0, -9.81]")
 
@@ -119,3 +137,38 @@ def test_what_carries_the_base_has_no_encoder(tmp_path):
         for kind in ("q", "q_link"):
             with pytest.raises(InputError, match=rf"at '{kind}\.{carrier.name}'; this model has .*q\.shoulder"):
                 model(tmp_path, f'effects = [{{ name = "sensor_delay", at = "{kind}.{carrier.name}" }}]')
+
+
+@pytest.mark.parametrize("torque", [0.0, 0.2])
+def test_a_base_in_a_plane_is_silent_out_of_it(tmp_path, torque):
+    """Its velocity and spin out of the plane are zero to the last digit, and so are the channels made of them."""
+    train, held = (recorded(tmp_path / f"{k}.csv", k, (0.0, 0.0, torque), planar=True, name="bus") for k in (1, 2))
+    model(tmp_path)
+    urdf = tmp_path / "servicer.urdf"
+    urdf.write_text(in_a_plane(urdf.read_text()))
+    (tmp_path / "plane.toml").write_text('name = "plane"\nsystem = "free_floating_arm"\nurdf = "servicer.urdf"\n')
+    found = diagnose(load_model(tmp_path / "plane.toml"), [train], held).diagnosis
+    assert [(e.name, e.at) for e in found.effects] == [("external_torque", "base")] * bool(torque), found.sentence
+    silent = [f"force.base.{a}" for a in "z"] + [f"torque.base.{a}" for a in "xy"]
+    assert any("force.base.z, torque.base.x, torque.base.y: zero in every row" in note for note in found.notes)
+    assert any("the base is taken to be 'bus'" in note for note in found.notes)
+    errors = {f.channel: f for f in found.fit}
+    assert max(errors[c].holdout.relative_before for c in silent) < 1e-5
+    assert [place.channel for place in found.location] == ["torque.base.z"] * bool(torque)
+
+
+def test_a_base_with_a_name_of_its_own_needs_no_key(tmp_path):
+    model(tmp_path)
+    (tmp_path / "m.toml").write_text('system = "free_floating_arm"\nurdf = "servicer.urdf"\n')
+    path = recorded(tmp_path / "1.csv", 1, name="spacecraft")
+    given = load_model(tmp_path / "m.toml")
+    assert "force.base.x" in identify(given, [path]).to_json()["fit"]
+    named = load_model(written(tmp_path, 'base = "spacecraft"'))
+    assert "torque.spacecraft.z" in identify(named, [path]).to_json()["fit"]
+    with pytest.raises(InputError, match=r"no signal 'quat\.bus\.w' of the floating base"):
+        identify(load_model(written(tmp_path, 'base = "bus"')), [path])
+
+
+def written(folder, line):
+    (folder / "n.toml").write_text(f'system = "free_floating_arm"\nurdf = "servicer.urdf"\n{line}\n')
+    return folder / "n.toml"

@@ -71,9 +71,7 @@ def test_without_a_recorded_base_there_is_no_momentum(tmp_path):
     """ETS-VII, from joints alone; momentum by functions that the simulation does not use."""
     time = np.arange(0.0, 20.0, 0.02)
     waves = {f"joint{k}": 0.3 * np.sin(0.2 * k * time + k) for k in range(1, 7)}
-    columns = {f"q.{j}": ("time", q) for j, q in waves.items()} | {
-        f"tau.{j}": ("time", 1 + 0 * q) for j, q in waves.items()
-    }
+    columns = {f"q.{j}": ("time", q) for j, q in waves.items()}  # no torque
     write_recording(xr.Dataset(columns, coords={"time": time}), tmp_path / "motion.csv")
     (tmp_path / "ets.toml").write_text('system = "free_floating_arm"\n')
     found = simulate(load_model(tmp_path / "ets.toml"), tmp_path / "motion.csv")

@@ -180,9 +180,22 @@ def test_floating_base_keeps_its_momentum_and_agrees_with_another_engine(tmp_pat
 
 
 def test_a_missing_value_is_named(tmp_path):
-    path = write_model(tmp_path, "arm", 1, '["coulomb_friction"]', {"coulomb_friction.joint1.level": 1.0})
-    with pytest.raises(InputError, match=r"no value for 'speed_scale.joint1' \(1 missing\)"):
+    path = write_model(tmp_path, "arm", 1, '["coulomb_friction"]', {})
+    with pytest.raises(InputError, match=r"no value for 'coulomb_friction.joint1.level' \(1 missing\)"):
         model_equations(load_model(path))
+
+
+def test_friction_turns_over_by_the_joints_speed_limit_where_no_recording_says(tmp_path):
+    path = write_model(tmp_path, "arm", 1, '["coulomb_friction"]', {"coulomb_friction.joint1.level": 1.0})
+    model = load_model(path)
+    (scale,) = [v for v in model_equations(model).of("parameter") if v.name == "speed_scale.joint1"]
+    limit = model.tree.joints[0].speed
+    assert scale.start == (limit if np.isfinite(limit) else 1.0)
+    fitted = write_model(
+        tmp_path, "fitted", 1, '["coulomb_friction"]', {"coulomb_friction.joint1.level": 1.0, "speed_scale.joint1": 0.7}
+    )
+    (scale,) = [v for v in model_equations(load_model(fitted)).of("parameter") if v.name == "speed_scale.joint1"]
+    assert scale.start == 0.7
 
 
 def test_a_servo_on_a_floating_base_moves_as_the_participant_does(tmp_path):

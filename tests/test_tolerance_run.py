@@ -216,4 +216,5 @@ def test_scheduler_and_workers_of_their_own(command, tmp_path):
 def test_unreachable_scheduler(command, tmp_path):
     message = finish(command("out", "--scheduler", "tcp://127.0.0.1:1"), status=2)
     assert "scheduler 'tcp://127.0.0.1:1' cannot be reached" in message
+    assert not (tmp_path / "out").exists()
     assert message.count("\n") == 1

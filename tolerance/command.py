@@ -25,10 +25,12 @@ def run(given: argparse.Namespace) -> None:
     from ..progress import Progress
     from .report import summarise
     from .results import Results
-    from .run import run_study
+    from .run import demand_scheduler, run_study
     from .study import load_study
 
     study = load_study(given.study)
+    if given.scheduler is not None:
+        demand_scheduler(given.scheduler)  # before anything is written
     results = Results(given.out, study)
     try:
         with Progress() as progress:

@@ -199,16 +199,26 @@ def _ignored_interrupt() -> Iterator[None]:
 
 @contextmanager
 def _client(jobs: int, scheduler: str | None) -> Iterator[Any]:
-    from dask.distributed import Client
-
     if scheduler is None:
+        from dask.distributed import Client
+
         with local_cluster(jobs) as cluster, Client(cluster) as client:
             yield client
         return
+    with _reached(scheduler) as client:
+        yield client
+
+
+def demand_scheduler(address: str) -> None:
+    """Refuse an address where no scheduler answers (InputError)."""
+    _reached(address).close()
+
+
+def _reached(address: str) -> Any:
+    from dask.distributed import Client
+
     try:
-        client = Client(scheduler, timeout="5s")
+        return Client(address, timeout="5s")
     except (OSError, TimeoutError, ValueError) as error:
         reason = " ".join(str(error).split())[:120]
-        raise InputError(f"scheduler {scheduler!r} cannot be reached: {reason}; is it running there?") from None
-    with client:
-        yield client
+        raise InputError(f"scheduler {address!r} cannot be reached: {reason}; is it running there?") from None

@@ -11,16 +11,20 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...models.floating.tree import CARRIERS, FloatingTree
+from ...models.floating.tree import CARRIERS, FloatingTree, channel, n_carriers
 from ...models.model import Model
 from ...models.rig.kinematics import sling_map
 from ...models.rig.rig import Rig
 from ...models.rigid_body import RigidBody
 from ...recordings import JointKind, read_recording
 from ...recordings.condition import Motion, condition
-from .floating_terms import as_carriers, twist_noise, wheel_impulse, with_twist
+from ...recordings.signals import Signal
+from .floating_terms import as_carriers, twist_noise, wheel_impulse, with_base, with_twist
 
 Array = NDArray[np.float64]
+
+NOTHING, FLOOR = 1e-10, 1e-6
+"""Share of the largest torque up to which a channel reads nothing; and of its floor of noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,16 +176,17 @@ def load_experiments(
     if not paths:
         raise InputError("recordings: none is given; give one or more")
     kinds: dict[str, JointKind] = {j.name: j.kind for j in model.tree.joints}
-    datasets = [read_recording(path, model.signals, kinds) for path in paths]
-    if not torque:
-        datasets = [d.assign({f"tau.{j}": ("time", np.ones(d.sizes["time"])) for j in model.joints}) for d in datasets]
+    if torque:
+        datasets = [read_recording(path, model.signals, kinds) for path in paths]
+    else:
+        datasets = [without_torque(read_recording(path, motion_signals(model), kinds), model) for path in paths]
     measured = [_tensions(d, model) for d in datasets]
     tree = model.tree
     if isinstance(tree, FloatingTree):
-        datasets = [with_twist(d, tree) for d in datasets]
+        datasets = [with_twist(with_base(d, tree), tree) for d in datasets]
     datasets = [_without_gaps_in(t, d) for t, d in zip(measured, datasets, strict=True)]
     wanted = band or model.bandwidth
-    motions = [condition(d, model.joints, wanted) for d in datasets]
+    motions = [condition(d, model.joints, wanted, fitted=torque) for d in datasets]
     narrowest = min(m.band for m in motions)
     if any(m.band > 1.01 * narrowest for m in motions):
         motions = [condition(d, model.joints, narrowest) for d in datasets]
@@ -198,6 +203,16 @@ def load_experiments(
         Experiment(m, body, {name: np.interp(m.time, d["time"].values, x) for name, x in t.items()})
         for m, d, t in zip(motions, datasets, measured, strict=True)
     ]
+
+
+def motion_signals(model: Model) -> dict[str, Signal]:
+    """A model's [signals] but for torques, which a motion that is only followed need not have."""
+    return {name: signal for name, signal in model.signals.items() if not name.startswith("tau.")}
+
+
+def without_torque(dataset: xr.Dataset, model: Model) -> xr.Dataset:
+    """The recording with ones for every joint's torque: it then decides on nothing."""
+    return dataset.assign({f"tau.{j}": ("time", np.ones(dataset.sizes["time"])) for j in model.joints})
 
 
 def _balanced(experiment: Experiment) -> Experiment:
@@ -228,15 +243,36 @@ def demand_apart(recordings: Sequence[str | Path], holdout: str | Path) -> None:
         raise InputError(f"{holdout}: the holdout is also a recording to fit; hold out one that the fit does not see")
 
 
-def demand_torque(experiments: Sequence[Experiment]) -> None:
-    """Refuse a torque channel that reads zero throughout: nothing can be fitted to it (InputError)."""
+def with_silence(experiments: Sequence[Experiment]) -> list[Experiment]:
+    """Recordings in which channels that read zero throughout have a floor of noise, a millionth of the largest torque.
+
+    Such a channel says nothing, and statistics of nothing do not exist: force on a base that floats in a plane, the
+    torque of an axis that no weight turns. It counts among `Motion.silent`, and a note says so.
+
+    Raises
+    ------
+    InputError
+        Where a joint's torque reads zero that by the model it cannot be: it was not recorded.
+    """
+    made = []
     for e in experiments:
-        for joint, tau in zip(e.motion.joints, e.motion.tau.T, strict=True):
-            if not tau.any():
-                raise InputError(
-                    f"{e.motion.path}: 'tau.{joint}' is zero in every row; record the torque, or map its column under "
-                    f"[signals] in the model file"
-                )
+        peak = np.max(np.abs(e.motion.tau), axis=0)
+        silent = np.flatnonzero(peak <= NOTHING * np.max(peak))
+        if len(silent):
+            modelled = np.max(np.abs(e.body.torque(e.motion.q, e.motion.qd, e.motion.qdd) - e.carried), axis=0)
+            for c in silent[silent >= n_carriers(e.body.tree)]:
+                if not peak.any() or modelled[c] > FLOOR * np.max(peak):
+                    raise InputError(
+                        f"{e.motion.path}: 'tau.{e.motion.joints[c]}' is zero in every row; record the torque, or map "
+                        "its column under [signals] in the model file"
+                    )
+            tau = e.motion.tau.copy("F")
+            tau[:, silent] += FLOOR * np.max(peak) * np.random.default_rng(0).normal(size=(len(tau), len(silent)))
+            names = ", ".join(channel(e.body.tree, int(c)) for c in silent)
+            notes = (*e.motion.notes, f"{names}: zero in every row, as the model has it; nothing is judged there")
+            e = replace(e, motion=replace(e.motion, tau=tau, silent=tuple(map(int, silent)), notes=notes))
+        made.append(e)
+    return made
 
 
 def scales(experiments: Sequence[Experiment]) -> Mapping[str, Scales]:

@@ -24,7 +24,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.spatial.transform import Rotation
 
 from ...errors import InputError
-from ...models.floating.tree import CARRIERS, FloatingTree
+from ...models.floating.tree import CARRIERS, UNNAMED, FloatingTree
 from ...recordings.attitude import attitude
 from ...recordings.condition import Motion
 
@@ -32,6 +32,27 @@ if TYPE_CHECKING:
     from .experiment import Experiment
 
 Array = NDArray[np.float64]
+
+
+def with_base(dataset: xr.Dataset, tree: FloatingTree) -> xr.Dataset:
+    """The recording with the base's signals under the model's name for it.
+
+    Where the model does not name the base, that is the body called as its link in the URDF, or the only body whose
+    attitude and twist are recorded; the notes say which.
+    """
+    known = [str(name).split(".")[1] for name in dataset if str(name).startswith("quat.")]
+    whole = {b for b in known if all(f"{kind}.{b}.{a}" in dataset for kind, axes in _NEEDED for a in axes)}
+    if tree.body != UNNAMED or UNNAMED in known or not whole:
+        return dataset
+    link = tree.links[CARRIERS - 1].name
+    if link not in whole and len(whole) > 1:
+        return dataset
+    body = link if link in whole else whole.pop()
+    kinds = ("pos", "force", "torque", *(kind for kind, _ in _NEEDED))
+    names = {f"{kind}.{body}.{a}": f"{kind}.{UNNAMED}.{a}" for kind in kinds for a in "wxyz"}
+    renamed = dataset.rename({old: new for old, new in names.items() if old in dataset})
+    note = f"the base is taken to be {body!r}; give 'base' in the model file to say so"
+    return renamed.assign_attrs(notes=[*dataset.attrs.get("notes", ()), note])
 
 
 def with_twist(dataset: xr.Dataset, tree: FloatingTree) -> xr.Dataset:

@@ -155,7 +155,7 @@ def _location(
         places += [(share, replace(p, channel=f"q_link.{link.pair.joint}")) for p in found]
     total = sum(share for share, _ in places)
     places.sort(key=lambda x: -x[0])
-    return tuple(replace(p, share=float(share / total)) for share, p in places)
+    return tuple(replace(p, share=float(share / total) * (1 - 1e-12)) for share, p in places)
 
 
 def _steps(links: Sequence[LinkDiagnosis]) -> list[Step]:

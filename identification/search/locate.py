@@ -40,7 +40,7 @@ def locate(experiments: Sequence[Experiment], explained: Sequence[Array]) -> tup
         return ()
     found = []
     for c in np.argsort(-weight):
-        share = float(weight[c] / total)
+        share = float(weight[c] / total) * (1 - 1e-12)  # so that rounding adds up to 1 at most
         if share < 0.01:
             break
         windows = _windows(experiments[0], explained[0][:, c])

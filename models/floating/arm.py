@@ -64,7 +64,7 @@ class FloatingArm:
         if self.floating and np.any(gravity):
             raise InputError(
                 f"{name}: a floating base with gravity {gravity.tolist()} m/s² and nothing to hold it would fall; "
-                "set gravity to 0, or floating=False"
+                "set gravity to [0.0, 0.0, 0.0], or let the base be fixed"
             )
         if self.floating and not self.base[0] > 0:
             raise InputError(f"{name}: the floating base has a mass of {self.base[0]:g} kg; give it one above 0")

@@ -14,7 +14,8 @@ from .ets_vii import ets_vii
 CARRIERS = 6
 """Leading joints that carry the base; their torques are the force and the moment on it, in its own axes."""
 
-_WRENCH = tuple(f"{kind}.base.{axis}" for kind in ("force", "torque") for axis in "xyz")
+UNNAMED = "base"
+"""What the base is called where the model file does not say."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,10 +25,10 @@ class FloatingTree(Tree):
     ``body`` is the base's name in recordings (``quat.<body>.w`` and so on).
     """
 
-    body: str = "base"
+    body: str = UNNAMED
 
 
-def floating_tree(arm: FloatingArm, body: str = "base") -> FloatingTree:
+def floating_tree(arm: FloatingArm, body: str = UNNAMED) -> FloatingTree:
     """Base and arm as one tree."""
     whole = arm.whole
     return FloatingTree(whole.name, whole.joints, whole.links, whole.gravity, body)
@@ -70,5 +71,7 @@ def n_carriers(tree: Tree) -> int:
 
 
 def channel(tree: Tree, index: int) -> str:
-    """Name of a torque channel: ``tau.<joint>``, or ``force.base.x`` to ``torque.base.z`` for a floating base."""
-    return _WRENCH[index] if index < n_carriers(tree) else f"tau.{tree.joints[index].name}"
+    """Name of a torque channel: ``tau.<joint>``, or ``force.<base>.x`` to ``torque.<base>.z`` for a floating base."""
+    if isinstance(tree, FloatingTree) and index < CARRIERS:
+        return f"{'force' if index < 3 else 'torque'}.{tree.body}.{'xyz'[index % 3]}"
+    return f"tau.{tree.joints[index].name}"

@@ -119,7 +119,7 @@ def numbers(friction: Friction, found: Diagnosis, result: Score) -> list[Quantit
     named = [f"{e.name} at {e.at}" for e in found.effects] or [found.verdict]
     return [
         *quantities,
-        Quantity("named", "", named, "reference"),
+        Quantity("named", "", ", ".join(named), "reference"),
         Quantity("named_rightly", "1", float(result.placed), "reference"),
         Quantity("named_wrongly", "1", float(result.wrong), "reference"),
         Quantity("friction_band_coverage", "1", result.coverage, "reference"),
