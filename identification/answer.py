@@ -63,8 +63,7 @@ def report_on(
     train, locked : sequence of Experiment
     """
     channels = [channel(model.tree, c) for c in range(model.tree.n_joints)]
-    order = sorted(confirmed, key=lambda t: -_returns(*trials[t.judged.placed.key]))
-    findings = tuple(_finding(t, final, trials, channels) for t in order)
+    findings = tuple(_finding(t, final, trials, channels) for t in confirmed)
     fits = _fits(model, found.first, final, train, locked)
     nameless = {c: x for c, x in found.closing.nameless.items() if x.share > NAMELESS}
     # What a curve explains well may also come and go.
@@ -143,11 +142,6 @@ def report_on(
         tuple(notes),
         train[0].motion.band,
     )
-
-
-def _returns(with_it: float, without_it: float) -> float:
-    """Share of a channel's energy that comes back when an effect is taken out again: how much it explains."""
-    return without_it**2 - with_it**2
 
 
 def _explained(first: Fit, final: Fit, experiment: Experiment) -> Array:

@@ -76,7 +76,7 @@ def diagnose(
     >>> found.verdict
     'missing_physics'
     >>> [effect.at for effect in found.effects if effect.name == "coulomb_friction"]
-    ['joint3', 'joint1', 'joint2']
+    ['joint2', 'joint1', 'joint3']
     >>> level = found.effects[0].parameters["level"]
     >>> level.unit, level.std < 0.1 * level.value
     ('N*m', True)

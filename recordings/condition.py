@@ -202,7 +202,7 @@ def condition(dataset: xr.Dataset, joints: Sequence[str], band: float | None = N
     if not parts or (fitted and kept < MINIMUM_SAMPLES):
         raise InputError(
             f"{path}: too few samples: {len(stamps)} rows leave {kept} in the {band:.3g} Hz analysis band, at least "
-            f"{MINIMUM_SAMPLES} are needed; record longer, or close the gaps"
+            f"{MINIMUM_SAMPLES if fitted else 1} are needed; record longer, or close the gaps"
         )
     # One joint's samples side by side: laws and filters go through them joint by joint.
     time, q, qd, qdd, tau, temperature = (np.asfortranarray(np.concatenate(c)) for c in zip(*parts, strict=True))

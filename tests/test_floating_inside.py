@@ -76,7 +76,7 @@ def test_wheel_without_friction_leaves_nothing_over(tmp_path):
     """Its momentum turns with the base: left out, that alone is 0.1 N·m, or 4 % of a channel."""
     path = record(tmp_path / "1.csv", 1, wheel=Wheel(2, inertia=0.1, viscous=0.0, coulomb=0.0, torque=0.2))
     fits = identify(model(tmp_path), [path]).to_json()["fit"]
-    assert all(fits[f"torque.base.{a}"]["train"]["relative"] < 4e-3 for a in "xyz")
+    assert all(fits[f"torque.hub.{a}"]["train"]["relative"] < 4e-3 for a in "xyz")
 
 
 def test_wheels_need_every_sample(tmp_path):

@@ -189,7 +189,7 @@ def load_experiments(
     motions = [condition(d, model.joints, wanted, fitted=torque) for d in datasets]
     narrowest = min(m.band for m in motions)
     if any(m.band > 1.01 * narrowest for m in motions):
-        motions = [condition(d, model.joints, narrowest) for d in datasets]
+        motions = [condition(d, model.joints, narrowest, fitted=torque) for d in datasets]
     if isinstance(tree, FloatingTree):
         return [
             _balanced(

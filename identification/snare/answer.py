@@ -25,7 +25,7 @@ from ..diagnosis import (
 from ..reliability import probability as reliability
 from ..report.words import words
 from ..wording import experiment_sentence, percent
-from .channels import ChannelError, channel_errors, channels, modelled
+from .channels import channel_errors, channels, modelled
 from .comparison import QUARTER, SLOW, variances
 from .fit import Fit, spread
 from .handles import bounds, handle_of, key_of
@@ -59,9 +59,7 @@ def report_on(
         What the search took [s], and the simulations in it.
     """
     fits = _fits(found, train, locked)
-    applied = [n for n in found.named if n.trial.placed.effect.name in APPLIED]
-    order = sorted(applied, key=lambda n: -_returns(n, locked))
-    findings = tuple(_finding(n, found, train, locked) for n in order)
+    findings = tuple(_finding(n, found, train, locked) for n in found.named if n.trial.placed.effect.name in APPLIED)
     corrected = [
         f"{p.effect.name} = {found.last.values[key_of(p)]:.4g} {p.effect.parameters[0].unit}"
         for p in found.last.placed
@@ -129,7 +127,8 @@ def _finding(named: Named, found: Searched, train: Sequence[Capture], locked: Se
         for r in named.rivals
         if r.probability >= LIKELY or not r.separable
     )
-    before, after = _missed(named, locked)
+    pairs = zip(channel_errors(locked, named.held_before), channel_errors(locked, named.held_after), strict=True)
+    before, after = max(pairs, key=lambda e: e[0].relative - e[1].relative)
     what = placed.effect.sentence
     evidence = (
         f"{what[:1].upper()}{what[1:]}: it explains {percent(named.trial.explained)} of what the model so far left "
@@ -138,18 +137,6 @@ def _finding(named: Named, found: Searched, train: Sequence[Capture], locked: Se
     )
     values = estimates(train, found.last)[placed.key]
     return Finding(placed.effect.name, placed.at, named.margin, named.margin * right, values, evidence, rivals)
-
-
-def _missed(named: Named, locked: Sequence[Capture]) -> tuple[ChannelError, ChannelError]:
-    """Errors of the held-out channel that misses an effect most, without it and with it."""
-    pairs = zip(channel_errors(locked, named.held_before), channel_errors(locked, named.held_after), strict=True)
-    return max(pairs, key=lambda e: e[0].relative - e[1].relative)
-
-
-def _returns(named: Named, locked: Sequence[Capture]) -> float:
-    """Share of that channel's energy that comes back without the effect: how much it explains."""
-    before, after = _missed(named, locked)
-    return before.relative**2 - after.relative**2
 
 
 def _size(value: float, unit: str) -> str:
