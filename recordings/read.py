@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Mapping
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -80,19 +79,17 @@ def read_recording(
     spared = {name for name in headers if name not in signals and joint_kinds is not None and _idle(name, joint_kinds)}
     faults: dict[str, str] = {}
 
-    def tried(name: str, take: Callable[[], Any]) -> Any:
+    def tried(name: str, take: Callable[..., Any], *given: Any) -> Any:
         try:
-            return take()
+            return take(*given)
         except InputError as error:
             if name not in spared:
                 raise
             faults[name] = str(error).removeprefix(f"{path}: ")
             return None
 
-    raw = {name: tried(name, partial(columns.column, header, name, len(time))) for name, header in headers.items()}
-    units = {
-        name: tried(name, partial(_unit, columns, found[0], signals.get(name))) for name, found in raw.items() if found
-    }
+    raw = {name: tried(name, columns.column, header, name, len(time)) for name, header in headers.items()}
+    units = {name: tried(name, _unit, columns, found[0], signals.get(name)) for name, found in raw.items() if found}
     for name, unit in units.items():
         joint = None if name in signals and signals[name].gain is not None else joint_of(name)
         if joint and joint not in kinds and unit is not None and fits(unit, default_unit(name, "prismatic")):
@@ -101,8 +98,10 @@ def read_recording(
     for name in [name for name in raw if name not in faults]:
         header, values = raw[name]
         wanted = default_unit(name, kinds.get(joint_of(name) or name, "revolute"))
-        take = partial(_numbers, columns, header, name, values, units[name], wanted, signals.get(name))
-        if (values := tried(name, take)) is not None:
+        values = tried(name, _in_unit, columns, header, name, values, units[name], wanted, signals.get(name))
+        if values is not None:
+            tried(name, _check_numbers, columns, header, values)
+        if name not in faults:
             variables[name] = ("time", values, {"unit": wanted, "column": header})
     idle = [f"{name} is left out, no fit needs it: {fault}" for name, fault in faults.items()]
     dataset = xr.Dataset(variables, {"time": ("time", time, {"unit": "s", "column": time_header})})
@@ -238,12 +237,13 @@ def _in_unit(
                 f"{columns.path}: gain {signal.gain!r} of [signals] {name!r} is {gain}; a number but 0 is wanted"
             )
         if signal.unit is not None and unit is not None:
-            if not fits(unit, str(parse_unit(signal.unit, header, columns.path))):
+            per = str(parse_unit(signal.unit, header, columns.path))
+            if not fits(unit, per):
                 raise InputError(
                     f"{columns.path}: column {header!r}: its unit does not fit unit = {signal.unit!r} of [signals] "
                     f"{name!r}, which the gain counts per; correct one of them"
                 )
-            values = convert(values, unit, str(parse_unit(signal.unit, header, columns.path)))
+            values = convert(values, unit, per)
         return values * gain
     if unit is None:
         return values
@@ -255,17 +255,7 @@ def _in_unit(
     return convert(values, unit, wanted)
 
 
-def _numbers(
-    columns: Columns,
-    header: str,
-    name: str,
-    values: np.ndarray,
-    unit: pint.Unit | None,
-    wanted: str,
-    signal: Signal | None,
-) -> np.ndarray:
-    """In the signal's unit, checked: finite or missing, and not all missing."""
-    values = _in_unit(columns, header, name, values, unit, wanted, signal)
+def _check_numbers(columns: Columns, header: str, values: np.ndarray) -> None:
     infinite = np.flatnonzero(np.isinf(values))
     if infinite.size:
         raise InputError(
@@ -277,7 +267,6 @@ def _numbers(
             f"{columns.path}: column {header!r}: holds no number in any of its {len(values)} rows; "
             "remove the column or record the channel"
         )
-    return values
 
 
 def _quality(dataset: xr.Dataset) -> list[str]:
