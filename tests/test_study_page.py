@@ -37,7 +37,8 @@ def test_page_says_the_finding_first_and_explains_the_kinds(tmp_path: Path, monk
     assert not re.findall(r"(?:src|href)=\"?http", text)
     assert "iframe" not in text
     result = write_result("demo", QUANTITIES, 1.0)
-    assert json.loads(result.read_text())["quantities"][0]["paper"] == 2.6
+    first, *_, named = json.loads(result.read_text())["quantities"]
+    assert (first["paper"], named["ours"]) == (2.6, "joint_elasticity at joint2, <odd>")
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,16 @@
-"""Why cases of the box fail, in words, on cases whose outcome is written down."""
+"""Where the box stands out of the envelope and why its cases fail, in words, on cases of known outcome."""
+
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from snarelab.tolerance.box import why_the_box_fails
+from snarelab.tolerance.box import where_the_box_stands_out, why_the_box_fails
 from snarelab.tolerance.capture import Axis, Capture, Outcome
+from snarelab.tolerance.rays import rays
 from snarelab.tolerance.study import Study, Success
+from snarelab.tolerance.summary import Interval
 
 
 @pytest.fixture
@@ -48,3 +52,31 @@ def test_no_side_is_told_where_both_fail_alike(study):
 def test_a_box_without_failures_says_so(study):
     rows = [case(y, 0.0, 0.005) for y in (-0.02, 0.02)]
     assert why_the_box_fails(study, pd.DataFrame(rows)) == "All 2 cases of the box succeed."
+
+
+def disc(study, radius):
+    """The ends of all rays where success is a disc about the nominal case."""
+    return [(ray, Interval(*(np.sign(ray.length) * np.array([radius, radius - 1e-3, radius])))) for ray in rays(study)]
+
+
+def test_a_square_box_stands_out_of_a_disc_at_its_corners(study):
+    boxed = replace(study, box=dict.fromkeys(study.ranges, (-0.02, 0.02)))
+    words = where_the_box_stands_out(boxed, disc(boxed, 0.025))
+    assert words.startswith("The box is not within the envelope. Of 8 directions tried, everything else at nominal,")
+    assert words.count("towards") == 4
+    assert "towards -radial_y +radial_z, at 24 to 25 mm of 28.3;" in words
+    assert where_the_box_stands_out(boxed, disc(boxed, 0.030)).startswith("In none of the 8 directions tried")
+
+
+def test_a_side_of_the_box_that_is_not_named_reaches_to_the_limit_of_the_range(study):
+    flat = replace(study, box={"radial_y": (-0.02, 0.02), "radial_z": (0.0, 0.0)})
+    assert where_the_box_stands_out(flat, disc(flat, 0.025)).startswith("In none of the 2 directions tried")
+    words = where_the_box_stands_out(replace(study, box={"radial_y": (-0.02, 0.02)}), disc(study, 0.025))
+    assert "towards -radial_z, at 24 to 25 mm of 100;" in words
+    assert "towards -radial_y," not in words
+
+
+def test_nothing_is_said_of_a_box_that_the_nominal_case_is_not_in_or_fails_in(study):
+    aside = replace(study, box=dict.fromkeys(study.ranges, (0.01, 0.02)))
+    assert where_the_box_stands_out(aside, disc(aside, 0.025)) == ""
+    assert where_the_box_stands_out(study, [(ray, Interval(np.nan, np.nan, np.nan)) for ray in rays(study)]) == ""

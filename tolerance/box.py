@@ -1,4 +1,4 @@
-"""Why cases of the box do not succeed, in words: how they miss, by how much, and on which side most of them stand."""
+"""The box in words: whether it lies within the envelope, and how, by how much and where those that fail miss."""
 
 from collections import Counter
 
@@ -6,10 +6,54 @@ import numpy as np
 import pandas as pd
 
 from .gallery import kind_of_miss
+from .rays import Ray
 from .study import Study
+from .summary import Interval, nominal_point
 
 TOLD = 0.2
 """Difference between the shares that fail on the two sides of an axis, from which on a side is told."""
+
+
+def where_the_box_stands_out(study: Study, found: list[tuple[Ray, Interval]]) -> str:
+    """A sentence that holds the box against the ends of the rays: along which of them it reaches beyond success.
+
+    Empty where the nominal case fails or is not in the box: no ray then leaves the box from a success inside.
+
+    Parameters
+    ----------
+    study : Study
+    found : list of (Ray, Interval)
+        As `rays.ends` has them.
+    """
+    centre = nominal_point(study)
+    low, high = np.array([study.box.get(name, limits) for name, limits in study.ranges.items()]).T
+    ways = [(ray, end, _reach(ray.tip - centre, low - centre, high - centre)) for ray, end in found]
+    if np.any(centre < low) or np.any(centre > high) or any(np.isnan(end.value) for _, end in found):
+        return ""
+    beyond = [
+        _beyond(study, ray, ray.tip - centre, end, share)
+        for ray, end, share in ways
+        if abs(end.high) < share * abs(ray.length)
+    ]
+    tried = f"{sum(share > 0 for *_, share in ways)} directions tried, everything else at nominal"
+    if not beyond:
+        return f"In none of the {tried}, does success end before the box."
+    return f"The box is not within the envelope. Of {tried}, success ends before the box {'; '.join(beyond)}."
+
+
+def _reach(way: np.ndarray, low: np.ndarray, high: np.ndarray) -> float:
+    """Share of a way from the nominal case that lies in the box, both as seen from there."""
+    moved = way != 0
+    return float(np.min(np.where(way > 0, high, low)[moved] / way[moved]))
+
+
+def _beyond(study: Study, ray: Ray, way: np.ndarray, end: Interval, share: float) -> str:
+    unit = study.capture.axis(ray.axes[0]).unit
+    factor, unit = {"m": (1e3, "mm"), "rad": (180 / np.pi, "deg")}.get(unit, (1.0, unit))
+    signs = dict(zip(study.ranges, way, strict=True))
+    name = " ".join(f"{'-' if signs[axis] < 0 else '+'}{axis}" for axis in ray.axes)
+    least, most = factor * abs(end.low), factor * abs(end.high)
+    return f"towards {name}, at {least:.3g} to {most:.3g} {unit} of {factor * share * abs(ray.length):.3g}"
 
 
 def why_the_box_fails(study: Study, box: pd.DataFrame) -> str:

@@ -1,7 +1,6 @@
 """A tolerance study's results as numbers for scripts and one page for people."""
 
 import re
-from collections import Counter
 from html import escape
 from typing import Any
 
@@ -9,10 +8,10 @@ import numpy as np
 
 from .. import __version__
 from ..report.html import figure, headline, page, paragraph, table
-from .box import why_the_box_fails
+from .box import where_the_box_stands_out, why_the_box_fails
 from .gallery import Miss, play_misses
 from .pictures import envelope_bars, probability_maps, sensitivity_bars, width_curve
-from .rays import ANGLES, RADIAL, STAGE, ends, envelope, shortest
+from .rays import ANGLES, RADIAL, STAGE, Ray, ends, envelope, shortest
 from .results import Results
 from .run import space_boundary
 from .study import LARGEST, Study
@@ -33,12 +32,12 @@ def summarise(study: Study, results: Results) -> dict[str, Any]:
     boundary = space_boundary(study, results, others=_OTHERS)
     indices = sensitivities(study, boundary)
     found = ends(study, results.table(STAGE)) if study.envelope else []
-    limits = envelope(study, found) if study.envelope else {}
+    limits = envelope(study, found) if found else {}
     content: dict[str, Any] = {
         "study": study.name,
         "capture": study.capture.name,
         "cases": len(results),
-        "failed": len(_failures(results)),
+        "failed": sum(map(len, _failures(results))),
         "width": boundary.width(),
         "probability": vars(success_probability(space)) if study.sampling != "adaptive" else None,
         "envelope": {n: {"down": _plain(d), "up": _plain(u)} for n, (d, u) in limits.items()},
@@ -55,7 +54,7 @@ def summarise(study: Study, results: Results) -> dict[str, Any]:
     content["misses"] = [vars(m) for m in misses]
     results.write_table()
     results.write("result.json", content)
-    results.write("report.html", _page(study, results, content, limits, indices, misses))
+    results.write("report.html", _page(study, results, content, found, indices, misses))
     return content
 
 
@@ -84,9 +83,15 @@ def _sentence(study: Study, content: dict[str, Any]) -> str:
 
 
 def _page(
-    study: Study, results: Results, content: dict[str, Any], limits: dict, indices: Any, misses: list[Miss]
+    study: Study,
+    results: Results,
+    content: dict[str, Any],
+    found: list[tuple[Ray, Interval]],
+    indices: Any,
+    misses: list[Miss],
 ) -> str:
     space = results.table("space")
+    limits = envelope(study, found) if found else {}
     rows = [
         [
             name,
@@ -106,7 +111,7 @@ def _page(
         numeric=(1, 2, 3, 4),
     )
     counts, widths = _widths(study, results)
-    reasons = "; ".join(f"{n} x {why}" for why, n in Counter(_failures(results)).items()) or "none"
+    reasons = "; ".join(f"{len(like)} x {like[0]}" for like in _failures(results)) or "none"
     boundary = space_boundary(study, results, others=_OTHERS)
     sections = [
         (
@@ -136,7 +141,7 @@ def _page(
                 "Undecided share against cases",
                 "The line is the width at which the study may stop.",
             )
-            + paragraph(f"Cases without a result: {reasons}."),
+            + paragraph(f"Cases without a result, of those alike the first: {reasons}."),
         ),
     ]
     if limits:
@@ -147,8 +152,8 @@ def _page(
     if misses:
         sections.insert(-1, ("misses", "Typical misses", _gallery(misses)))
     if study.box:
-        words = why_the_box_fails(study, results.table("box"))
-        sections.insert(1 if limits else 0, ("box", "The box", paragraph(words)))
+        words = f"{where_the_box_stands_out(study, found)} {why_the_box_fails(study, results.table('box'))}"
+        sections.insert(1 if limits else 0, ("box", "The box", paragraph(words.strip())))
     return page(
         f"{study.name}: capture tolerance",
         headline(content["sentence"]),
@@ -168,9 +173,12 @@ def _gallery(misses: list[Miss]) -> str:
     return paragraph("Each opens in 3-D with a slider of time; the pages stand beside this one.") + f"<ul>{items}</ul>"
 
 
-def _failures(results: Results) -> list[str]:
-    """Reasons of cases without a result, their numbers left out so that like stands with like."""
-    return [re.sub(r"\[.*?\]|[-+]?\d[\d.e+-]*", "#", str(why)) for why in results.table()["reason"] if why]
+def _failures(results: Results) -> list[list[str]]:
+    """Reasons of cases without a result, those together that differ in numbers only."""
+    alike: dict[str, list[str]] = {}
+    for why in filter(None, map(str, results.table()["reason"])):
+        alike.setdefault(re.sub(r"\[.*?\]|[-+]?\d[\d.e+-]*", "", why), []).append(why)
+    return list(alike.values())
 
 
 def _widths(study: Study, results: Results) -> tuple[np.ndarray, np.ndarray]:
