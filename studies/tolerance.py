@@ -94,7 +94,9 @@ def _page(quantities: list[Quantity], found: list[tuple[dict[str, Any], str]]) -
         numeric=(1, 2),
     )
     parts = [("numbers", "In numbers", numbers), ("studies", "The two studies", f"<ul>{links}</ul>")]
-    header = "<h1>How far off may the arm arrive?</h1>" + "".join(paragraph(c["sentence"]) for c, _ in found)
+    header = "<h1>How far off may the arm arrive?</h1>" + "".join(
+        paragraph(c["sentence"]) + paragraph(c["box"]) for c, _ in found
+    )
     return page("Capture tolerances", header, parts, "Written by snarelab: make study-tolerance.")
 
 

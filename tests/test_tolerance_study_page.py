@@ -84,6 +84,10 @@ def test_both_studies_leave_the_documented_numbers_and_go_on(here, capsys):
         f'href="{folder}/report.html"' in page and (here / folder / "report.html").is_file() for folder in folders
     )
     assert len(folders) == 2
+    assert (
+        page.count("In none of the 12 directions tried, everything else at nominal, does success end before the box")
+        == 2
+    )
 
     capsys.readouterr()
     assert tolerance.main() == 0

@@ -25,8 +25,9 @@ def summarise(study: Study, results: Results) -> dict[str, Any]:
     """Write ``result.json``, ``cases.parquet`` and ``report.html`` into the results folder; returns the numbers.
 
     Keys: ``cases``, ``failed`` (cases without a result), ``width``, ``probability`` over the ranges and
-    ``probability_box``, ``envelope`` an axis, ``envelope_radial`` [m] and ``envelope_angle`` [rad] in the worst of the
-    directions that were tried (see `rays`), ``sensitivity``, ``misses`` (file, kind, text), ``sentence``.
+    ``probability_box``, ``box`` (what speaks against it, in words), ``envelope`` an axis, ``envelope_radial`` [m] and
+    ``envelope_angle`` [rad] in the worst of the directions that were tried (see `rays`), ``sensitivity``, ``misses``
+    (file, kind, text), ``sentence``.
     """
     space = results.table("space")
     boundary = space_boundary(study, results, others=_OTHERS)
@@ -48,7 +49,9 @@ def summarise(study: Study, results: Results) -> dict[str, Any]:
         if worst:
             content[key] = _plain(worst)
     if study.box:
-        content["probability_box"] = vars(success_probability(results.table("box")))
+        box = results.table("box")
+        content["probability_box"] = vars(success_probability(box))
+        content["box"] = f"{where_the_box_stands_out(study, found)} {why_the_box_fails(study, box)}".strip()
     content["sentence"] = _sentence(study, content)
     misses = play_misses(study, results)
     content["misses"] = [vars(m) for m in misses]
@@ -152,8 +155,7 @@ def _page(
     if misses:
         sections.insert(-1, ("misses", "Typical misses", _gallery(misses)))
     if study.box:
-        words = f"{where_the_box_stands_out(study, found)} {why_the_box_fails(study, results.table('box'))}"
-        sections.insert(1 if limits else 0, ("box", "The box", paragraph(words.strip())))
+        sections.insert(1 if limits else 0, ("box", "The box", paragraph(content["box"])))
     return page(
         f"{study.name}: capture tolerance",
         headline(content["sentence"]),
