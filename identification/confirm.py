@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from .fitting.experiment import Experiment
 from .fitting.fit import Fit, channel_rms, fit
 from .search.forward import Found, Taken, carry, without
-from .search.rest import bridged, fitted
+from .search.rest import fitted, moving
 from .search.trial import MOST
 
 Array = NDArray[np.float64]
@@ -55,7 +55,7 @@ def confirm(
     tried again in the order of how much they were missed before, and only until one is to go.
     """
     progress("confirming on the held-out recording")
-    final, moving = found.fit, [bridged(e) for e in locked]
+    final, in_motion = found.fit, [moving(e) for e in locked]
     left = {t.judged.placed.key: t for t in found.taken}
     missed: dict[str, _Missed] = {}
     rejected: list[Taken] = []
@@ -64,7 +64,7 @@ def confirm(
         # What was never tried, then what was missed least.
         key = min(stale, key=lambda k: missed[k].rise if k in missed else -np.inf)
         stale.remove(key)
-        missed[key] = _missed(left[key], final, train, locked, moving)
+        missed[key] = _missed(left[key], final, train, locked, in_motion)
         if any(k not in missed for k in left):
             continue
         weakest = min(left, key=lambda k: missed[k].rise)
@@ -78,7 +78,7 @@ def confirm(
 
 
 def _missed(
-    t: Taken, final: Fit, train: Sequence[Experiment], locked: Sequence[Experiment], moving: Sequence[Experiment]
+    t: Taken, final: Fit, train: Sequence[Experiment], locked: Sequence[Experiment], in_motion: Sequence[Experiment]
 ) -> _Missed:
     """Take one effect out of a fit and fit the rest again. Channels are weighted as the fit weights them."""
     c, effect = list(t.judged.channels), t.judged.placed.effect
@@ -93,11 +93,15 @@ def _missed(
     if _energy(adds - with_it, c, final) <= LEAST * _energy(with_it, c, final):
         return _Missed(0.0, trial, rest)
     # A joint at rest holds what it is given: there, only laws for what happens at rest can be missed.
-    both = [channel_rms(x.assembly, moving, x.theta)[0] for x in (final, rest)]
+    both = [channel_rms(x.assembly, in_motion, x.theta)[0] for x in (final, rest)]
     pairs = [(*both, CONFIRM)]
     if effect.at_rest or effect.exceeds_at_rest:
         # What was named for leaving little near rest must still do so, now that the others are there.
         pairs.append((with_it, rms, MOST / (1 - MOST) if effect.remembers else CONFIRM))
+    if effect.exceeds_at_rest:
+        creeping = fitted(final.assembly, locked)
+        both = [channel_rms(x.assembly, creeping, x.theta)[0] for x in (final, rest)]
+        pairs.append((*both, CONFIRM))
     rise = max((_energy(b, c, final) / _energy(a, c, final) - 1) / bar for a, b, bar in pairs)
     return _Missed(rise, trial, rest)
 

@@ -90,6 +90,9 @@ def test_a_block_that_dwarfs_the_others_is_no_reason_to_doubt_them():
     gains = np.array([62.3, 59.1, 29.6, 18.5, 51.7, 34.5, 55.6, 66.2, 1527.0, 26.9, 45.9, 71.1, 81.5])
     assert reliably_positive(gains)
     assert not reliably_positive(-gains)
+    few = np.array([7646.0, 310.0, 947.0, 1851.0, 76.0, 82.0, 73.0])  # 94 % of a residual, of 12 s
+    assert reliably_positive(few)
+    assert not reliably_positive(np.where(few < 80, -few, few))
     mixed = np.array([-15.6, -17.4, -4.7, 46.6, -29.6, 0.2, -21.1, 67.4, -391.0, 18.8, -28.6, 2.5, 32.4])
     assert not reliably_positive(mixed)
 

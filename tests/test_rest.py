@@ -10,10 +10,15 @@ import pytest
 from scipy.signal import butter, lfilter, sosfilt
 
 from snarelab.identification.diagnose import diagnose
-from snarelab.identification.fitting.experiment import Bridge
+from snarelab.identification.fitting.experiment import Bridge, load_experiments, scales
+from snarelab.identification.fitting.fit import channel_rms, fit
+from snarelab.identification.search.forward import _refitted, assemble
 from snarelab.identification.search.noise import Whitener
-from snarelab.identification.search.rest import without
+from snarelab.identification.search.rest import fitted, without
+from snarelab.models.effects import get_effect
+from snarelab.models.model import Placed
 from snarelab.models.model_file import load_model
+from snarelab.models.rigid_body import RigidBody
 
 MASS, LENGTH, GRAVITY = 4.0, 0.4, 9.81
 INERTIA = MASS * LENGTH**2 + 0.02
@@ -62,14 +67,23 @@ def test_a_bridge_leaves_straight_lines_alone():
     np.testing.assert_allclose(bridge(spoilt), line)
 
 
-def record(path, seed, seconds, *, rounding=0.0, stribeck=0.0, speed=0.08, drag=0.0):
-    """A pendulum under a PD servo; friction of 3 N·m, rounded over ``rounding`` [rad/s] or sharp."""
+def record(path, seed, seconds, *, rounding=0.0, stribeck=0.0, speed=0.08, drag=0.0, stops=False):
+    """A pendulum under a PD servo; friction of 3 N·m, rounded over ``rounding`` [rad/s] or sharp.
+
+    It swings, or goes from point to point and ``stops`` there.
+    """
     rng = np.random.default_rng(seed)
     steps, fine = int(1000 * seconds), 4
     t = np.arange(steps) / 1000
     phase, f = rng.uniform(0, 2 * np.pi, 4), np.array([0.11, 0.23, 0.37, 0.52])
     fade = np.clip(t / 2, 0, 1) ** 2 * (3 - 2 * np.clip(t / 2, 0, 1))
     target = fade * np.sum(np.sin(2 * np.pi * f * t[:, None] + phase) * 0.16 / f, axis=1)
+    if stops:
+        points = rng.uniform(-0.9, 0.9, int(seconds / 2) + 2)
+        part = np.clip((t % 2.0) / 1.5, 0, 1)
+        way = part**3 * (10 - 15 * part + 6 * part**2)
+        at = (t // 2.0).astype(int)
+        target = points[at] + way * (points[at + 1] - points[at])
     wanted = np.gradient(target, 1e-3)
     ahead = INERTIA * np.gradient(wanted, 1e-3) + MASS * GRAVITY * LENGTH * np.cos(target)
     push = np.asarray(sosfilt(butter(2, (0.3, 12.0), "bandpass", fs=1000, output="sos"), rng.normal(size=steps)))
@@ -96,7 +110,8 @@ def record(path, seed, seconds, *, rounding=0.0, stribeck=0.0, speed=0.08, drag=
     np.savetxt(path, table[:: 1000 // RATE], delimiter=",", header="time,q.joint1,tau.joint1", comments="", fmt="%.8g")
 
 
-def diagnosed(folder, seed, **concealed):
+def recorded(folder, seed, **concealed):
+    """A model with viscous and Coulomb friction, beside two recordings."""
     own = f'<inertial><origin xyz="{LENGTH} 0 0"/><mass value="{MASS}"/>'
     own += '<inertia ixx="0.02" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.02"/></inertial>'
     (folder / "arm.urdf").write_text(
@@ -109,17 +124,24 @@ def diagnosed(folder, seed, **concealed):
     )
     record(folder / "train.csv", seed, 25.0, **concealed)
     record(folder / "hold.csv", seed + 1000, 12.0, **concealed)
-    return diagnose(load_model(folder / "arm.toml"), [folder / "train.csv"], folder / "hold.csv").diagnosis
+    return load_model(folder / "arm.toml")
 
 
-@pytest.mark.parametrize("rounding", [0.0, 0.003, 0.01])
-def test_a_joint_that_sticks_or_a_rounded_sign_is_no_missing_physics(tmp_path, rounding):
-    found = diagnosed(tmp_path, 1, rounding=rounding)
+def diagnosed(folder, seed, **concealed):
+    model = recorded(folder, seed, **concealed)
+    return diagnose(model, [folder / "train.csv"], folder / "hold.csv").diagnosis
+
+
+@pytest.mark.parametrize(("rounding", "stops"), [(0.0, False), (0.003, False), (0.01, False), (0.0, True)])
+def test_a_joint_that_sticks_or_a_rounded_sign_is_no_missing_physics(tmp_path, rounding, stops):
+    found = diagnosed(tmp_path, 1, rounding=rounding, stops=stops)
     assert found.verdict == "adequate", [(e.name, e.at) for e in found.effects]
 
 
-def test_friction_that_rises_near_rest_is_named(tmp_path):
-    found = diagnosed(tmp_path, 2, stribeck=3.0)
+@pytest.mark.parametrize("rounding", [0.0, 0.004])
+def test_friction_that_rises_near_rest_is_named(tmp_path, rounding):
+    """Rounded over a little speed, it was once named Makkar friction, which has such a speed."""
+    found = diagnosed(tmp_path, 2, stribeck=3.0, rounding=rounding)
     assert [(e.name, e.at) for e in found.effects] == [("stribeck_friction", "joint1")]
 
 
@@ -127,3 +149,31 @@ def test_sticking_does_not_spoil_what_is_identified_in_motion(tmp_path):
     found = diagnosed(tmp_path, 3, drag=1.2)
     assert [(e.name, e.at) for e in found.effects] == [("quadratic_friction", "joint1")]
     assert found.effects[0].parameters["coefficient"].value == pytest.approx(1.2, rel=0.1)
+
+
+@pytest.mark.parametrize("rounding", [0.0, 0.01])
+def test_what_a_joint_holds_at_its_stops_does_not_spoil_the_fit(tmp_path, rounding):
+    model = recorded(tmp_path, 4, stops=True, rounding=rounding)
+    experiments = load_experiments(model, [tmp_path / "train.csv"], RigidBody(model.tree))
+    assembly = assemble(model, None, scales(experiments))
+    found = fit(assembly, fitted(assembly, experiments))
+    values = {s.name: v for s, v in zip(assembly.slots, found.theta, strict=True)}
+    assert values["level"] == pytest.approx(3.0, rel=0.03)
+    assert values["coefficient"] == pytest.approx(2.0, rel=0.05)
+
+
+def test_what_is_added_leaves_no_more_from_a_bad_start(tmp_path):
+    """Beside a sensor's gain, presliding hysteresis once ended at 9e6 N·m, and both names were lost."""
+    model = recorded(tmp_path, 5)
+    model = model.with_effects([Placed(get_effect("sensor_gain"), "tau.joint1")], {})
+    experiments = load_experiments(model, [tmp_path / "train.csv"], RigidBody(model.tree))
+    known = scales(experiments)
+    assembly = assemble(model, None, known)
+    before = fit(assembly, fitted(assembly, experiments))
+    more = Placed(get_effect("presliding_hysteresis"), "joint1")
+    start = {f"{more.key}.level": 1e7, f"{more.key}.travel": 1e-6}
+    wider = assemble(model.with_effects([more], start), None, known)
+    samples = fitted(wider, experiments)
+    found = _refitted(before, wider, samples, False, 0)
+    left, was = (channel_rms(f.assembly, samples, f.theta)[0][0] for f in (found, before))
+    assert left <= 1.001 * was

@@ -63,20 +63,29 @@ class Experiment:
     store: dict[object, Any] = field(default_factory=dict, repr=False)
     bridged: tuple[Bridge, ...] = ()
     """For each channel, runs of samples that are no data; none by default."""
+    kept: NDArray[np.bool_] | None = None
+    """Samples of the analysis band that count (n_band, J); the others are zero. All by default."""
 
     def to_band(self, x: Array, channel: int) -> Array:
         """Samples (n, ...) of a channel, bridged where they are no data, in the analysis band (n_band, ...)."""
-        return self.motion.to_band(self.bridged[channel](x) if self.bridged else x)
+        banded = self.motion.to_band(self.bridged[channel](x) if self.bridged else x)
+        return banded if self.kept is None else banded * self.kept[:, channel].reshape(-1, *(1,) * (x.ndim - 1))
 
     def all_to_band(self, x: Array) -> Array:
         """Samples of all channels (n, J), bridged where they are no data, in the analysis band (n_band, J)."""
-        if not self.bridged:
-            return self.motion.to_band(x)
-        return self.motion.to_band(np.stack([b(own) for b, own in zip(self.bridged, x.T, strict=True)], 1))
+        if self.bridged:
+            x = np.stack([b(own) for b, own in zip(self.bridged, x.T, strict=True)], 1)
+        banded = self.motion.to_band(x)
+        return banded if self.kept is None else banded * self.kept
 
-    def with_bridges(self, bridges: tuple[Bridge, ...]) -> "Experiment":
+    @property
+    def counted(self) -> Array:
+        """How many samples of the analysis band count, of each channel (J,)."""
+        return np.full(self.measured.shape[1], len(self.measured)) if self.kept is None else self.kept.sum(axis=0)
+
+    def with_bridges(self, bridges: tuple[Bridge, ...], kept: NDArray[np.bool_] | None) -> "Experiment":
         """The same recording with runs of samples that are no data; what the rigid body gave is not worked out anew."""
-        made = replace(self, store={}, bridged=bridges)
+        made = replace(self, store={}, bridged=bridges, kept=kept)
         shared = ("regressor", "mass_matrix", "tangent", "carried", "elapsed")
         made.__dict__.update({name: getattr(self, name) for name in shared})
         return made

@@ -104,15 +104,16 @@ def fit(
 
 
 def channel_rms(assembly: Assembly, experiments: Sequence[Experiment], theta: Array) -> tuple[Array, Array]:
-    """RMS residual and RMS measurement of every channel in the analysis band, each (J,).
+    """RMS residual and RMS measurement of every channel in the analysis band, each (J,), over samples that count.
 
     Of a channel that is silent in all, the largest measurement of the others stands for its own.
     """
     residuals = np.concatenate([e.measured - e.all_to_band(assembly.torque(e, theta)) for e in experiments])
     measured = np.concatenate([e.measured for e in experiments])
-    size = np.sqrt(np.mean(measured**2, axis=0))
+    counted = np.maximum(np.sum([e.counted for e in experiments], axis=0), 1)
+    size = np.sqrt(np.sum(measured**2, axis=0) / counted)
     size[sorted(set.intersection(*(set(e.motion.silent) for e in experiments)))] = size.max()
-    return np.sqrt(np.mean(residuals**2, axis=0)), size
+    return np.sqrt(np.sum(residuals**2, axis=0) / counted), size
 
 
 def _reweighted(problem: Problem, theta: Array, sigma: Array) -> Array:

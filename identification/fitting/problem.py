@@ -108,7 +108,8 @@ class Problem:
         residuals = [
             (e.measured - e.all_to_band(self.assembly.torque(e, theta)))[:, self.channels] for e in self.experiments
         ]
-        return np.sqrt(np.mean(np.concatenate(residuals) ** 2, axis=0))
+        counted = np.sum([e.counted[self.channels] for e in self.experiments], axis=0)
+        return np.sqrt(np.sum(np.concatenate(residuals) ** 2, axis=0) / np.maximum(counted, 1))
 
 
 def gather(blocks: Sequence[Block], channel: int) -> tuple[Index, Array]:

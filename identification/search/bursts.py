@@ -16,13 +16,15 @@ from ...models.floating.tree import n_carriers
 from ...models.rig.rig import Rig
 from ..fitting.experiment import Experiment
 from ..fitting.fit import Fit
+from .encoder_noise import encoder_torque
 from .locate import WINDOW
 from .rest import bridged, in_motion
 
 Array = NDArray[np.float64]
 
 LOUD = 3.0
-"""Times the median window's mean square from which on a window is out of the ordinary."""
+"""Times the ordinary mean square, of the median window and of what the encoders' noise leaves, from which on a window
+is out of the ordinary: that noise goes with the pose, and with how fast an encoder's steps pass."""
 
 LEAST = 0.2
 """Share of a channel's residual energy, above that of ordinary windows, that makes it bursts."""
@@ -50,10 +52,11 @@ def bursts(final: Fit, experiments: Sequence[Experiment]) -> dict[int, Bursts]:
         return {}
     moving = np.split(in_motion(experiments), np.cumsum([len(e.measured) for e in experiments])[:-1])
     residuals = [final.assembly.residual(bridged(e), final.theta)[0] for e in experiments]
+    heard = np.mean([encoder_torque(final, e) ** 2 for e in experiments], axis=0)
     found = {}
     for c in range(residuals[0].shape[1]):
         strength, loudest = _windows(experiments, [r[:, c] for r in residuals], [m[:, c] for m in moving])
-        usual = np.median(strength) if len(strength) >= FEWEST else np.inf
+        usual = np.median(strength) + heard[c] if len(strength) >= FEWEST else np.inf
         over = np.maximum(strength - LOUD * usual, 0.0).sum() / max(strength.sum(), 1e-300)
         if over > LEAST:
             found[c] = Bursts(float(over), loudest)

@@ -18,7 +18,7 @@ from ...models.model import Model, Placed
 from ..fitting.assembly import Assembly
 from ..fitting.base_parameters import BaseParameters
 from ..fitting.experiment import Experiment, Scales
-from ..fitting.fit import Fit, fit
+from ..fitting.fit import Fit, channel_rms, fit
 from .closed_loop import DRIVEN, planned
 from .evidence import ABSORBED
 from .judged import Judged
@@ -38,6 +38,9 @@ AS_GOOD = 0.1
 
 AHEAD = 1.15
 """Ratio of scores up to which a special case is preferred to what contains it."""
+
+WORSE = 1.05
+"""Ratio of a channel's residuals, with something more and without, that no good optimum has."""
 
 MOST_ROUNDS = 8
 BOOTSTRAPS = 400
@@ -144,10 +147,24 @@ def search(
         assembly = assemble(model, base, scales)
         # What rings has a local optimum at many a frequency; the screening's columns leave its damping where it is.
         rings = any(j.placed.effect.at == "base" and j.placed.effect.states for j in chosen)
-        found = fit(assembly, fitted(assembly, experiments), start=carry(found, assembly), multi_start=rings, seed=seed)
+        found = _refitted(found, assembly, fitted(assembly, experiments), rings, seed)
         instruments = planned(found, experiments, instruments)
         result = screen(model, found, experiments, instruments, opening.noise, seed, _in_round(number, progress))
     return Found(first, model, found, tuple(taken), opening, result, tuple(instruments))
+
+
+def _refitted(before: Fit, assembly: Assembly, samples: Sequence[Experiment], everywhere: bool, seed: int) -> Fit:
+    """The fit of a model that has something more; from many starts if it was to be, or if one ended badly.
+
+    What it had before is a special case of it, so that it leaves no more, unless it ended in a bad optimum.
+    """
+    found = fit(assembly, samples, start=carry(before, assembly), multi_start=everywhere, seed=seed)
+    if everywhere:
+        return found
+    with_it, without_it = (channel_rms(f.assembly, samples, f.theta)[0] for f in (found, before))
+    if np.all(with_it <= WORSE * without_it):
+        return found
+    return fit(assembly, samples, start=carry(before, assembly), multi_start=True, seed=seed)
 
 
 def _in_round(number: int, progress: Callable[[str], None]) -> Callable[[str], None]:
@@ -208,14 +225,17 @@ def _untied(result: Screening, passing: list[Judged]) -> list[Judged]:
     """
     for k in range(len(passing)):
         j = passing[k]
+        if _near_rest(result, j):
+            continue
         twins = [
             o
             for o in passing[k + 1 :]
             if o.channels == j.channels
+            and not _near_rest(result, o)
             and j.score - o.score < TIE
             and result.evidence.likeness(j.signal(), o.signal()) > ALIKE
         ]
-        if twins and not _near_rest(result, j):
+        if twins:
             alike = {id(o): o.among(result.near_rest).score for o in (j, *twins)}
             likely = [o for o in (j, *twins) if alike[id(o)] > max(alike.values()) - TIE]
             best = max(likely, key=lambda o: (o.placed.effect.family == "measurement", alike[id(o)]))

@@ -24,6 +24,10 @@ Mask = NDArray[np.bool_]
 REST = 0.02
 """Share of a joint's peak speed below which friction may stick, and a static law says nothing."""
 
+CREEP = 0.01
+"""Share of a joint's peak speed down to which a law of the friction above its level is fitted: nearer to rest the sign
+of a speed is rounded, and friction falls short of any such law."""
+
 ROUNDING = (0.003, 0.01)
 """Shares of a joint's peak speed over which the sign of a speed may be rounded."""
 
@@ -31,18 +35,20 @@ LONGEST_RUN = 48
 """Missing samples in a row beyond which the noise remembers nothing of the time before them."""
 
 
-def slow(experiment: Experiment, joint: int) -> Mask:
+def slow(experiment: Experiment, joint: int, share: float = REST) -> Mask:
     """Samples at which a joint is near rest (n,), with those that differentiation mixes with them.
+
+    Near rest is below a ``share`` of its peak speed; with none, nothing is.
 
     A floating base is never at rest. On a suspension, which never hangs quite still, friction lets go of what it holds,
     and the joints that stand feel what the others do to the slings: there, every sample counts.
     """
     motion = experiment.motion
-    if joint < n_carriers(experiment.body.tree) or isinstance(experiment.body.tree, Rig):
+    if not share or joint < n_carriers(experiment.body.tree) or isinstance(experiment.body.tree, Rig):
         return np.zeros(len(motion.time), bool)
     speed = motion.qd[:, joint]
-    found = np.abs(speed) < REST * np.max(np.abs(speed))
-    # Slower than REST somewhere between two samples, too.
+    found = np.abs(speed) < share * np.max(np.abs(speed))
+    # Slower than that somewhere between two samples, too.
     found[:-1] |= speed[:-1] * speed[1:] < 0
     reach = max(1, motion.thinning // 2)
     for part in motion.segments:
@@ -50,16 +56,28 @@ def slow(experiment: Experiment, joint: int) -> Mask:
     return found
 
 
-def bridged(experiment: Experiment, spared: frozenset[int] = frozenset()) -> Experiment:
-    """The same without what happens near rest: it would reach far through the low-pass into the samples in motion.
+def bridged(experiment: Experiment) -> Experiment:
+    """The same without what happens near rest: it would reach far through the low-pass into the samples in motion."""
+    return _bridged(experiment, (REST,) * experiment.measured.shape[1], False)
 
-    Channels in ``spared`` keep all their samples.
+
+def moving(experiment: Experiment, shares: Sequence[float] | None = None) -> Experiment:
+    """The same, and what lies on the bridges counts for nothing: a line between two samples has their noise.
+
+    ``shares`` of the peak speed are where motion begins, for each channel; `REST` by default.
     """
-    key = ("bridged", spared)
+    return _bridged(experiment, tuple(shares or (REST,) * experiment.measured.shape[1]), True)
+
+
+def _bridged(experiment: Experiment, shares: tuple[float, ...], drop: bool) -> Experiment:
+    key = ("bridged", shares, drop)
     if key not in experiment.store:
-        joints = range(experiment.measured.shape[1])
-        bridges = tuple(_bridge(experiment, np.zeros(0, bool) if c in spared else slow(experiment, c)) for c in joints)
-        experiment.store[key] = experiment.with_bridges(bridges)
+        bridges = tuple(_bridge(experiment, slow(experiment, c, share)) for c, share in enumerate(shares))
+        kept = None
+        if drop:
+            kept = np.stack([~near_rest(experiment, c, share) for c, share in enumerate(shares)], 1)
+            kept |= ~kept.any(axis=0)  # what is never in motion is all that there is
+        experiment.store[key] = experiment.with_bridges(bridges, kept)
     return experiment.store[key]
 
 
@@ -78,15 +96,17 @@ def _bridge(experiment: Experiment, rest: Mask) -> Bridge:
 
 def fitted(assembly: Assembly, experiments: Sequence[Experiment]) -> list[Experiment]:
     """What a model is fitted to: samples near rest count where it has a law for what happens there."""
-    laws = [p for p in assembly.placed if p.effect.at_rest or p.effect.exceeds_at_rest]
-    spared = frozenset(assembly.joint_of(p) for p in laws)
-    return [bridged(e, spared) for e in experiments]
+    whole = {assembly.joint_of(p) for p in assembly.placed if p.effect.at_rest}
+    creeping = {assembly.joint_of(p) for p in assembly.placed if p.effect.exceeds_at_rest}
+    joints = range(len(assembly.tree.joints))
+    shares = [0.0 if c in whole else CREEP if c in creeping else REST for c in joints]
+    return [moving(e, shares) for e in experiments]
 
 
-def near_rest(experiment: Experiment, joint: int) -> Mask:
+def near_rest(experiment: Experiment, joint: int, share: float = REST) -> Mask:
     """Samples of the analysis band that are near rest themselves (n_band,)."""
     motion = experiment.motion
-    indicator = slow(experiment, joint)
+    indicator = slow(experiment, joint, share)
     # Kept samples are those in the middle of the low-pass.
     parts = []
     for s, b in zip(motion.segments, motion.band_segments(), strict=True):

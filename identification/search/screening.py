@@ -7,6 +7,7 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm, wilcoxon
 
 from ...models.model import Model
 from ..diagnosis import Limit
@@ -198,14 +199,17 @@ def _limits(assembly: Assembly, evidence: Evidence, j: Judged, needed: float, wo
 
 
 def reliably_positive(gains: Array, errors: float = 2.0) -> bool:
-    """Mean over blocks left out above zero by so many standard errors (two: one-sided 2.5 %).
+    """Is what is gained on blocks left out above zero?
 
-    With all of them, or without the best and the worst: one may be where no other has been, and a gain there that
-    dwarfs the others is no reason to doubt them.
+    Its mean by so many standard errors (two: one-sided 2.5 %), with all blocks or without the best and the worst: one
+    may be where no other has been. Or by the signs and ranks (Wilcoxon 1945): where one or two gain a hundred times
+    what the others do, their scatter is no reason to doubt the others.
     """
     inner = np.sort(gains)[1:-1]
     some = [gains, inner] if len(inner) > 2 else [gains]
-    return any(bool(np.mean(x) > errors * np.std(x, ddof=1) / np.sqrt(len(x))) for x in some)
+    if any(bool(np.mean(x) > errors * np.std(x, ddof=1) / np.sqrt(len(x))) for x in some):
+        return True
+    return bool(np.any(gains)) and bool(wilcoxon(gains, alternative="greater")[1] < norm.sf(errors))
 
 
 def _saturated(along: Readings, pool: Sequence[Sequence[Option]]) -> list[Array]:

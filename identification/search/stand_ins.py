@@ -15,7 +15,7 @@ from ...models.model import Placed
 from ..fitting.experiment import Experiment
 from ..fitting.fit import Fit, channel_rms
 from .forward import Found, Taken, carry, without
-from .rest import bridged
+from .rest import moving
 
 LEFT = 0.7
 """Names stand in for something else where a curve leaves less than this share of the energy that they leave, ..."""
@@ -45,9 +45,9 @@ def stand_ins(
     experiments : sequence of Experiment
         Training recordings.
     """
-    moving = [bridged(e) for e in experiments]
-    after, _ = channel_rms(final.assembly, moving, final.theta)
-    before, _ = channel_rms(found.first.assembly, moving, found.first.theta)
+    in_motion = [moving(e) for e in experiments]
+    after, _ = channel_rms(final.assembly, in_motion, final.theta)
+    before, _ = channel_rms(found.first.assembly, in_motion, found.first.theta)
     left = (after / np.maximum(before, 1e-300)) ** 2
     curves = found.opening.nameless
 

@@ -27,7 +27,8 @@ WORTH = 0.05
 
 MOST = 0.5
 """Share of its channels' residual energy, near rest too, from which on an effect with a memory of where the joint
-turned is named for what it does near rest: joints that stick and rounded signs look like one, and leave most of it."""
+turned is named for what it does near rest: joints that stick and rounded signs look like one, and leave most of it.
+A joint that stands quite still while it sticks lets go after no travel at all: that is not one, either."""
 
 DRIVEN_MOST = 0.25
 """Share of its own channel's residual energy from which on a drive's spring or play is named for what it explains along
@@ -85,7 +86,7 @@ def tried(ground: Grounds, options: Sequence[Option], null: Null) -> Trial | Non
             others.append(judge(ground.near_rest, near))
         if effect.remembers:
             j = judge(ground.near_rest.alone(), near)
-            others += [j] if j is not None and j.explained > MOST else []
+            others += [j] if j is not None and j.explained > MOST and not _sticks(j, options) else []
     if effect.at_rest and plain is not None and plain.case.share() > WORTH:
         # What is plain in motion may be worth its name for what it does near rest.
         share = ground.near_rest.alone().explained(plain.variant, whole.columns(plain.variant))
@@ -96,6 +97,11 @@ def tried(ground: Grounds, options: Sequence[Option], null: Null) -> Trial | Non
     free = judge.free(best.variant)
     hold = tuple(p.name for p in best.placed.effect.parameters if p.name not in free)
     return Trial(replace(best, placed=replace(best.placed, hold=hold)), asked)
+
+
+def _sticks(j: Judged, options: Sequence[Option]) -> bool:
+    """Does a joint let go after no travel that could be told from none, the shortest of the grid being the best?"""
+    return bool(np.all(j.variant.parameters == np.min([v.parameters for v, _ in options], axis=0)))
 
 
 def source(along: Readings, effect: Effect) -> Reading:
