@@ -59,9 +59,14 @@ def pixels(page: Page) -> np.ndarray:
 
 def playing(page: Page) -> Frame:
     """A study page's playback, scrolled to, unpacked and drawn."""
-    page.locator("#playback-frame").scroll_into_view_if_needed()
-    drawn(page.frame_locator("#playback-frame").locator("body").element_handle().owner_frame())
-    return page.frames[1]
+    shown = page.locator("#playback-frame")
+    shown.scroll_into_view_if_needed()
+    shown.content_frame.locator("body").wait_for()
+    frame = shown.element_handle().content_frame()  # of the element in this page: what it shows may still change
+    assert frame is not None
+    frame.wait_for_load_state()
+    drawn(frame)
+    return frame
 
 
 def drawn(playback: Frame | None) -> None:

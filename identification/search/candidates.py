@@ -96,6 +96,12 @@ def refines(model: Model, placed: Placed) -> bool:
     return curve and has_whole_law(model.effects, placed.at)
 
 
+def widens(model: Model, placed: Placed) -> bool:
+    """Is an effect all that the model has at the same link already, and more?"""
+    contained = placed.effect.contains if placed.effect.at == "link" else ()
+    return any(p.at == placed.at and p.effect.name in contained for p in model.effects)
+
+
 def _makkar() -> tuple[str, ...]:
     """Makkar's law and what it contains; the law of slides is the same."""
     law = effects()["makkar_friction"]

@@ -14,16 +14,19 @@ from ..diagnosis import Limit
 from ..fitting.assembly import Assembly
 from ..fitting.experiment import Experiment
 from ..fitting.fit import Fit, channel_rms
-from .candidates import library, refines, variants
+from .candidates import library, refines, variants, widens
 from .curves import nameless_columns, smooth_columns
 from .evidence import Evidence
 from .grounds import NULLS, Grounds, Readings, grounds, readings
 from .judged import Judged, Samples
 from .saturated import Noise, learn
-from .trial import IDEALISED, MATERIAL, WORTH, Null, Option, source, tried
+from .trial import IDEALISED, MATERIAL, WIDER, WORTH, Null, Option, source, tried
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
+
+FEW = 16
+"""Blocks up to which a mean and its standard error say little of gains that differ by orders of magnitude."""
 
 LEVEL = 0.995
 """Quantile of the best score on noise that a candidate must beat, among all that reach the same channels."""
@@ -161,7 +164,7 @@ def _nameless(ground: Grounds, threshold: Mapping[tuple[int, ...], float]) -> di
 
 def _worth(model: Model, found: Fit, experiments: Sequence[Experiment], judged: Sequence[Judged]) -> dict[str, float]:
     """`WORTH`, or more beside what is there: `IDEALISED` of what slings and booms do, and for what only changes the
-    shape of a law `MATERIAL` of the torque."""
+    shape of a law `MATERIAL` of the torque. `WIDER` of what takes the place of a name that is there, and adds none."""
     left, measured = channel_rms(found.assembly, experiments, found.theta)
     left = np.maximum(left, 1e-300)
     idealised = (IDEALISED * _hung(found, experiments) / left) ** 2
@@ -170,7 +173,8 @@ def _worth(model: Model, found: Fit, experiments: Sequence[Experiment], judged: 
     for j in judged:
         reached = list(j.channels)
         part = float(material[reached].min()) if refines(model, j.placed) else 0.0
-        worth[j.placed.key] = max(WORTH, part, float(idealised[reached].mean()))
+        least = WIDER if widens(model, j.placed) else WORTH
+        worth[j.placed.key] = max(least, part, float(idealised[reached].mean()))
     return worth
 
 
@@ -202,14 +206,16 @@ def reliably_positive(gains: Array, errors: float = 2.0) -> bool:
     """Is what is gained on blocks left out above zero?
 
     Its mean by so many standard errors (two: one-sided 2.5 %), with all blocks or without the best and the worst: one
-    may be where no other has been. Or by the signs and ranks (Wilcoxon 1945): where one or two gain a hundred times
-    what the others do, their scatter is no reason to doubt the others.
+    may be where no other has been. Or, of `FEW`, by the signs and ranks (Wilcoxon 1945): where one or two gain a hundred
+    times what the others do, their scatter is no reason to doubt the others.
     """
     inner = np.sort(gains)[1:-1]
     some = [gains, inner] if len(inner) > 2 else [gains]
     if any(bool(np.mean(x) > errors * np.std(x, ddof=1) / np.sqrt(len(x))) for x in some):
         return True
-    return bool(np.any(gains)) and bool(wilcoxon(gains, alternative="greater")[1] < norm.sf(errors))
+    return (
+        len(gains) <= FEW and bool(np.any(gains)) and bool(wilcoxon(gains, alternative="greater")[1] < norm.sf(errors))
+    )
 
 
 def _saturated(along: Readings, pool: Sequence[Sequence[Option]]) -> list[Array]:

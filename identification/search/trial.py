@@ -25,6 +25,9 @@ first order, a boom no spring without mass. What explains no more than that is n
 WORTH = 0.05
 """Least share of its channels' residual energy that an effect must explain to be named."""
 
+WIDER = 0.025
+"""The same of what says more of a link whose mass or centre is named already, and takes its place."""
+
 MOST = 0.5
 """Share of its channels' residual energy, near rest too, from which on an effect with a memory of where the joint
 turned is named for what it does near rest: joints that stick and rounded signs look like one, and leave most of it.
