@@ -206,8 +206,8 @@ def reliably_positive(gains: Array, errors: float = 2.0) -> bool:
     """Is what is gained on blocks left out above zero?
 
     Its mean by so many standard errors (two: one-sided 2.5 %), with all blocks or without the best and the worst: one
-    may be where no other has been. Or, of `FEW`, by the signs and ranks (Wilcoxon 1945): where one or two gain a hundred
-    times what the others do, their scatter is no reason to doubt the others.
+    may be where no other has been. Or, of `FEW`, by the signs and ranks (Wilcoxon 1945): where one or two gain a
+    hundred times what the others do, their scatter is no reason to doubt the others.
     """
     inner = np.sort(gains)[1:-1]
     some = [gains, inner] if len(inner) > 2 else [gains]
