@@ -18,6 +18,10 @@ CONFIRM = 0.05
 """An effect is confirmed if the held-out residual energy of its channels, in motion, rises by this share when it is
 taken out."""
 
+SURE = 2.0
+"""Standard deviations from zero that one of an effect's amplitudes must have: two names that can swap what they explain
+are both far from it until one is gone."""
+
 LEAST = 1e-6
 """An effect that moves no more of the held-out residual's energy, all else as it is, adds nothing."""
 
@@ -92,6 +96,8 @@ def _missed(
     adds = channel_rms(assembly, locked, carry(final, assembly))[0]
     if _energy(adds - with_it, c, final) <= LEAST * _energy(with_it, c, final):
         return _Missed(0.0, trial, rest)
+    if not _known(final, t):
+        return _Missed(0.0, trial, rest)
     # A joint at rest holds what it is given: there, only laws for what happens at rest can be missed.
     both = [channel_rms(x.assembly, in_motion, x.theta)[0] for x in (final, rest)]
     pairs = [(*both, CONFIRM)]
@@ -104,6 +110,14 @@ def _missed(
         pairs.append((*both, CONFIRM))
     rise = max((_energy(b, c, final) / _energy(a, c, final) - 1) / bar for a, b, bar in pairs)
     return _Missed(rise, trial, rest)
+
+
+def _known(final: Fit, t: Taken) -> bool:
+    """Is an amplitude of the effect known to be other than zero? A law without amplitudes is judged by its shape."""
+    own = final.assembly.index_of(t.judged.placed)
+    amplitudes = [t.judged.placed.effect.parameters[i].name for i in t.judged.variant.amplitudes]
+    own = [i for i in own if final.assembly.slots[i].name in amplitudes]
+    return not own or bool(np.any(np.abs(final.theta[own]) >= SURE * final.std[own]))
 
 
 def _energy(rms: Array, channels: Sequence[int], found: Fit) -> float:
