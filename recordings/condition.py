@@ -36,6 +36,9 @@ NOISE_SHARE = 0.1
 MINIMUM_SAMPLES = 50
 """Fewest samples in the analysis band that a fit is tried on."""
 
+ENOUGH = 120
+"""Samples in the analysis band that a recording keeps, filters' ends included, however noisy its encoders are."""
+
 MINIMUM_RUN = 16
 """Fewest samples in the analysis band that a run between gaps must leave; a noise model remembers up to 12."""
 
@@ -128,7 +131,7 @@ def condition(dataset: xr.Dataset, joints: Sequence[str], band: float | None = N
     band : float, optional
         Edge of the analysis band [Hz], lowered to a whole number of samples for one: a quarter of the sample rate at
         most. By default the lowest of 40 Hz, that, and the band in which the noise of the derived acceleration stays
-        below a tenth of its signal on every moving joint.
+        below a tenth of its signal on every moving joint; never so narrow that a recording long enough is left short.
     fitted : bool
         Whether torques will be compared in the band; a motion that is only followed may be shorter.
 
@@ -170,7 +173,8 @@ def condition(dataset: xr.Dataset, joints: Sequence[str], band: float | None = N
     white = _white_level(positions, period)
     if band is None:
         edge = min(BAND_CAP, rate / 2.5, 1 / (2 * longest))
-        band, limit = _band_from_noise(positions, white, period, edge)
+        needed = ENOUGH / (2 * period * sum(len(p[0]) for p in pieces)) if fitted and pieces else 0.0
+        band, limit = _band_from_noise(positions, white, period, edge, min(max(needed, edge / 20), edge))
     elif not 0 < band <= rate / 2.5:
         raise InputError(
             f"{path}: bandwidth {band:g} Hz cannot be carried at {rate:.4g} samples a second; "
@@ -307,7 +311,7 @@ def _white_level(position: Array, period: float) -> Array:
     return np.median(power[f > 0.375 / period], axis=0) / np.log(2)
 
 
-def _band_from_noise(position: Array, white: Array, period: float, edge: float) -> tuple[float, str]:
+def _band_from_noise(position: Array, white: Array, period: float, edge: float, narrowest: float) -> tuple[float, str]:
     """Widest band <= edge in which derived acceleration noise is below NOISE_SHARE of its signal, on moving joints."""
     if len(position) < FEWEST:
         return edge, "few samples: the widest band"
@@ -317,9 +321,11 @@ def _band_from_noise(position: Array, white: Array, period: float, edge: float) 
     if not moving.any():
         return edge, "no joint moves: the widest band"
     for band in np.geomspace(edge, edge / 20, 40):
+        if band < narrowest:
+            break
         noise = white * (2 * np.pi) ** 4 * band**5 / 5
         energy = np.sum(signal[f <= band], axis=0) * f[1]
         if np.all(noise[moving] <= NOISE_SHARE**2 * energy[moving]):
             why = "the cap" if band == edge else "beyond it encoder noise would reach the acceleration"
             return float(band), why
-    return float(edge / 20), "encoder noise is high: the narrowest band tried"
+    return float(narrowest), "encoder noise is high: the narrowest band tried"

@@ -19,7 +19,7 @@ _TEXT = (1, 2, 4, 16, 17, 18)
 _UINT32, _MATRIX, _COMPRESSED = 6, 14, 15
 _INTEGER, _NAME = (5, 6), (1, 16)
 _COMPLEX = 0x800
-_CELL, _STRUCT, _OBJECT, _SPARSE = 1, 2, 3, 5
+_CELL, _STRUCT, _OBJECT, _SPARSE, _FUNCTION, _OPAQUE = 1, 2, 3, 5, 16, 17
 _NUMERIC = range(6, 16)
 _Element = tuple[int, bytes]
 
@@ -69,8 +69,9 @@ def _check_matrix(data: bytes, order: str) -> None:
     (word,) = struct.unpack(f"{order}I", flags[:4])
     family, parts = word & 0xFF, 2 if word & _COMPLEX else 1
     _require(family in range(1, 18))
-    if family > 15:  # function handles and opaque objects have layouts of their own, and are no columns
-        return
+    if family == _OPAQUE:  # name, type and class, then what it holds
+        _require(len(rest) == 4 and all(kind in _NAME for kind, _ in rest[:3]) and rest[3][0] == _MATRIX)
+        return _check_matrix(rest[3][1], order)
     _require(len(rest) >= 2 and rest[0][0] in _INTEGER and len(rest[0][1]) >= 8 and rest[1][0] in _NAME)
     shape = struct.unpack(f"{order}{len(rest[0][1]) // 4}i", rest[0][1])
     _require(min(shape) >= 0)
@@ -88,6 +89,9 @@ def _check_matrix(data: bytes, order: str) -> None:
         for kind, content in children:
             _require(kind == _MATRIX)
             _check_matrix(content, order)
+    elif family == _FUNCTION:
+        _require(len(body) == 1 and body[0][0] == _MATRIX)
+        _check_matrix(body[0][1], order)
     elif family == _SPARSE:
         _require(len(body) == 2 + parts and all(kind in _INTEGER for kind, _ in body[:2]))
         _require(all(kind in _NUMBERS for kind, _ in body[2:]))

@@ -291,5 +291,6 @@ def _quality(dataset: xr.Dataset) -> list[str]:
     return notes
 
 
-def _some(names: list[str], most: int = 8) -> str:
-    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
+def _some(names: list[str], most: int = 8, longest: int = 60) -> str:
+    shown = [name if len(name) <= longest else f"{name[: longest - 3]}..." for name in names[:most]]
+    return ", ".join(shown) + (f" and {len(names) - most} more" if len(names) > most else "")

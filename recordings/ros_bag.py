@@ -82,7 +82,7 @@ def read(path: Path, wanted: Mapping[str, str]) -> Columns:
     try:
         with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
             _check_definitions(path, reader)
-            topics = {connection.topic for connection in reader.connections}
+            topics = {str(connection.topic) for connection in reader.connections}
             fields = {column: _topic_and_field(path, column, topics) for column in wanted.values() if column[:1] == "/"}
             streams = _streams(path, reader, fields)
     except (InputError, MemoryError):

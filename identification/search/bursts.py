@@ -16,7 +16,7 @@ from ...models.floating.tree import n_carriers
 from ...models.rig.rig import Rig
 from ..fitting.experiment import Experiment
 from ..fitting.fit import Fit
-from .encoder_noise import encoder_torque
+from .encoder_noise import UNEVEN, encoder_torque
 from .locate import WINDOW
 from .rest import bridged, in_motion
 
@@ -28,6 +28,9 @@ is out of the ordinary: that noise goes with the pose, and with how fast an enco
 
 LEAST = 0.2
 """Share of a channel's residual energy, above that of ordinary windows, that makes it bursts."""
+
+AGAIN = 2
+"""Windows out of the ordinary from which on something comes and goes; what happened once is an event."""
 
 FEWEST = 12
 """Windows of which a median says something."""
@@ -56,10 +59,11 @@ def bursts(final: Fit, experiments: Sequence[Experiment]) -> dict[int, Bursts]:
     found = {}
     for c in range(residuals[0].shape[1]):
         strength, loudest = _windows(experiments, [r[:, c] for r in residuals], [m[:, c] for m in moving])
-        usual = np.median(strength) + heard[c] if len(strength) >= FEWEST else np.inf
-        over = np.maximum(strength - LOUD * usual, 0.0).sum() / max(strength.sum(), 1e-300)
-        if over > LEAST:
-            found[c] = Bursts(float(over), loudest)
+        usual = np.median(strength) + UNEVEN * heard[c] if len(strength) >= FEWEST else np.inf
+        over = np.maximum(strength - LOUD * usual, 0.0)
+        share = over.sum() / max(strength.sum(), 1e-300)
+        if share > LEAST and np.count_nonzero(over) >= AGAIN:
+            found[c] = Bursts(float(share), loudest)
     return found
 
 

@@ -1,7 +1,7 @@
 """What noise of the encoders leaves in the torque residual, through derivatives of the position and the model.
 
 A spring or play between motor and link keeps the link from following fast motion. Where the fast motion is noise, the
-torque with a spring is nearer the measured one although nothing is springy.
+torque with a spring is nearer the measured one although nothing is springy. A late sensor does the same.
 """
 
 from dataclasses import replace
@@ -14,6 +14,10 @@ from ..fitting.fit import Fit
 from .rest import slow
 
 Array = NDArray[np.float64]
+
+UNEVEN = 1.5
+"""Energy of encoder noise in the band over that of white noise as strong as what stands above the band: a coarse
+encoder's steps follow its motion, and are not white."""
 
 
 def encoder_torque(found: Fit, experiment: Experiment) -> Array:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from ...models.effect import Effect
 from .candidates import Variant, free_parameters
+from .encoder_noise import UNEVEN
 from .grounds import NULLS, Grounds, Reading, Readings
 from .judged import Case, Judged, Parts, Samples
 
@@ -77,9 +78,11 @@ def tried(ground: Grounds, options: Sequence[Option], null: Null) -> Trial | Non
     plain = judge(ground.measured if effect.at_rest else ground.asked, options, null)
     asked: Judged | None = None
     others: list[Judged | None] = []
+    # What follows late follows noise least, and comes nearer to the torque for that.
+    late = effect.acts_on == "position" or (effect.at == "sensor" and bool(effect.states))
+    if late and plain is not None and judge.beyond_noise(plain, ground.asked, ground.readings.asked) < WORTH:
+        plain = None
     if effect.acts_on == "position":
-        if plain is not None and judge.beyond_noise(plain, ground.asked, ground.readings.asked) < WORTH:
-            plain = None
         driven = judge.along_measured([v for v, _ in options])
         if driven is not None:
             asked, others = plain, [driven]
@@ -152,9 +155,10 @@ class _Judge:
         )
 
     def beyond_noise(self, j: Judged, samples: Samples, reading: Reading) -> float:
-        """Share of its joint's own residual that a drive explains, less what the encoders' noise accounts for."""
+        """Share of its joint's own residual that a candidate explains, less what encoder noise may account for."""
         own = reading.found.assembly.joint_of(j.placed)
-        return samples.explained(j.variant, {own: reading.columns(j.variant)[own]}) - self._ground.heard[own]
+        explained = samples.explained(j.variant, {own: reading.columns(j.variant)[own]})
+        return explained - UNEVEN * self._ground.heard[own]
 
     def along_measured(self, grid: Sequence[Variant]) -> Judged | None:
         """A drive's spring or play along the motion as measured, its shape tuned; None where it explains too little."""
