@@ -67,7 +67,8 @@ def report_on(
     fits = _fits(model, found.first, final, train, locked)
     nameless = {c: x for c, x in found.closing.nameless.items() if x.share > NAMELESS}
     # What a curve explains well may also come and go.
-    unsteady = {c: b for c, b in bursts(final, train).items() if c not in nameless or nameless[c].share < PLAIN}
+    bursting = bursts(final, train)
+    unsteady = {c: b for c, b in bursting.items() if b.again and (c not in nameless or nameless[c].share < PLAIN)}
 
     def size(c: int, share: float) -> float:
         return float(np.sqrt(share)) * fits[c].train.relative_after
@@ -115,6 +116,12 @@ def report_on(
         for t in doubtful
     ]
     notes += [f"too little to speak of: {text}" for c, _, text in said if c not in loud]
+    notes += [
+        f"on {channels[c]}, {percent(b.share)} of the residual stands in one window and has not come again: "
+        "a knock, or an outlier"
+        for c, b in bursting.items()
+        if not b.again
+    ]
     notes += _excitation(train)
     candidates = tuple(
         Candidate(j.placed.effect.name, j.placed.at, float(j.explained), float(j.score), j.placed.key in named)

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from snarelab.errors import InputError
-from snarelab.recordings.condition import MINIMUM_SAMPLES, Motion, condition
+from snarelab.recordings.condition import ENOUGH, MINIMUM_SAMPLES, Motion, condition
 
 RATE = 200.0
 BAND = 20.0
@@ -341,3 +341,14 @@ def test_what_is_only_followed_may_be_short():
     np.testing.assert_allclose(motion.qd[:, 0], sine(motion.time, 1.0)[1], atol=1e-2)
     with pytest.raises(InputError, match="too few samples"):
         condition(recording(t[:8], sine(t[:8], 1.0)[0]), ["joint1"], BAND, fitted=False)
+
+
+def test_a_short_recording_from_coarse_encoders_keeps_enough_of_its_band():
+    """In the band that its noise asks for, 2 Hz, 12 s at 100 Hz would be 33 samples."""
+    t = clock(12.0, 100.0)
+    step = 2e-2
+    q = 0.3 * np.sin(2 * np.pi * 0.2 * t) + 0.2 * step * np.random.default_rng(0).normal(size=len(t))
+    motion = condition(recording(t, step * np.round(q / step)), ["joint1"])
+    assert ENOUGH / 2 < len(motion.to_band(motion.tau)) <= ENOUGH
+    assert motion.band == pytest.approx(ENOUGH / 24.0, rel=0.01)
+    noted(motion, "encoder noise is high")

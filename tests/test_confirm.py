@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from snarelab.identification import confirm as module
-from snarelab.identification.confirm import _Missed, confirm
+from snarelab.identification.confirm import SURE, _known, _Missed, confirm
 
 N = 6
 
@@ -61,3 +61,20 @@ def test_of_two_twins_one_stays(monkeypatch):
     done = confirm(found, [], [], lambda _: None)
     assert len(done.confirmed) == len(done.rejected) == 1
     assert done.trials == {done.confirmed[0].judged.placed.key: (0.1, 0.4)}
+
+
+@pytest.mark.parametrize(("deviations", "known"), [((0.3, 0.9 * SURE), False), ((0.3, 1.1 * SURE), True), ((), True)])
+def test_a_name_needs_one_amplitude_that_is_known_to_be_other_than_zero(deviations, known):
+    """The third parameter is a shape: a travel or a speed is never zero, and says nothing. With no amplitude, the law's
+    shape is all there is to judge."""
+    names = ("first", "second", "shape")
+    slots = [SimpleNamespace(name="of another effect"), *(SimpleNamespace(name=n) for n in names)]
+    final: Any = SimpleNamespace(
+        assembly=SimpleNamespace(index_of=lambda placed: [1, 2, 3], slots=slots),
+        theta=np.array([9.0, *(deviations or (0.0, 0.0)), 9.0]),
+        std=np.ones(4),
+    )
+    effect = SimpleNamespace(parameters=[SimpleNamespace(name=n) for n in names])
+    variant = SimpleNamespace(amplitudes=range(len(deviations)))
+    taken: Any = SimpleNamespace(judged=SimpleNamespace(placed=SimpleNamespace(effect=effect), variant=variant))
+    assert _known(final, taken) is known

@@ -30,7 +30,8 @@ LEAST = 0.2
 """Share of a channel's residual energy, above that of ordinary windows, that makes it bursts."""
 
 AGAIN = 2
-"""Windows out of the ordinary from which on something comes and goes; what happened once is an event."""
+"""Windows out of the ordinary from which on something comes and goes; what was there once, as a knock is, has not come
+again, and no law of the arm's could be held to it."""
 
 FEWEST = 12
 """Windows of which a median says something."""
@@ -38,10 +39,12 @@ FEWEST = 12
 
 @dataclass(frozen=True)
 class Bursts:
-    """Of one channel: the share of the residual's energy that is out of the ordinary, and its frequency [Hz]."""
+    """Of one channel: the share of the residual's energy that is out of the ordinary, its frequency [Hz], and whether
+    it was there more than once."""
 
     share: float
     frequency: float
+    again: bool
 
 
 def bursts(final: Fit, experiments: Sequence[Experiment]) -> dict[int, Bursts]:
@@ -62,8 +65,8 @@ def bursts(final: Fit, experiments: Sequence[Experiment]) -> dict[int, Bursts]:
         usual = np.median(strength) + UNEVEN * heard[c] if len(strength) >= FEWEST else np.inf
         over = np.maximum(strength - LOUD * usual, 0.0)
         share = over.sum() / max(strength.sum(), 1e-300)
-        if share > LEAST and np.count_nonzero(over) >= AGAIN:
-            found[c] = Bursts(float(share), loudest)
+        if share > LEAST:
+            found[c] = Bursts(float(share), loudest, np.count_nonzero(over) >= AGAIN)
     return found
 
 
