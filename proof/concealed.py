@@ -170,6 +170,5 @@ MAKERS: dict[str, Maker] = {
 }
 """By the vocabulary's name. Those missing act on rigs, floating bases and snares, not on an arm."""
 
-MEASUREMENT = tuple(name for name in MAKERS if effects()[name].family == "measurement")
 STRUCTURE = ("inertia_error", "payload_mass", "com_offset")
 """What a wrong parameter of the rigid body may be called."""

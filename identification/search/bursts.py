@@ -66,7 +66,7 @@ def bursts(final: Fit, experiments: Sequence[Experiment]) -> dict[int, Bursts]:
         over = np.maximum(strength - LOUD * usual, 0.0)
         share = over.sum() / max(strength.sum(), 1e-300)
         if share > LEAST:
-            found[c] = Bursts(float(share), loudest, np.count_nonzero(over) >= AGAIN)
+            found[c] = Bursts(float(share), loudest, bool(np.count_nonzero(over) >= AGAIN))
     return found
 
 
