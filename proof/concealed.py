@@ -13,7 +13,6 @@ from bench.arm import Arm
 from bench.concealed import FRICTION, Concealed, Maker, Planned, Rng, TooMuch
 from bench.concealed import MAKERS as BENCH
 from bench.parts import Drift, Elasticity
-from snarelab.models.effects import effects
 
 from .plant import Law
 from .robots import point_inertia
