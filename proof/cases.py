@@ -32,6 +32,10 @@ BANDS = np.arange(2.0, 62.0, 2.0)
 MOST_ASTRAY = 0.1
 """A recording whose arm strays this far from its motion [rad] is no recording of it: another arm is drawn."""
 
+RATTLING, RATTLE_SHARE, RATTLE_NOISES = 20.0, 0.25, 10.0
+"""A torque that has more than this share of its energy above this frequency [Hz], and there this many times its noise,
+is a servo's limit cycle: on another arm it would have been tuned again, and another arm is drawn."""
+
 PAIRS = (
     ("stribeck_friction", "harness_stiffness"),
     ("load_dependent_friction", "torque_ripple"),
@@ -118,7 +122,17 @@ class Case:
             astray = float(np.abs(q - motion(recording["time"])[0]).max())
             if astray > MOST_ASTRAY:
                 raise ValueError(f"the arm strays {astray:.2g} rad from its motion")
+            for joint in self.plant.arm.joints:
+                if rattles(recording[f"tau.{joint}"], self.answer.noise):
+                    raise ValueError(f"the servo of {joint} rattles")
             write_csv(folder / name, recording)
+
+
+def rattles(torque: NDArray, noise: float) -> bool:
+    """Whether a servo is in a limit cycle: its torque (n_samples,) [T] is fast, and far stronger than its noise [T]."""
+    slow = band_rms(torque[:, None] - torque.mean(), RATE, RATTLING)[0]
+    whole = float(np.std(torque))
+    return bool(whole**2 - slow**2 > max(RATTLE_SHARE * whole**2, (RATTLE_NOISES * noise) ** 2))
 
 
 def planned_cases(count: int, seed: int) -> list[tuple[str, tuple[str, ...], float]]:

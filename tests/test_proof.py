@@ -137,6 +137,18 @@ def test_case_is_the_same_each_time():
     assert one.answer != drawn("torque_ripple", 1.0, number=4).answer
 
 
+def test_a_servo_in_a_limit_cycle_is_no_recording(tmp_path):
+    """Of seed 90300 joint1 shook at 300 N·m, ten times what its motion takes, and the error of that was laid at a name."""
+    with pytest.raises(ValueError, match="the servo of joint1 rattles"):
+        draw(planned_cases(len(ROUND), 90300)[51], 90300, 51, 0).write(tmp_path)
+    time = np.arange(5000) / cases.RATE
+    noise = 0.5 * np.random.default_rng(0).standard_normal(len(time))
+    light = 0.3 * np.sin(2 * np.pi * 0.4 * time) + 0.1 * time  # a wrist, whose noise is stronger than what it carries
+    assert not cases.rattles(light + noise, 0.5)
+    assert not cases.rattles(light + 0.1 * np.sin(2 * np.pi * 30 * time), 0.02)
+    assert cases.rattles(light + 2.0 * np.sin(2 * np.pi * 30 * time), 0.02)
+
+
 def test_play_under_a_steady_load_is_the_gap_and_the_spring():
     twist = play(np.full(2000, -3.0), 4e-3, 0.2, 500.0, 5.0, 0.02)
     assert twist[-1] == pytest.approx(-3.0 / 500.0 - 0.01, rel=1e-6)
