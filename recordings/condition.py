@@ -36,7 +36,7 @@ NOISE_SHARE = 0.1
 MINIMUM_SAMPLES = 50
 """Fewest samples in the analysis band that a fit is tried on."""
 
-ENOUGH = 120
+LEAST_KEPT = 120
 """Samples in the analysis band that a recording keeps, filters' ends included, however noisy its encoders are."""
 
 MINIMUM_RUN = 16
@@ -173,7 +173,7 @@ def condition(dataset: xr.Dataset, joints: Sequence[str], band: float | None = N
     white = _white_level(positions, period)
     if band is None:
         edge = min(BAND_CAP, rate / 2.5, 1 / (2 * longest))
-        needed = ENOUGH / (2 * period * sum(len(p[0]) for p in pieces)) if fitted and pieces else 0.0
+        needed = LEAST_KEPT / (2 * period * sum(len(p[0]) for p in pieces)) if fitted and pieces else 0.0
         band, limit = _band_from_noise(positions, white, period, edge, min(max(needed, edge / 20), edge))
     elif not 0 < band <= rate / 2.5:
         raise InputError(

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from snarelab.errors import InputError
-from snarelab.recordings.condition import ENOUGH, MINIMUM_SAMPLES, Motion, condition
+from snarelab.recordings.condition import LEAST_KEPT, MINIMUM_SAMPLES, Motion, condition
 
 RATE = 200.0
 BAND = 20.0
@@ -349,6 +349,6 @@ def test_a_short_recording_from_coarse_encoders_keeps_enough_of_its_band():
     step = 2e-2
     q = 0.3 * np.sin(2 * np.pi * 0.2 * t) + 0.2 * step * np.random.default_rng(0).normal(size=len(t))
     motion = condition(recording(t, step * np.round(q / step)), ["joint1"])
-    assert ENOUGH / 2 < len(motion.to_band(motion.tau)) <= ENOUGH
-    assert motion.band == pytest.approx(ENOUGH / 24.0, rel=0.01)
+    assert LEAST_KEPT / 2 < len(motion.to_band(motion.tau)) <= LEAST_KEPT
+    assert motion.band == pytest.approx(LEAST_KEPT / 24.0, rel=0.01)
     noted(motion, "encoder noise is high")

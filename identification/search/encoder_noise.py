@@ -1,7 +1,7 @@
 """What noise of the encoders leaves in the torque residual, through derivatives of the position and the model.
 
 A spring or play between motor and link keeps the link from following fast motion. Where the fast motion is noise, the
-torque with a spring is nearer the measured one although nothing is springy. A late sensor does the same.
+torque with a spring is nearer the measured one although nothing is springy. A late torque sensor does the same.
 """
 
 from dataclasses import replace

@@ -20,10 +20,12 @@ from ..fitting.base_parameters import BaseParameters
 from ..fitting.experiment import Experiment, Scales
 from ..fitting.fit import Fit, channel_rms, fit
 from .closed_loop import DRIVEN, planned
+from .encoder_noise import UNEVEN
 from .evidence import ABSORBED
 from .judged import Judged
 from .rest import fitted
 from .screening import Screening, reliably_positive, screen
+from .trial import WORTH
 
 Array = NDArray[np.float64]
 
@@ -204,6 +206,9 @@ def _passes(result: Screening, j: Judged) -> bool:
     # What a disturbance drives is let into the motion up to a share, and looks like a late sensor.
     late = j.placed.effect.at == "sensor" and bool(j.placed.effect.states)
     worth = max(result.worth[j.placed.key], DRIVEN if late else 0.0)
+    if late and j.placed.at.startswith("tau."):
+        # A torque that comes late follows the noise of the motion least, and is nearer to the measured one for that.
+        worth = max(worth, WORTH + UNEVEN * float(result.heard[j.channels[0]]))
     if j.score <= result.threshold[j.channels] or j.explained < worth:
         return False
     return reliably_positive(j.case.fresh_gains())

@@ -62,6 +62,8 @@ class Screening:
     """Share of its channels' residual that each candidate must explain to be worth a name."""
     limits: tuple[Limit, ...]
     noise: Noise
+    heard: Array
+    """Share of each channel's residual energy that noise of the encoders accounts for (J,)."""
 
 
 def screen(
@@ -122,6 +124,7 @@ def screen(
         worth,
         tuple(limits),
         noise,
+        ground.heard,
     )
 
 

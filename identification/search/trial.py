@@ -78,11 +78,9 @@ def tried(ground: Grounds, options: Sequence[Option], null: Null) -> Trial | Non
     plain = judge(ground.measured if effect.at_rest else ground.asked, options, null)
     asked: Judged | None = None
     others: list[Judged | None] = []
-    # What follows late follows noise least, and comes nearer to the torque for that.
-    late = effect.acts_on == "position" or (effect.at == "sensor" and bool(effect.states))
-    if late and plain is not None and judge.beyond_noise(plain, ground.asked, ground.readings.asked) < WORTH:
-        plain = None
     if effect.acts_on == "position":
+        if plain is not None and judge.beyond_noise(plain, ground.asked, ground.readings.asked) < WORTH:
+            plain = None
         driven = judge.along_measured([v for v, _ in options])
         if driven is not None:
             asked, others = plain, [driven]
@@ -155,7 +153,7 @@ class _Judge:
         )
 
     def beyond_noise(self, j: Judged, samples: Samples, reading: Reading) -> float:
-        """Share of its joint's own residual that a candidate explains, less what encoder noise may account for."""
+        """Share of its joint's own residual that a drive explains, less what the encoders' noise may account for."""
         own = reading.found.assembly.joint_of(j.placed)
         explained = samples.explained(j.variant, {own: reading.columns(j.variant)[own]})
         return explained - UNEVEN * self._ground.heard[own]
