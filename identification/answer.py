@@ -16,7 +16,8 @@ from .fitting.floating_terms import momentum_floor
 from .reliability import probability as reliability
 from .search.bursts import bursts
 from .search.candidates import has_whole_law
-from .search.forward import Found, Taken
+from .search.choice import Taken
+from .search.forward import Found
 from .search.locate import locate
 from .search.trial import MATERIAL
 from .wording import evidence_sentence, experiment_sentence, listed, percent, verdict_sentence

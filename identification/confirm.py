@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from .fitting.experiment import Experiment
 from .fitting.fit import Fit, channel_rms, fit
-from .search.forward import Found, Taken, carry, without
+from .search.choice import Taken
+from .search.forward import Found, carry, without
 from .search.rest import fitted, moving
 from .search.trial import MOST
 

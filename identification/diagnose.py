@@ -26,7 +26,8 @@ from .fitting.fit import Fit, channel_rms, fit
 from .identify import demand_one_process, inertial_values, physical
 from .links.answer import with_links
 from .links.diagnose import diagnose_links
-from .search.forward import Found, Taken, carry, search
+from .search.choice import Taken
+from .search.forward import Found, carry, search
 from .search.rest import fitted
 from .search.stand_ins import stand_ins
 from .snare.diagnose import diagnose_captures

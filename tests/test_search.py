@@ -11,8 +11,8 @@ from bench.concealed_arm import run_case
 from snarelab.identification.fitting.assembly import Assembly
 from snarelab.identification.fitting.experiment import Scales
 from snarelab.identification.search.candidates import variants
+from snarelab.identification.search.choice import choose
 from snarelab.identification.search.evidence import Channel, Evidence
-from snarelab.identification.search.forward import _choose
 from snarelab.models.effects import get_effect
 from snarelab.models.model import Placed
 from snarelab.models.urdf import load_urdf
@@ -63,7 +63,7 @@ def screening(rng: np.random.Generator, wide_size: float, local_size: float) -> 
 )
 def test_one_effect_on_all_channels_or_several_on_one_each(seed, wide, local, first, never):
     result, candidates = screening(np.random.default_rng(seed), wide, local)
-    chosen = [j.placed.key for j in _choose(result, candidates)]
+    chosen = [j.placed.key for j in choose(result, candidates)]
     assert chosen[0] == first
     assert not any(key.startswith(never) for key in chosen)
 

@@ -16,8 +16,10 @@ from numpy.typing import NDArray
 from ...models.effects import effects
 from ...models.model import Placed
 from ..search.candidates import MOST_VARIANTS
-from ..search.forward import ALIKE, BOOTSTRAPS, MOST_ROUNDS
+from ..search.choice import BOOTSTRAPS
+from ..search.forward import MOST_ROUNDS
 from ..search.noise import Whitener, whitener
+from ..search.passing import ALIKE
 from ..search.saturated import BLOCK, MOST_BLOCKS
 from ..search.trial import WORTH
 from .pair import Pair, PairFit, fit_pair

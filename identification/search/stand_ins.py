@@ -14,7 +14,8 @@ import numpy as np
 from ...models.model import Placed
 from ..fitting.experiment import Experiment
 from ..fitting.fit import Fit, channel_rms
-from .forward import Found, Taken, carry, without
+from .choice import Taken
+from .forward import Found, carry, without
 from .rest import moving
 
 LEFT = 0.7

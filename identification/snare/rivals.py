@@ -5,7 +5,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..search.forward import ALIKE, BOOTSTRAPS, RivalOdds
+from ..search.choice import BOOTSTRAPS, RivalOdds
+from ..search.passing import ALIKE
 from .comparison import LONG, SLOW, Blocks, variances
 from .fit import Fit
 from .recording import Capture

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...models.model import Model, Placed
-from ..search.forward import RivalOdds
+from ..search.choice import RivalOdds
 from .fit import Fit, evaluate, fit, started, with_slopes
 from .library import library, start_of
 from .rivals import weigh
