@@ -6,7 +6,7 @@ STUDIES := emps kuka bam free-floating ground-capture zero-g-rig orbit-inspectio
 
 BENCHES := torque friction_fit diagnosis floating cosim fmu snare ecos_inspection tolerance
 
-.PHONY: help demo test check studies bench accuracy fuzz kills proof fmus docs clean $(STUDIES:%=study-%)
+.PHONY: help demo test check studies bench accuracy fuzz kills mutants proof fmus docs clean $(STUDIES:%=study-%)
 
 help:            ## what can be made
 	@sed -n -e 's/^\$$(STUDIES.*## /  make study-NAME\t/p' -e 's/^\([a-z]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
@@ -39,6 +39,11 @@ fuzz: .venv/installed ## broken files at every reader, SECONDS for each
 
 kills: .venv/installed ## two hundred runs killed at random: nothing lost that was reported done
 	$(BIN)/python bench/kills.py
+
+MUTANTS ?= 60
+mutants: .venv/installed ## change identification and cosim at random places, and count how often a test notices; branch coverage
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt '.[mutants]'
+	$(BIN)/python bench/mutants.py --mutants $(MUTANTS)
 
 proof: .venv/installed ## conceal effects in another engine's recordings, let the tool name them, and score it: half an hour
 	$(BIN)/python -m proof

@@ -4,8 +4,8 @@ A case is a random robot, its friction, disturbances, noise, motions and what it
 (seed, number, attempt), so that answers need not lie on a disk to be scored later.
 """
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -100,7 +100,10 @@ class Answer:
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A case before it is recorded: the plant, its two motions, the model's text, the answer."""
+    """A case before it is recorded: the plant, its two motions, the model's text, the answer.
+
+    ``twin`` and ``twin_model``: the same arm with nothing concealed, and a model that knows its friction.
+    """
 
     plant: ProofPlant
     motions: tuple[Motion, Motion]
@@ -109,6 +112,8 @@ class Case:
     hidden: tuple[Concealed, ...]
     planned: tuple[Planned, ...]
     noise: tuple[Rng, Rng] = field(repr=False)
+    twin: ProofPlant
+    twin_model: str
 
     def write(self, folder: Path) -> None:
         """Record it: model, URDF, ``train.csv``, ``hold.csv``. Raises ValueError where the arm cannot be recorded."""
@@ -175,16 +180,16 @@ def _drawn(plan: tuple[str, tuple[str, ...], float], number: int, rng: Rng) -> C
         for name, value in made.plant.items():
             parts[name] = parts.get(name, {}) | value if isinstance(value, dict) else value
     disturbance = Disturbance(rms, float(rng.uniform(0.2, 1.0)), float(rng.uniform(10.0, 15.0)))
-    plant = ProofPlant(
+    twin = ProofPlant(
         arm,
-        friction=laws,
+        friction=friction,
         disturbance=dict.fromkeys(arm.joints, disturbance),
         encoder_step=by_joint(arm, 2.0 * np.pi / 2 ** int(rng.integers(23, 26))),
         tau_noise=by_joint(arm, noise),
         # Long arms couple their joints, and bear a slower servo.
         servo=Servo(bandwidth=float(rng.uniform(3.0, 5.0)) * min(1.0, 3.5 / n)),
-        **parts,
     )
+    plant = replace(twin, friction=laws, **parts)
     noises = (rng.spawn(1)[0], rng.spawn(1)[0])
     lowest = floor(plant, HOLDOUT, RATE, noises[1])
     by_band = np.array([band_rms(lowest, RATE, band) for band in BANDS])
@@ -202,7 +207,9 @@ def _drawn(plan: tuple[str, tuple[str, ...], float], number: int, rng: Rng) -> C
         tuple(f"tau.{arm.joints[int(np.argmax(shows(m, h)))]}" for m, h in zip(planned, hidden, strict=True)),
         {f"tau.{joint}": tuple(float(f"{x:.5g}") for x in by_band[:, k]) for k, joint in enumerate(arm.joints)},
     )
-    return Case(plant, motions, _model(group, kinds, hidden, planned, plant), answer, tuple(hidden), planned, noises)
+    secret = {(name, m.name) for h, m in zip(hidden, planned, strict=True) for name in h.unknown}
+    model, twin_model = _model(kinds, hidden, plant, secret), _model((), hidden, twin, ())
+    return Case(plant, motions, model, answer, tuple(hidden), planned, noises, twin, twin_model)
 
 
 def _make(group: str, kind: str, m: Planned, rms: float, rng: Rng) -> Concealed:
@@ -267,10 +274,11 @@ def _truth(kind: str, made: Concealed) -> Truth:
     return Truth(kind, made.at, tuple(name for name in made.unknown if name != kind))
 
 
-def _model(group: str, kinds, hidden, planned, plant: ProofPlant) -> str:
+def _model(
+    kinds: Collection[str], hidden: Sequence[Concealed], plant: ProofPlant, secret: Collection[tuple[str, str]]
+) -> str:
     """The model file: friction known everywhere but where it is concealed; and the wrong numbers that a case wants."""
     knows = dict.fromkeys((*FRICTION, *(name for h in hidden for name in h.knows)))
-    secret = {(name, m.name) for h, m in zip(hidden, planned, strict=True) for name in h.unknown}
     known = [(e, j) for e in knows for j in plant.arm.joints if (e, j) not in secret]
     listed = ", ".join(f'{{name = "{e}", at = "{j}"}}' for e, j in known)
     text = f'name = "arm"\nsystem = "arm"\nurdf = "arm.urdf"\neffects = [{listed}]\n'

@@ -16,10 +16,11 @@ from snarelab.models.effects import effects
 
 from .cases import BANDS, Answer, Truth
 from .concealed import STRUCTURE
+from .oracle import over_floor
 
 Diagnosed = Mapping[str, Any]
 AUDIBLE = 1.02
-"""A holdout error below this multiple of its floor leaves nothing to close."""
+"""A holdout error below this multiple of its oracle's leaves nothing to close."""
 
 SILENT = "none"
 """Verdict of a method that names nothing, by what it is: it has no false alarms, and no right names."""
@@ -28,7 +29,7 @@ SILENT = "none"
 @dataclass(frozen=True)
 class Scored:
     """One case. ``claims``: (probability, right) of each class named; ``error``: holdout error over its floor where the
-    concealed effects show, (before, after).
+    concealed effects show, (before, after); ``oracle``: there, too, what the same arm with nothing concealed leaves.
     """
 
     answer: Answer
@@ -41,20 +42,29 @@ class Scored:
     claims: tuple[tuple[float, bool], ...]
     sizes: tuple[int, ...]
     error: tuple[float, float] | None
+    oracle: float = 1.0
 
     @property
     def closure(self) -> float | None:
-        """(before − after) / (before − floor) of the holdout; where there was nothing to close, 1 if it stayed so."""
+        """(before − after) / (before − oracle) of the holdout; where there was nothing to close, 1 if it stayed so."""
+        return self._closed(self.oracle)
+
+    @property
+    def closure_to_floor(self) -> float | None:
+        """The same with the floor for an oracle, which is disturbance and noise alone."""
+        return self._closed(1.0)
+
+    def _closed(self, least: float) -> float | None:
         if self.error is None:
             return None
         before, after = self.error
-        if before < AUDIBLE:
-            return float(after < AUDIBLE)
-        return (before - after) / (before - 1.0)
+        if before < AUDIBLE * least:
+            return float(after < AUDIBLE * least)
+        return (before - after) / (before - least)
 
 
-def judge(answer: Answer, found: Diagnosed) -> Scored:
-    """Score one case."""
+def judge(answer: Answer, found: Diagnosed, oracle: Mapping[str, float] | None = None) -> Scored:
+    """Score one case; ``oracle``: holdout error over its floor of every channel, in the band of what was found."""
     classes = [_class(e) for e in found["effects"]]
     right = [_fits(c, answer.truths) for c in classes]
     placed = rightly_placed(answer, found)
@@ -74,6 +84,7 @@ def judge(answer: Answer, found: Diagnosed) -> Scored:
         claims=tuple(zip(probability, placed, strict=True)),
         sizes=tuple(len(c) for c in classes),
         error=_error(answer, found),
+        oracle=over_floor(oracle or {}, answer.channels),
     )
 
 

@@ -168,15 +168,21 @@ def _cases(own: Score) -> str:
             str(c.answer.case),
             escape(words(c.answer)),
             escape(_said(c)),
-            "–" if c.closure is None else f"{c.closure:.2f}",
+            *(("–",) * 4 if c.error is None else (f"{x:.2f}" for x in (*c.error, c.oracle, c.closure or 0.0))),
             str(c.answer.joints),
             f"{c.answer.disturbance:.2f}",
             f"{c.answer.noise:.2f}",
         ]
         for c in own.cases
     ]
-    heads = ["case", "concealed", "said", "closure", "joints", "disturbance [N·m]", "noise [N·m]"]
-    return folded(f"{len(rows)} cases", table("", heads, rows, numeric=(3, 4, 5, 6)))
+    heads = ["case", "concealed", "said", "before", "after", "oracle", "closure", "joints"]
+    heads += ["disturbance [N·m]", "noise [N·m]"]
+    about = paragraph(
+        "Before, after, oracle: holdout error over its floor where the concealed effects show most. Closure: "
+        "(before − after) / (before − oracle). The oracle is the tool's fit of the same arm, motion, disturbance and "
+        "noise with nothing concealed; where that arm cannot be recorded, it is the floor."
+    )
+    return folded(f"{len(rows)} cases", about + table("", heads, rows, numeric=range(3, 10)))
 
 
 def _said(c: Any) -> str:

@@ -1,6 +1,6 @@
 """The proof: conceal effects, seal the answers, let the tool name them, score what it says.
 
-``python -m proof --cases 142 --workers 2 --seed 700001``, from the repository's root, with the package installed.
+``python -m proof --cases 142 --workers 2 --seed 700002``, from the repository's root, with the package installed.
 What is done is kept under ``build/proof`` and not done again: recordings as long as the generator is the same,
 diagnoses as long as the tool is, rivals as long as they are.
 """
@@ -17,25 +17,28 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from snarelab.files import written_whole
 
-from . import rivals
+from . import oracle, rivals
 from .cases import ROUND, Answer, draw, planned_cases
 from .page import write_page
 from .result import result, terminal
+from .rival_columns import CUTOFF
 from .score import score
 from .seal import INPUTS, BrokenSeal, Seal, digest, sha256, text, tool, write_json
+from .seal import oracle as oracle_digest
 from .seal import rivals as rivals_digest
 
-SEED = 700001
-"""The proof's own; 90000 to 99999 is for work on the tool, `proof.calibrate` among it."""
+SEED = 700002
+"""The proof's own: 700001 was, until its misses had been read. 90000 to 99999 is for work on the tool."""
 
 FOLDER = Path("build/proof")
 LONGEST = 1800.0  # s, then a diagnosis counts as none
 Diagnosed = dict[str, Any]
 Tell = Callable[[str], None]
+T = TypeVar("T")
 
 
 def record(seed: int, count: int, number: int, folder: Path) -> int:
@@ -106,23 +109,23 @@ def prepare(count: int, seed: int, pool: Executor, tell: Tell, folder: Path) -> 
 
 
 def fill(
-    path: Path, version: str, folders: Sequence[Path], run: Callable[[Path], Diagnosed], pool: Executor, tell: Tell
+    path: Path, version: str, items: Sequence[T], run: Callable[[T], Diagnosed], pool: Executor, tell: Tell
 ) -> list[Diagnosed]:
-    """``run`` on every folder, but for those that ``path`` has a line of with this version; all, in order."""
+    """``run`` on every item, but for those that ``path`` has a line of with this version; all, in order."""
     lines = path.read_text().splitlines(keepends=True) if path.exists() else []
     kept = [line for line in lines if line.endswith("\n") and json.loads(line)["version"] == version]
     with written_whole(path) as part:
         part.write_text("".join(kept))  # without what other sources made, and without half a line of a run stopped
     done = {record["case"]: record["found"] for record in map(json.loads, kept)}
     with path.open("a") as file:
-        jobs = {pool.submit(run, f): k for k, f in enumerate(folders) if k not in done}
+        jobs = {pool.submit(run, item): k for k, item in enumerate(items) if k not in done}
         for job in as_completed(jobs):
             k = jobs[job]
             done[k] = job.result()
             file.write(json.dumps({"case": k, "version": version, "found": done[k]}) + "\n")
             file.flush()
-            tell(f"{path.stem} {len(done)}/{len(folders)}: case {k}, {done[k].get('seconds', 0.0):.0f} s")
-    return [done[k] for k in range(len(folders))]
+            tell(f"{path.stem} {len(done)}/{len(items)}: case {k}, {done[k].get('seconds', 0.0):.0f} s")
+    return [done[k] for k in range(len(items))]
 
 
 def prove(
@@ -145,9 +148,16 @@ def prove(
         )
     version = rivals_digest() + seal.answers
     by_rivals = fill(folder / "rivals.jsonl", version, folders, rivals.run, pool, tell)
+    plan = planned_cases(count, seed)
+    wanted = [
+        oracle.Wanted(plan[k], seed, k, seal.attempts[k], (d["band"]["value"], CUTOFF) if a.truths else ())
+        for k, (a, d) in enumerate(zip(answers, by_tool, strict=True))
+    ]
+    oracles = fill(folder / "oracles.jsonl", sources + oracle_digest() + seal.answers, wanted, oracle.run, pool, tell)
+    own, theirs = ([o["over_floor"][i] if o["over_floor"] else {} for o in oracles] for i in (0, 1))
     (folder / "answers.json").write_text(text(answers))
     methods = {"snarelab": by_tool} | {name: [r[name] for r in by_rivals] for name in rivals.NAMES}
-    scores = {name: score(answers, found) for name, found in methods.items()}
+    scores = {name: score(answers, d, own if name == "snarelab" else theirs) for name, d in methods.items()}
     content = result(scores, seal, time.perf_counter() - start, [d["seconds"] for d in by_tool])
     write_json(folder / "result.json", content)
     write_page(folder / "report.html", answers, scores, seal, content, by_tool)

@@ -40,9 +40,12 @@ class Score:
     figures: Mapping[str, Figure]
 
 
-def score(answers: Sequence[Answer], found: Sequence[Diagnosed]) -> Score:
-    """Score one method on all cases."""
-    cases = tuple(judge(a, d) for a, d in zip(answers, found, strict=True))
+def score(
+    answers: Sequence[Answer], found: Sequence[Diagnosed], oracles: Sequence[Mapping[str, float]] | None = None
+) -> Score:
+    """Score one method on all cases; without oracles, the floor stands for each."""
+    every = zip(answers, found, oracles or [{}] * len(answers), strict=True)
+    cases = tuple(judge(*case) for case in every)
     return Score(cases, {f.name: f for f in _figures(cases)})
 
 
@@ -78,6 +81,7 @@ def _figures(cases: Sequence[Scored]) -> list[Figure]:
     claims = [claim for c in cases for claim in c.claims]
     every = [c for c in cases if c.answer.truths]
     errors = [c.error[1] for c in every if c.error]
+    to_floor = [x for c in named if (x := c.closure_to_floor) is not None]
     every_closure = [x for c in known if (x := c.closure) is not None]
     gone = [c for c in named if c.error]
     silent = all(c.verdict == SILENT for c in cases)
@@ -126,7 +130,8 @@ def _figures(cases: Sequence[Scored]) -> list[Figure]:
             *_interval(closures, _median),
             len(closures),
             0.9,
-            meaning="share of the avoidable holdout error that naming removes, median over rightly named cases",
+            meaning="share of the avoidable holdout error that naming removes, median over rightly named cases; "
+            "avoidable: what the oracle, a fit of the same arm with nothing concealed, does not leave",
         ),
         Figure(
             "closure_worst",
@@ -173,6 +178,17 @@ def _figures(cases: Sequence[Scored]) -> list[Figure]:
             lambda c: c.first,
             None,
             "the first name given is right, whatever else is named: all sizes, decoys and swallowed ones",
+        ),
+        *(
+            Figure(
+                f"closure_to_floor_{label}",
+                value,
+                None,
+                None,
+                len(to_floor),
+                meaning=f"{label} closure with disturbance and noise alone for an oracle, which no fit reaches",
+            )
+            for label, value in (("median", _median(to_floor)), ("worst", min(to_floor, default=None)))
         ),
         Figure(
             "closure_all",

@@ -95,6 +95,11 @@ def rivals() -> str:
     return digest(sorted((ROOT / "proof").glob("rival*.py")))
 
 
+def oracle() -> str:
+    """SHA-256 over the source of the oracle."""
+    return digest([ROOT / "proof" / "oracle.py"])
+
+
 def write_json(path: Path, content: Mapping[str, Any]) -> None:
     """Whole or not at all."""
     part = path.with_name(path.name + ".part")

@@ -1,5 +1,6 @@
 """The proof's own facts: sizes as demanded, answers sealed before any diagnosis, a score met by hand-made answers."""
 
+import copy
 import hashlib
 import json
 import re
@@ -15,8 +16,9 @@ import pytest
 from scipy.interpolate import make_interp_spline
 
 from bench.arm import Arm, Link, random_arm
+from bench.concealed import FRICTION
 from bench.lugre import LuGre
-from proof import cases, rivals, run
+from proof import cases, oracle, rivals, run
 from proof.cases import ROUND, SIZES, draw, planned_cases, shows
 from proof.concealed import MAKERS, play, with_mass
 from proof.judge import judge
@@ -222,11 +224,49 @@ def test_floor_is_what_the_true_dynamics_leave_of_a_recording():
     assert band_rms(lowest, 250.0, 125.0) == pytest.approx(np.sqrt(np.mean(lowest**2, axis=0)))
 
 
+# The oracle
+
+
+def test_twin_conceals_nothing_and_has_the_same_noise():
+    case = drawn("sensor_drift", 4.0)
+    m, drift = case.planned[0], case.plant.tau_drift[case.planned[0].name]
+    with_it, without_it = (
+        record(p, case.motions[1], 3.0, 250.0, copy.deepcopy(case.noise[1])) for p in (case.plant, case.twin)
+    )
+    # The drift is in the torque channel alone: nothing else differs, and that by its closed form.
+    for name, values in with_it.items():
+        grown = drift.final * (1.0 - np.exp(-with_it["time"] / drift.time_constant)) if name == f"tau.{m.name}" else 0.0
+        assert values - without_it[name] == pytest.approx(grown, abs=1e-9)
+    whole = drawn("makkar_friction")
+    at = f'at = "{whole.answer.truths[0].at}"'
+    assert at not in whole.model
+    assert whole.twin_model.count(at) == len(FRICTION)  # which the twin's model knows everywhere
+
+
+def test_oracle_leaves_about_its_floor(monkeypatch):
+    """MuJoCo's arm against the tool's fit of it: within a fifth of disturbance and noise, where no bristle shows."""
+    monkeypatch.setattr(cases, "N_JOINTS", (3,))
+    monkeypatch.setattr(cases, "TRAIN", 10.0)
+    plan = ("single", ("harness_stiffness",), 4.0)
+    (left,) = oracle.run(oracle.Wanted(plan, SEED, 1, 0, (20.0,)))["over_floor"]
+    assert set(left) == {"tau.joint1", "tau.joint2", "tau.joint3"}
+    assert all(0.8 < x < 1.2 for x in left.values()), left
+    assert oracle.run(oracle.Wanted(plan, SEED, 0, 0, ())) == {"over_floor": []}
+
+
+def test_no_oracle_where_the_twin_cannot_be_recorded(monkeypatch):
+    monkeypatch.setattr(cases, "MOST_ASTRAY", 0.0)
+    monkeypatch.setattr(cases, "TRAIN", 1.0)
+    found = oracle.run(oracle.Wanted(("single", ("harness_stiffness",), 4.0), SEED, 0, 0, (20.0, 8.0)))
+    assert found["over_floor"] == [{}, {}]
+    assert "strays" in found["none"]
+
+
 # The seal
 
 
 def test_answers_are_sealed_before_the_tool_runs_and_nowhere_to_be_read(tmp_path, monkeypatch):
-    monkeypatch.setattr(cases, "TRAIN", 3.0)
+    monkeypatch.setattr(cases, "TRAIN", 8.0)
     monkeypatch.setattr(cases, "HOLDOUT", 5.0)
     seen, told = [], []
 

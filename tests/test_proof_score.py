@@ -61,6 +61,18 @@ def test_closure_is_over_the_floor_where_the_effect_shows():
     assert judge(answer(), diagnosis(RIGHT, before=2.0, after=2.5)).closure == pytest.approx(-0.5 / 1.5)
 
 
+def test_closure_is_over_the_oracle_where_there_is_one():
+    """Floor 0.5: the oracle of 1.1 floors leaves 0.55, as the diagnosis does; the other joint's counts for nothing."""
+    oracle = {"tau.joint1": 3.0, "tau.joint2": 1.1}
+    case = judge(answer(), diagnosis(RIGHT), oracle)
+    assert case.closure == pytest.approx(1.0)
+    assert case.closure_to_floor == pytest.approx((1.0 - 0.55) / (1.0 - 0.5))
+    assert judge(answer(), diagnosis(RIGHT, before=1.0, after=0.9), oracle).closure == pytest.approx(0.1 / 0.45)
+    # Nothing to close, and it stayed so; and did not.
+    assert judge(answer(), diagnosis(RIGHT, before=0.56, after=0.55), oracle).closure == 1.0
+    assert judge(answer(), diagnosis(RIGHT, before=0.56, after=0.7), oracle).closure == 0.0
+
+
 def test_figures_by_hand():
     figures = score(*several()).figures
     expected = {
