@@ -18,7 +18,7 @@ from typing import Any, NoReturn
 from . import __version__
 from .arguments import positive
 from .cosim.command import add_parser as add_cosim
-from .errors import InputError, one_line
+from .errors import InputError, nearest, one_line
 from .exit_status import status_of
 from .files import written_whole
 from .fmu.command import add_parser as add_export
@@ -59,8 +59,17 @@ def _run(given: argparse.Namespace) -> int:
 class _OneLineParser(argparse.ArgumentParser):
     """Says what is wrong with the arguments in one line; ``--help`` has the rest."""
 
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """As ever, and remember what was given."""
+        self._given = list(sys.argv[1:] if args is None else args)
+        return super().parse_known_args(args, namespace)
+
     def error(self, message: str) -> NoReturn:
-        """Exit with status 2."""
+        """Exit with status 2; a required option that is missing may be there, but misspelt."""
+        known = [option for option in self._option_string_actions if option.startswith("--")]
+        for word in (w.partition("=")[0] for w in self._given if w.startswith("--") and "required" in message):
+            if not any(option.startswith(word) for option in known):
+                message += f"; {word} is not one, did you mean {nearest(word, known)}?"
         self.exit(2, f"{self.prog}: {message}; see {self.prog} --help\n")
 
 

@@ -3,6 +3,7 @@
 The package gives them as ``snarelab.diagnose``, ``snarelab.identify`` and ``snarelab.simulate``.
 """
 
+import re
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -205,7 +206,7 @@ def _as_files(recordings: Sequence[RecordingLike]) -> Iterator[list[str | Path]]
             if isinstance(recording, str | Path):
                 written[id(recording)] = recording
                 continue
-            path = Path(folder) / f"recording{k}.parquet"
+            path = Path(folder) / f"recording {k}.parquet"
             try:
                 if isinstance(recording, pd.DataFrame):
                     recording.to_parquet(path)
@@ -225,4 +226,5 @@ def _as_files(recordings: Sequence[RecordingLike]) -> Iterator[list[str | Path]]
         try:
             yield [written[id(recording)] for recording in recordings]
         except InputError as error:
-            raise InputError(str(error).replace(f"{folder}/", "")) from None
+            # The caller knows no file; a recording's number is its place among all that were given.
+            raise InputError(re.sub(rf"{re.escape(folder)}/(recording \d+)\.parquet", r"\1", str(error))) from None

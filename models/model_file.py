@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, nearest
 from ..files import toml_table
+from ..recordings.read import SUFFIXES
 from ..recordings.signals import FORMS, Signal, is_signal, joint_of
 from .effects import get_effect
 from .floating.tree import UNNAMED, n_carriers, read_floating
@@ -52,7 +53,10 @@ def load_model(path: str | Path) -> Model:
     """
     path = Path(path)
     if not path.is_file():
-        raise InputError(f"{path}: no such model file")
+        near = nearest(path.name, (p.name for p in path.parent.glob("*.toml")))
+        raise InputError(f"{path}: no such model file; {f'nearest is {near!r}' if near else 'check the path'}")
+    if path.suffix.lower() in SUFFIXES:
+        raise InputError(f"{path}: is a recording by its suffix; the model file (TOML) comes first, then recordings")
     raw = toml_table(path)
     for key in raw:
         if key not in _KEYS:
@@ -80,6 +84,10 @@ def load_model(path: str | Path) -> Model:
     elif "capture" in raw:
         raise InputError(f"{path}: [capture] belongs to system = 'snare_capture'; take it out")
     urdf = path.parent / _text(path, raw, "urdf", "") if "urdf" in raw else None
+    if urdf is not None and not urdf.is_file():
+        near = nearest(urdf.name, (p.name for p in urdf.parent.glob("*.urdf")))
+        hint = f"nearest is {near!r}" if near else "check the path, which starts where the model file is"
+        raise InputError(f"{path}: urdf = {raw['urdf']!r}: no such file; {hint}")
     tree = _tree(path, raw, system, urdf, gravity)
     return Model(
         path,
@@ -183,7 +191,10 @@ def _signals(path: Path, table: Any, tree: Tree) -> dict[str, Signal]:
             raise InputError(f"{path}: {name!r} in [signals] is not a signal's name; allowed are {FORMS}")
         joint = joint_of(name)
         if joint is not None and joint not in joints:
-            raise InputError(f"{path}: {name!r} in [signals]: the URDF has no such joint, only {', '.join(joints)}")
+            raise InputError(
+                f"{path}: {name!r} in [signals]: the URDF has no such joint, only {', '.join(joints)}; did you mean "
+                f"{nearest(joint, joints)!r}?"
+            )
         slings = [f"tension.{s.name}" for s in tree.slings] if isinstance(tree, Rig) else [name]
         if name.startswith("tension.") and name not in slings:
             raise InputError(f"{path}: {name!r} in [signals]: the rig has no such sling, only {', '.join(slings)}")

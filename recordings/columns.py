@@ -90,7 +90,7 @@ class Columns:
         if header is None:
             raise InputError(
                 f"{self.path}: column {name!r} of [signals] {signal!r} is not one of its {len(self.names)} columns; "
-                f"nearest is {nearest(name, self.names)!r}"
+                f"nearest is {nearest(name, self.names)!r}; correct [signals] in the model file"
             )
         where = f"{self.path}: column {name!r} ({signal})" if name != signal else f"{self.path}: column {name!r}"
         if header in self.problems:
@@ -119,7 +119,7 @@ class Columns:
         if header is None or header in self.problems:
             raise InputError(
                 f"{self.path}: gain {name!r} of [signals] {signal!r} is not one of its {len(self.names)} names; "
-                f"nearest is {nearest(name, [*self.scalars, *self.arrays])!r}"
+                f"nearest is {nearest(name, [*self.scalars, *self.arrays])!r}; correct [signals] in the model file"
             )
         values = np.ravel(self.arrays[header])
         if index is not None and self.arrays[header].ndim == 1 and index < len(values):

@@ -145,10 +145,12 @@ def condition(dataset: xr.Dataset, joints: Sequence[str], band: float | None = N
     missing = [name for name in wanted if name not in dataset]
     if missing:
         known = sorted(str(v) for v in dataset.data_vars)
-        near = nearest(missing[0], [name for name in known if name not in wanted] or known)
+        family = missing[0].partition(".")[0]
+        near = nearest(missing[0], [n for n in known if n.partition(".")[0] == family and n not in wanted])
+        hint = f"; nearest is {near!r}" if near else ""
         raise InputError(
-            f"{path}: no signal {missing[0]!r} for a joint of the URDF; nearest is {near!r} of "
-            f"{', '.join(known)}; add the column, or map it under [signals] in the model file"
+            f"{path}: no signal {missing[0]!r} for a joint of the URDF, only {', '.join(known)}{hint}; add the column, "
+            "or map it under [signals] in the model file"
         )
     stamps = np.asarray(dataset["time"].values, float)
     q, tau = (np.stack([np.asarray(dataset[f"{k}.{j}"].values, float) for j in joints], 1) for k in ("q", "tau"))

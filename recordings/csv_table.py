@@ -124,7 +124,8 @@ def _row_number(data: bytes, index: int) -> int:
 def _long_row(data: bytes, separator: str, width: int) -> str:
     for number, cells in _rows(data, separator):
         if len(cells) > width:
-            return f"row {number} has {len(cells)} cells and the header has {width}; mend that row"
+            commas = ", or separate columns by ';' where numbers have decimal commas" if separator == "," else ""
+            return f"row {number} has {len(cells)} cells and the header has {width}; mend that row{commas}"
     return "is not a table that can be read; check its quotes"
 
 

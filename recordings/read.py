@@ -26,6 +26,9 @@ _READERS: Mapping[str, Callable[[Path], Columns]] = {
     ".hdf5": hdf5.read,
 }
 _BAGS = (".db3", ".mcap")
+SUFFIXES = (*_READERS, *_BAGS)
+"""Of files that are recordings."""
+
 _LISTED_GAPS = 20
 _TIME_UNITS = ("ns", "us", "ms", "min")
 
@@ -122,7 +125,7 @@ def _load(path: Path, signals: Mapping[str, Signal]) -> Columns:
             return ros_bag.read(path, {name: signal.column for name, signal in signals.items()})
     if suffix not in _READERS:
         raise InputError(
-            f"{path}: suffix {suffix!r} is not one of a recording; known are {' '.join([*_READERS, *_BAGS])} "
+            f"{path}: suffix {suffix!r} is not one of a recording; known are {' '.join(SUFFIXES)} "
             "and the folder of a ROS 2 bag"
         )
     if path.stat().st_size == 0:
@@ -250,7 +253,8 @@ def _in_unit(
     if not fits(unit, wanted):
         raise InputError(
             f"{columns.path}: column {header!r}: unit '{unit:~P}' ({unit.dimensionality}) does not fit {name}, "
-            f"which is in {wanted} or a unit of that dimension; correct the unit or the joint's kind"
+            f"which is in {wanted} or a unit of that dimension; correct the unit or the joint's kind, or give it a "
+            "gain under [signals] in the model file"
         )
     return convert(values, unit, wanted)
 

@@ -97,8 +97,10 @@ def test_tables_in_memory_give_what_files_give(fitted, tmp_path):
 @pytest.mark.parametrize("call", [snarelab.diagnose, snarelab.identify])
 def test_a_holdout_that_is_fitted_too_is_refused(call):
     frame = pd.read_csv(BUNDLED / "train.csv")
-    with pytest.raises(snarelab.InputError, match=r"recording1.parquet: the holdout is also a recording to fit"):
+    with pytest.raises(snarelab.InputError, match=r"recording 1: the holdout is also a recording to fit"):
         call(BUNDLED / "arm3.toml", frame, holdout=frame)
+    with pytest.raises(snarelab.InputError, match=r"recording 2: the holdout is also .* byte for byte recording 1;"):
+        call(BUNDLED / "arm3.toml", frame, holdout=frame.copy())
 
 
 @pytest.mark.parametrize("call", [snarelab.diagnose, snarelab.identify])
@@ -109,7 +111,7 @@ def test_processes_are_for_captures(call):
 
 def test_a_mistake_names_the_table_and_not_where_it_was_put():
     frame = pd.read_csv(BUNDLED / "train.csv").rename(columns={"q.joint2": "q.joint22"})
-    with pytest.raises(snarelab.InputError, match=r"^recording1.parquet.*q\.joint2") as caught:
+    with pytest.raises(snarelab.InputError, match=r"^recording 1:.*q\.joint2") as caught:
         snarelab.identify(BUNDLED / "arm3.toml", frame)
     assert len(str(caught.value).splitlines()) == 1
     with pytest.raises(snarelab.InputError, match="recording 1: is a int; give a path"):

@@ -89,7 +89,10 @@ def unphysical():
 MAPPED = MODEL + '[signals]\n"tau.joint1" = { column = "tau.jiont1", unit = "N*m" }\n'
 MISTAKES = {
     "missing file": (lambda: {"recording": "none.csv"}, ("none.csv", "no such file")),
-    "missing mapped column": (model(MAPPED), ("train.csv", "'tau.jiont1'", "nearest is 'tau.joint1'")),
+    "missing mapped column": (
+        model(MAPPED),
+        ("train.csv", "'tau.jiont1'", "nearest is 'tau.joint1'; correct [signals]"),
+    ),
     "missing column": (
         edited(lambda f: f.rename(columns={"q.joint2": "q.jont2"})),
         ("bad.csv", "'q.joint2'", "nearest is 'q.jont2'"),
@@ -97,13 +100,17 @@ MISTAKES = {
     "time backwards": (edited(backwards), ("bad.csv", "'time'", "backwards in row 302", "1.25 s after 2.99 s")),
     "unit": (
         edited(lambda f: f.rename(columns={"q.joint1": "q.joint1 [kg]"})),
-        ("bad.csv", "'q.joint1 [kg]'", "does not fit", "rad"),
+        ("bad.csv", "'q.joint1 [kg]'", "does not fit", "rad", "gain under [signals]"),
+    ),
+    "decimal commas": (
+        raw("bad.csv", b"time,q.joint1,q.joint2,tau.joint1,tau.joint2\n0,00,1,0,2,0,3,0,4,0\n"),
+        ("bad.csv", "row 2", "10 cells", "';' where numbers have decimal commas"),
     ),
     "unknown unit": (edited(lambda f: f.rename(columns={"tau.joint1": "tau.joint1 [Nmm!]"})), ("bad.csv", "Nmm!")),
     "all NaN": (edited(lambda f: f.assign(**{"tau.joint1": np.nan})), ("bad.csv", "'tau.joint1'", "no number")),
     "joint without signal": (
         edited(lambda f: f.drop(columns=["q.joint2", "tau.joint2"])),
-        ("bad.csv", "'q.joint2'", "q.joint1, tau.joint1", "[signals]"),
+        ("bad.csv", "'q.joint2'", "only q.joint1", "; add the column", "[signals]"),
     ),
     "no time": (edited(lambda f: f.rename(columns={"time": "tmie"})), ("bad.csv", "no column 'time'", "tmie")),
     "too few samples": (edited(lambda f: f[:60]), ("bad.csv", "too few samples", "60 rows", "at least 50")),
@@ -129,7 +136,8 @@ MISTAKES = {
     "empty file": (raw("bad.csv", b""), ("bad.csv", "empty")),
     "bytes": (raw("bad.csv", bytes(range(256)) * 10), ("bad.csv",)),
     "unknown suffix": (raw("bad.xlsx", b"PK"), ("bad.xlsx", ".csv")),
-    "missing model": (lambda: {"model": "none.toml"}, ("none.toml", "no such")),
+    "missing model": (lambda: {"model": "amr.toml"}, ("amr.toml", "no such", "nearest is 'arm.toml'")),
+    "recording for a model": (lambda: {"model": "train.csv"}, ("train.csv", "the model file (TOML) comes first")),
     "unknown effect": (
         model(MODEL.replace("viscous", "viscuos")),
         ("bad.toml", "'viscuos_friction'", "nearest: viscous_friction", "coulomb_friction", "sensor_delay"),
@@ -137,9 +145,12 @@ MISTAKES = {
     "broken TOML": (model(MODEL + "[signals\n"), ("bad.toml", "not a TOML file", "line 5")),
     "joint in signals": (
         model(MAPPED.replace('"tau.joint1"', '"tau.joint7"')),
-        ("bad.toml", "'tau.joint7'", "joint1, joint2"),
+        ("bad.toml", "'tau.joint7'", "joint1, joint2", "did you mean"),
     ),
-    "missing URDF": (model(MODEL.replace("arm.urdf", "amr.urdf")), ("amr.urdf", "no such file")),
+    "missing URDF": (
+        model(MODEL.replace("arm.urdf", "amr.urdf")),
+        ("bad.toml: urdf = 'amr.urdf'", "nearest is 'arm.urdf'"),
+    ),
     "unphysical URDF": (unphysical, ("bad.urdf", "'link2'", "nearest", "ixx=")),
     "bandwidth": (model(MODEL + "bandwidth = 45\n"), ("train.csv", "45 Hz", "100 samples a second", "<= 40 Hz")),
 }
@@ -178,10 +189,11 @@ def test_a_mistake_in_the_second_or_held_out_recording(arm_folder, capfd, comman
     refused(capfd, [*given[:3], "bad.csv", *given[3:]], "bad.csv", "row 43")
 
 
-@pytest.mark.parametrize("same", ["train.csv", "./train.csv", "link.csv"])
+@pytest.mark.parametrize("same", ["train.csv", "./train.csv", "link.csv", "copy.csv"])
 @pytest.mark.parametrize("command", ["identify", "diagnose"])
 def test_a_holdout_that_is_fitted_is_refused(arm_folder, capfd, command, same):
     (arm_folder / "link.csv").symlink_to("train.csv")
+    (arm_folder / "copy.csv").write_bytes((arm_folder / "train.csv").read_bytes())
     refused(capfd, arguments(command, holdout=same), same, "also a recording to fit")
 
 
@@ -216,6 +228,12 @@ def test_a_command_that_is_not_complete(arm_folder, capfd, given):
     said = capfd.readouterr().err
     assert said.count("\n") == 1
     assert said.endswith("--help\n")
+
+
+def test_a_required_option_that_is_misspelt(arm_folder, capfd):
+    with pytest.raises(SystemExit):
+        main(["diagnose", "arm.toml", "train.csv", "--hodlout=hold.csv"])
+    assert "--hodlout is not one, did you mean --holdout?" in capfd.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -87,7 +87,7 @@ def test_bytes_that_are_no_text(folder):
 
 
 def test_missing_urdf_file(folder):
-    with pytest.raises(InputError, match=r"amr\.urdf: no such file"):
+    with pytest.raises(InputError, match=r"urdf = 'amr\.urdf': no such file; nearest is 'arm\.urdf'"):
         load_model(written(folder, 'urdf = "amr.urdf"\n'))
 
 

@@ -1,5 +1,6 @@
 """A conditioned recording with everything the rigid body contributes worked out once."""
 
+import filecmp
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -248,8 +249,14 @@ def _without_gaps_in(tensions: Mapping[str, Array], dataset: xr.Dataset) -> xr.D
 
 def demand_apart(recordings: Sequence[str | Path], holdout: str | Path) -> None:
     """Refuse a held-out recording that is fitted too (InputError)."""
-    if Path(holdout).resolve() in [Path(r).resolve() for r in recordings]:
-        raise InputError(f"{holdout}: the holdout is also a recording to fit; hold out one that the fit does not see")
+    held = Path(holdout)
+    for fitted in map(Path, recordings):
+        same = held.resolve() == fitted.resolve()
+        if same or (held.is_file() and fitted.is_file() and filecmp.cmp(held, fitted, shallow=False)):
+            copy = "" if same else f", byte for byte {fitted}"
+            raise InputError(
+                f"{holdout}: the holdout is also a recording to fit{copy}; hold out one that the fit does not see"
+            )
 
 
 def with_silence(experiments: Sequence[Experiment]) -> list[Experiment]:
