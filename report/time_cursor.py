@@ -7,10 +7,10 @@ paper, the pictures are plain. Others on the page join in by two events of the d
 
 STYLE = """
 .cursor{position:absolute;width:1px;background:#7a3f66;pointer-events:none}
-.cursor span{position:absolute;top:0;left:3px;max-width:20rem;overflow:hidden;text-overflow:ellipsis;white-space:nowrap;
-padding:0 .3rem;background:rgba(255,255,255,.88);color:#7a3f66;font-size:.75rem;line-height:1.3;font-weight:600;
-font-variant-numeric:tabular-nums}
-.cursor.left span{left:auto;right:3px}
+.cursor span{position:absolute;bottom:100%;left:-2px;max-width:20rem;overflow:hidden;text-overflow:ellipsis;
+white-space:nowrap;padding:0 .3rem;background:rgba(255,255,255,.88);color:#7a3f66;font-size:.75rem;line-height:1.3;
+font-weight:600;font-variant-numeric:tabular-nums}
+.cursor.left span{left:auto;right:-2px}
 .cursor span:empty{display:none}
 .times{position:absolute;cursor:crosshair;border-radius:.2rem}
 .times:focus-visible{outline:2px solid #00588f;outline-offset:2px}
