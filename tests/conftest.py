@@ -3,9 +3,14 @@
 import os
 import signal
 import sys
+from collections.abc import Generator
 from pathlib import Path
+from typing import Any
 
 import pytest
+
+from snarelab.errors import InputError
+from snarelab.models.c_library import find_compiler
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.append(str(ROOT))  # bench/ holds the independent plant; it is not part of the package
@@ -14,6 +19,35 @@ sys.path.append(str(ROOT / "tests"))  # what several files of tests share
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # A shell starts what runs in the background deaf to Ctrl-C, and so would be what the tests start.
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+try:
+    find_compiler(os.environ.get("SNARELAB_CC", ""), os.environ.get("PATH", ""))
+    NO_COMPILER = ""
+except OSError as problem:
+    NO_COMPILER = str(problem)
+
+
+def _skipped_without_compiler() -> Generator[None, Any, Any]:
+    """Where this machine has no C compiler, a test that asks for one is skipped, and says so."""
+    try:
+        return (yield)
+    except (InputError, OSError, Warning) as error:
+        if NO_COMPILER and ("C compiler" in str(error) or NO_COMPILER in str(error)):
+            pytest.skip(f"no C compiler: {error}")
+        raise
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_setup(item: pytest.Item) -> Generator[None, Any, Any]:
+    """Fixtures that build something."""
+    return (yield from _skipped_without_compiler())
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
+    """Tests that build something."""
+    return (yield from _skipped_without_compiler())
 
 
 @pytest.fixture(scope="session")

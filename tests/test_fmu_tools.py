@@ -23,6 +23,7 @@ from snarelab.fmu.elements import ELEMENTS
 from snarelab.fmu.export import export, model_equations
 from snarelab.fmu.hosted import participant_class
 from snarelab.fmu.inverse import inverse_equations
+from snarelab.models.c_library import find_compiler
 from snarelab.models.model_file import load_model
 
 SIZE, STEPS = 2.0**-9, 60  # exact in binary, and in libcosim's nanoseconds: every tool takes the same steps
@@ -150,7 +151,9 @@ def hosts(tmp_path_factory):
 
     folder, headers = tmp_path_factory.mktemp("host"), Path(fmpy.__file__).parent / "c-code"
     for version in (2, 3):
-        command = ["cc", "-g", "-O1", f"-DFMI={version}", f"-I{headers}", str(Path(__file__).with_name("fmu_host.c"))]
+        source = str(Path(__file__).with_name("fmu_host.c"))
+        compiler, _ = find_compiler("", os.environ["PATH"])
+        command = [*compiler, "-g", "-O1", f"-DFMI={version}", f"-I{headers}", source]
         subprocess.run([*command, "-o", str(folder / f"host{version}"), "-ldl"], check=True)
     return folder
 
