@@ -90,12 +90,12 @@ def pytest(tree: Path, words: Sequence[str], timeout: float | None = None) -> su
     return subprocess.run(command, cwd=tree, env=environment, capture_output=True, text=True, timeout=timeout)
 
 
-def measure(tree: Path, workers: int) -> None:
-    """Run everything once under coverage; raises SystemExit where a test fails."""
+def measure(tree: Path, workers: int, tests: Sequence[str]) -> None:
+    """Run these tests, or all, once under coverage; raises SystemExit where one fails."""
     (tree / ".coveragerc").write_text(_COVERAGE)
     words = ["-n", str(workers), "--junitxml", str(FOLDER / "times.xml"), "--cov", "--cov-config", ".coveragerc"]
-    words += ["--cov-context", "test", "--cov-report", "json"]
-    print("the whole tests, under coverage ...", flush=True)
+    words += ["--cov-context", "test", "--cov-report", "json", *tests]
+    print("the tests, under coverage ...", flush=True)
     done = pytest(tree, words)
     if done.returncode:
         raise SystemExit(done.stdout[-3000:] + done.stderr[-1000:])
@@ -178,11 +178,12 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--minutes", type=float, default=1.0)
+    parser.add_argument("--tests", nargs="*", default=(), metavar="FILE", help="files of tests (default: all)")
     given = parser.parse_args()
     FOLDER.mkdir(parents=True, exist_ok=True)
-    version, whole = git("rev-parse", "HEAD^{tree}"), lay_out("whole")
+    version, whole = " ".join([git("rev-parse", "HEAD^{tree}"), *given.tests]), lay_out("whole")
     if not (FOLDER / "version").exists() or (FOLDER / "version").read_text() != version:
-        measure(whole, given.workers)
+        measure(whole, given.workers, given.tests)
         (FOLDER / "version").write_text(version)
     totals = json.loads((FOLDER / "coverage.json").read_text())["totals"]
     print(f"branch coverage {totals['percent_covered']:.1f} % (lines and branches of the package)", flush=True)
