@@ -53,8 +53,7 @@ def load_model(path: str | Path) -> Model:
     """
     path = Path(path)
     if not path.is_file():
-        near = nearest(path.name, (p.name for p in path.parent.glob("*.toml")))
-        raise InputError(f"{path}: no such model file; {f'nearest is {near!r}' if near else 'check the path'}")
+        raise InputError(f"{path}: no such model file; {_neighbour(path, '.toml') or 'check the path'}")
     if path.suffix.lower() in SUFFIXES:
         raise InputError(f"{path}: is a recording by its suffix; the model file (TOML) comes first, then recordings")
     raw = toml_table(path)
@@ -84,9 +83,8 @@ def load_model(path: str | Path) -> Model:
     elif "capture" in raw:
         raise InputError(f"{path}: [capture] belongs to system = 'snare_capture'; take it out")
     urdf = path.parent / _text(path, raw, "urdf", "") if "urdf" in raw else None
-    if urdf is not None and not urdf.is_file():
-        near = nearest(urdf.name, (p.name for p in urdf.parent.glob("*.urdf")))
-        hint = f"nearest is {near!r}" if near else "check the path, which starts where the model file is"
+    if urdf is not None and _missing(urdf):
+        hint = _neighbour(urdf, ".urdf") or "check the path, which starts where the model file is"
         raise InputError(f"{path}: urdf = {raw['urdf']!r}: no such file; {hint}")
     tree = _tree(path, raw, system, urdf, gravity)
     return Model(
@@ -101,6 +99,23 @@ def load_model(path: str | Path) -> Model:
         None if bandwidth is None else float(bandwidth),
         _values(path, raw.get("parameters", {})),
     )
+
+
+def _missing(path: Path) -> bool:
+    """Whether there is nothing; what cannot even be looked for is left to who reads it."""
+    try:
+        return not path.exists()
+    except (OSError, ValueError):  # a name that is too long, or a folder that is closed
+        return False
+
+
+def _neighbour(path: Path, suffix: str) -> str:
+    """In words, the file in the same folder that is spelled most like it and has this suffix; empty without one."""
+    try:
+        near = nearest(path.name, (p.name for p in path.parent.glob(f"*{suffix}") if p.is_file()))
+    except (OSError, ValueError):
+        return ""
+    return f"nearest is {near!r}" if near else ""
 
 
 def _tree(path: Path, raw: Mapping[str, Any], system: str, urdf: Path | None, gravity: Sequence[float]) -> Tree:
