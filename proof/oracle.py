@@ -1,7 +1,7 @@
 """The oracle: what the tool's own fit leaves of the same arm with nothing concealed in it.
 
-Nobody can ask a name to close more than this. The floor of disturbance and noise lies lower: identified numbers have
-errors, and no law of friction tells what a joint that stood still before the recording began holds.
+Nobody can ask a name to close more than this. The floor of disturbance and noise can lie far lower: identified numbers
+have errors, and no law of friction tells what a joint that stood still before the recording began holds.
 """
 
 import tempfile

@@ -186,7 +186,7 @@ def _figures(cases: Sequence[Scored]) -> list[Figure]:
                 None,
                 None,
                 len(to_floor),
-                meaning=f"{label} closure with disturbance and noise alone for an oracle, which no fit reaches",
+                meaning=f"{label} closure with disturbance and noise alone for an oracle",
             )
             for label, value in (("median", _median(to_floor)), ("worst", min(to_floor, default=None)))
         ),

@@ -252,11 +252,19 @@ def demand_apart(recordings: Sequence[str | Path], holdout: str | Path) -> None:
     held = Path(holdout)
     for fitted in map(Path, recordings):
         same = held.resolve() == fitted.resolve()
-        if same or (held.is_file() and fitted.is_file() and filecmp.cmp(held, fitted, shallow=False)):
+        if same or _is_copy(held, fitted):
             copy = "" if same else f", byte for byte {fitted}"
             raise InputError(
                 f"{holdout}: the holdout is also a recording to fit{copy}; hold out one that the fit does not see"
             )
+
+
+def _is_copy(held: Path, fitted: Path) -> bool:
+    """Whether two files hold the same bytes; what cannot be read is left to its reader."""
+    try:
+        return held.is_file() and fitted.is_file() and filecmp.cmp(held, fitted, shallow=False)
+    except OSError:
+        return False
 
 
 def with_silence(experiments: Sequence[Experiment]) -> list[Experiment]:
