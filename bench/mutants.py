@@ -42,10 +42,13 @@ _COVERAGE = """
 [run]
 branch = true
 source = .
-omit = tests/*, bench/*, proof/*, docs/*
 patch = subprocess
 parallel = true
+[report]
+omit = */tests/*, */bench/*, */proof/*, */docs/*
+exclude_also = ^@compiled
 """
+"""Functions that numba compiles are run by no interpreter, and so seen by no tracer: they are left out."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +65,7 @@ class Mutant:
         from cosmic_ray.mutating import mutate_code  # pyright: ignore[reportMissingImports]
         from cosmic_ray.plugins import get_operator  # pyright: ignore[reportMissingImports]
 
-        changed = mutate_code((ROOT / self.path).read_text(), get_operator(f"core/{self.operator}")(), self.occurrence)
+        changed = mutate_code(committed(self.path), get_operator(f"core/{self.operator}")(), self.occurrence)
         assert changed is not None
         return changed
 
@@ -70,6 +73,11 @@ class Mutant:
 def git(*words: str) -> str:
     """What git says of this repository."""
     return subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True, check=True).stdout.strip()
+
+
+def committed(path: str) -> str:
+    """A file of the last commit."""
+    return git("show", f"HEAD:{path}") + "\n"
 
 
 def lay_out(name: str) -> Path:
@@ -91,22 +99,27 @@ def pytest(tree: Path, words: Sequence[str], timeout: float | None = None) -> su
 
 
 def measure(tree: Path, workers: int, tests: Sequence[str]) -> None:
-    """Run these tests, or all, once under coverage; raises SystemExit where one fails."""
+    """Run these tests, or all, once under coverage; raises SystemExit where pytest does not come to an end."""
     (tree / ".coveragerc").write_text(_COVERAGE)
     words = ["-n", str(workers), "--junitxml", str(FOLDER / "times.xml"), "--cov", "--cov-config", ".coveragerc"]
     words += ["--cov-context", "test", "--cov-report", "json", *tests]
     print("the tests, under coverage ...", flush=True)
     done = pytest(tree, words)
-    if done.returncode:
+    if done.returncode > 1:
         raise SystemExit(done.stdout[-3000:] + done.stderr[-1000:])
+    for line in done.stdout.splitlines():
+        if line.startswith("FAILED"):
+            print(f"{line}; under coverage at least, and it kills no mutant", flush=True)
     shutil.copy(tree / ".coverage", FOLDER / "coverage")
     shutil.copy(tree / "coverage.json", FOLDER / "coverage.json")
 
 
 def times() -> dict[str, float]:
-    """Seconds of every test, by its name in contexts."""
+    """Seconds of every test that passed, by its name in contexts."""
     found = {}
     for case in ET.parse(FOLDER / "times.xml").getroot().iter("testcase"):
+        if case.find("failure") is not None or case.find("error") is not None:
+            continue
         parts = case.attrib["classname"].split(".")
         found[f"{'/'.join(parts[:2])}.py::{'::'.join([*parts[2:], case.attrib['name']])}"] = float(case.attrib["time"])
     return found
@@ -133,7 +146,7 @@ def draw(count: int, seed: int, folders: Sequence[str]) -> list[Mutant]:
 
     places: dict[tuple[str, tuple[int, int]], list[Mutant]] = {}
     for name in git("ls-files", *(f"{folder}/*.py" for folder in folders)).splitlines():
-        nodes = list(ast_nodes(get_ast((ROOT / name).read_text())))
+        nodes = list(ast_nodes(get_ast(committed(name))))
         for operator in OPERATORS:
             made = get_operator(f"core/{operator}")()
             starts = [start for node in nodes for start, _ in made.mutation_positions(node)]
@@ -186,7 +199,8 @@ def main() -> int:
         measure(whole, given.workers, given.tests)
         (FOLDER / "version").write_text(version)
     totals = json.loads((FOLDER / "coverage.json").read_text())["totals"]
-    print(f"branch coverage {totals['percent_covered']:.1f} % (lines and branches of the package)", flush=True)
+    share = [totals[f"percent_{what}_covered"] for what in ("branches", "statements")]
+    print(f"covered: {share[0]:.1f} % of branches, {share[1]:.1f} % of lines, but for what numba compiles", flush=True)
     reach, seconds = reaching(whole), times()
     trees: SimpleQueue[Path] = SimpleQueue()
     for k in range(given.workers):

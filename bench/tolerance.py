@@ -38,11 +38,11 @@ import snarelab
 from snarelab.models.snare.parameters import SnareParameters
 from snarelab.models.snare.settled import settled
 from snarelab.tolerance.boundary import Boundary, fit_boundary
-from snarelab.tolerance.capture import Axis, Capture, Outcome
+from snarelab.tolerance.capture import Axis, Capture, Outcome, run_case
 from snarelab.tolerance.enclosure import closed_loop, runs_through
 from snarelab.tolerance.ground import CAPTURE
 from snarelab.tolerance.results import Results
-from snarelab.tolerance.run import local_cluster, run_case, run_study
+from snarelab.tolerance.run import local_cluster, run_study
 from snarelab.tolerance.study import Study, load_study
 
 SPEEDUP_GOAL, OVERHEAD_GOAL, SHARE_GOAL, HOURLY_GOAL = 1.8, 0.05, 0.25, 1200

@@ -23,9 +23,10 @@ import numpy as np
 import snarelab
 from snarelab.files import written_whole
 from snarelab.tolerance.boundary import UNDECIDED
+from snarelab.tolerance.capture import run_case
 from snarelab.tolerance.pictures import probability_maps
 from snarelab.tolerance.results import Results
-from snarelab.tolerance.run import run_case, sobol_points, space_boundary
+from snarelab.tolerance.run import sobol_points, space_boundary
 from snarelab.tolerance.study import Study, load_study
 from snarelab.tolerance.summary import to_unit
 

@@ -103,14 +103,18 @@ def _missed(
     both = [channel_rms(x.assembly, in_motion, x.theta)[0] for x in (final, rest)]
     pairs = [(*both, CONFIRM)]
     if effect.at_rest or effect.exceeds_at_rest:
-        # What was named for leaving little near rest must still do so, now that the others are there.
-        pairs.append((with_it, rms, MOST / (1 - MOST) if effect.remembers else CONFIRM))
+        pairs.append((with_it, rms, CONFIRM))
     if effect.exceeds_at_rest:
         creeping = fitted(final.assembly, locked)
         both = [channel_rms(x.assembly, creeping, x.theta)[0] for x in (final, rest)]
         pairs.append((*both, CONFIRM))
-    rise = max((_energy(b, c, final) / _energy(a, c, final) - 1) / bar for a, b, bar in pairs)
-    return _Missed(rise, trial, rest)
+    rises = [(_energy(b, c, final) / _energy(a, c, final) - 1) / bar for a, b, bar in pairs]
+    if effect.remembers:
+        # What was named for leaving little near rest must still do so, now that the others are there.
+        floor, after, before = (_energy(x, c, final) for x in (both[0], with_it, rms))
+        most = (before - after) / max(after - floor, LEAST * after) * (1 - MOST) / MOST
+        rises[1] = min(rises[1], most)
+    return _Missed(max(rises), trial, rest)
 
 
 def _known(final: Fit, t: Taken) -> bool:

@@ -106,6 +106,9 @@ class Effect:
         Names of hidden states, all starting at rest (zero rate), or from zero.
     rate : callable or None
         ``rate(s, p) -> list of ca.SX``, the states' time derivatives.
+    advance : callable or None
+        ``advance(s, later, p, h) -> list of ca.SX``: the states a sample later, h seconds on, where the rate has
+        a closed solution between samples; ``later`` are the signals then. None integrates the rate.
     from_zero : bool
         True where the states accumulate, and so start from zero.
     acts_on : "torque" or "position"
@@ -140,6 +143,7 @@ class Effect:
     law: Callable[[Symbols, Symbols], ca.SX]
     states: tuple[str, ...] = ()
     rate: Callable[[Symbols, Symbols], list[ca.SX]] | None = None
+    advance: Callable[[Symbols, Symbols, Symbols, ca.SX], list[ca.SX]] | None = None
     from_zero: bool = False
     acts_on: Literal["torque", "position"] = "torque"
     dissipates: bool = False

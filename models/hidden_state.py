@@ -12,7 +12,8 @@ dependence of u taken into the linearisation::
     x_n+1 = x_n + 3/2 k1 + 1/2 k2
 
 gamma = 1 - 1/sqrt(2) is the more accurate of the two values for which the method is L-stable: a spring or a delay much
-faster than the sampling costs nothing and decays at once. A solution that is linear in time is followed exactly. The
+faster than the sampling costs nothing and decays at once. A solution that is linear in time is followed exactly. Where
+an effect gives the exact solution over a sample (``Effect.advance``), that takes the place of the step. The
 sensitivities dx/dp are the exact derivatives of these steps, carried along in the same pass.
 """
 
@@ -203,10 +204,16 @@ def _symbols(effect: Effect) -> _Symbols:
     p = ca.SX.sym("p", len(effect.parameters))
     x = ca.SX.sym("x", len(effect.states))
     signals = {name: ca.SX.sym(name, size) for name, size in SIGNALS[effect.at].items()}
-    named = dict(zip((parameter.name for parameter in effect.parameters), ca.vertsplit(p), strict=True))
-    s = signals | dict(zip(effect.states, ca.vertsplit(x) if effect.states else [], strict=True))
+    states, named = _named(effect, x, p)
+    s = signals | states
     law = ca.vertcat(effect.law(s, named))
     return _Symbols(p, x, signals, law, ca.vertcat(*effect.rate(s, named)) if effect.rate else ca.SX(0, 1))
+
+
+def _named(effect: Effect, x: ca.SX, p: ca.SX) -> tuple[dict[str, ca.SX], dict[str, ca.SX]]:
+    """States and parameters by name."""
+    states = dict(zip(effect.states, ca.vertsplit(x) if effect.states else [], strict=True))
+    return states, dict(zip((parameter.name for parameter in effect.parameters), ca.vertsplit(p), strict=True))
 
 
 @cache
@@ -233,17 +240,27 @@ def _step(
     u = ca.vertcat(*signals.values())
     later = {f"next_{name}": ca.SX.sym(f"next_{name}", symbol.shape) for name, symbol in signals.items()}
     next_u, h = ca.vertcat(*later.values()), ca.SX.sym("h")
+    if effect.advance:
+        states, named = _named(effect, x, p)
+        next_signals = dict(zip(signals, later.values(), strict=True))
+        next_x = ca.vertcat(*effect.advance({**signals, **states}, next_signals, named, h))
+    else:
+        next_x = _integrated(rate, u, next_u, x, p, h)
+    next_sensitivity = ca.jacobian(next_x, x) @ sensitivity + ca.jacobian(next_x, p)
+    inputs = [_stacked(x, sensitivity), *signals.values(), *later.values(), ca.vertcat(p, h)]
+    names = ["states", *signals, *later, "p_and_h"]
+    return _compiled(effect, "step", inputs, [_stacked(next_x, next_sensitivity)], names)
+
+
+def _integrated(rate: ca.SX, u: ca.SX, next_u: ca.SX, x: ca.SX, p: ca.SX, h: ca.SX) -> ca.SX:
+    """One step of ROS2."""
     f = ca.Function("f", [u, x, p], [rate, ca.jacobian(rate, x), ca.jacobian(rate, u)])
     here, by_state, by_input = f(u, x, p)
     matrix = ca.SX.eye(x.numel()) - _GAMMA * h * by_state
     drift = _GAMMA * h * by_input @ (next_u - u)
     k1 = ca.solve(matrix, h * here + drift)
     k2 = ca.solve(matrix, h * f(next_u, x + k1, p)[0] - 2 * k1 - drift)
-    next_x = x + 1.5 * k1 + 0.5 * k2
-    next_sensitivity = ca.jacobian(next_x, x) @ sensitivity + ca.jacobian(next_x, p)
-    inputs = [_stacked(x, sensitivity), *signals.values(), *later.values(), ca.vertcat(p, h)]
-    names = ["states", *signals, *later, "p_and_h"]
-    return _compiled(effect, "step", inputs, [_stacked(next_x, next_sensitivity)], names)
+    return x + 1.5 * k1 + 0.5 * k2
 
 
 def _stacked(x: ca.SX, sensitivity: ca.SX) -> ca.SX:

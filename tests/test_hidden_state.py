@@ -2,6 +2,7 @@
 
 import warnings
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 
 import casadi as ca
 import numpy as np
@@ -16,6 +17,7 @@ from snarelab.models.hidden_state import evaluate_law, prepare, simulate_states
 
 DELAY = get_effect("sensor_delay")
 SPRING = get_effect("joint_elasticity")
+BRISTLES = get_effect("presliding_hysteresis")
 
 
 def load(time):
@@ -149,6 +151,36 @@ def test_stiff_spring_follows_its_load_at_rest_and_in_motion():
     states, _ = simulate_states(SPRING, inputs, np.array([1e9, 10.0]), 0.01)
     assert states[0, 0] == pytest.approx(11e-9, rel=1e-12)
     np.testing.assert_allclose(states[:, 0], inputs["load"] / 1e9, rtol=1e-2)
+
+
+@pytest.mark.parametrize("travel", [1e-3, 0.1])
+def test_bristles_over_a_sample_have_the_closed_solution(travel):
+    time = np.arange(0.0, 3.0, 0.05)
+    speed = 0.3 * np.sin(5 * time) + 0.05 * np.sin(31 * time)  # several samples turn between two of them
+
+    def rate(at, bent):
+        qd = np.interp(at, time, speed)
+        return (qd - abs(qd) * bent) / travel
+
+    states, _ = simulate_states(
+        BRISTLES, {"qd": speed, "speed_scale": np.ones_like(speed)}, np.array([1.0, travel]), 0.05
+    )
+    exact = [0.0]
+    for begin, end in pairwise(time):  # every sample by itself: the speed has a corner there
+        solved = solve_ivp(rate, (begin, end), exact[-1:], "LSODA", rtol=1e-10, atol=1e-12, max_step=5e-4)
+        exact.append(solved.y[0, -1])
+    np.testing.assert_allclose(states[:, 0], exact, rtol=0, atol=2e-6)
+
+
+def test_bristles_shorter_than_a_sample_stay_between_their_ends():
+    """Steps of ROS2 from rest made -12 000 of a travel that the motion passes a thousandfold in a sample."""
+    speed = np.concatenate([np.zeros(5), 0.3 * np.sin(np.linspace(0.0, 40.0, 500)), np.zeros(5), [0.5]])
+    for travel in (1e-9, 1e-6, 1e-4):
+        states, _ = simulate_states(
+            BRISTLES, {"qd": speed, "speed_scale": np.ones_like(speed)}, np.array([1.0, travel]), 1e-3
+        )
+        assert np.abs(states).max() <= 1.0
+        assert states[-1, 0] == pytest.approx(1.0)
 
 
 def test_no_steady_state_is_said():

@@ -9,10 +9,10 @@ from scipy.stats import beta, qmc
 
 from snarelab.errors import InputError
 from snarelab.tolerance.boundary import fit_boundary
-from snarelab.tolerance.capture import Axis, Capture, Outcome
+from snarelab.tolerance.capture import Axis, Capture, Outcome, run_case
 from snarelab.tolerance.report import summarise
 from snarelab.tolerance.results import Results
-from snarelab.tolerance.run import run_case, space_boundary
+from snarelab.tolerance.run import space_boundary
 from snarelab.tolerance.study import Study, Success
 from snarelab.tolerance.summary import sensitivities, success_probability
 

@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from ..errors import InputError
 
 _PACKAGE = Path(__file__).parents[1]
@@ -92,6 +94,22 @@ class Capture:
     def axis(self, name: str) -> Axis:
         """The axis of that name; raises KeyError."""
         return {a.name: a for a in self.axes}[name]
+
+
+def run_case(capture: Capture, values: Mapping[str, float]) -> Outcome:
+    """One case, in a worker: a simulation that breaks down is an outcome with its reason, not an error.
+
+    It stands here so that a worker loads no more than the capture.
+    """
+    try:
+        found = capture.run(values)
+    except (ArithmeticError, RuntimeError, ValueError) as error:
+        return Outcome.failed(" ".join(str(error).split())[:200] or type(error).__name__)
+    if not isinstance(found, Outcome):
+        raise InputError(f"{capture.name}: run gives a {type(found).__name__}; give an Outcome")
+    if found.enclosed and not np.isfinite([found.radial_error, found.peak_tension]).all():
+        return Outcome.failed(f"radial error {found.radial_error:g} m, tension {found.peak_tension:g} N: not finite")
+    return found
 
 
 BUILT_IN = {name: f"snarelab.tolerance.{name}:CAPTURE" for name in ("ground", "inspection")}

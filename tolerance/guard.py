@@ -19,8 +19,8 @@ import numpy as np
 
 from ..errors import InputError
 from . import ground, inspection
-from .capture import Capture, Outcome
-from .run import box_points, run_case
+from .capture import Capture, Outcome, run_case
+from .run import box_points
 from .study import Success, load_study
 
 SUCCESS = Success(radial_error=0.010, strength=8000.0)

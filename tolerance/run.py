@@ -13,7 +13,7 @@ from scipy.stats import qmc
 
 from ..errors import InputError
 from .boundary import Boundary, fit_boundary
-from .capture import Capture, Outcome
+from .capture import Outcome, run_case
 from .rays import COARSE, STAGE, next_cases, rays
 from .results import Results
 from .study import LARGEST, Study
@@ -81,19 +81,6 @@ def space_boundary(
     names = [*study.ranges, "margin"]
     points = np.vstack([part.iloc[:LARGEST][names].to_numpy(float) for part in parts])
     return fit_boundary(to_unit(study, points[:, :-1]), points[:, -1], study.seed)
-
-
-def run_case(capture: Capture, values: Mapping[str, float]) -> Outcome:
-    """One case, in a worker: a simulation that breaks down is an outcome with its reason, not an error."""
-    try:
-        found = capture.run(values)
-    except (ArithmeticError, RuntimeError, ValueError) as error:
-        return Outcome.failed(" ".join(str(error).split())[:200] or type(error).__name__)
-    if not isinstance(found, Outcome):
-        raise InputError(f"{capture.name}: run gives a {type(found).__name__}; give an Outcome")
-    if found.enclosed and not np.isfinite([found.radial_error, found.peak_tension]).all():
-        return Outcome.failed(f"radial error {found.radial_error:g} m, tension {found.peak_tension:g} N: not finite")
-    return found
 
 
 class _Runner:

@@ -32,7 +32,7 @@ def success_probability(table: pd.DataFrame, confidence: float = 0.95) -> Interv
     return Interval(won / total, float(interval.low), float(interval.high))
 
 
-def sensitivities(study: Study, boundary: Boundary, samples: int = 4096) -> pd.DataFrame:
+def sensitivities(study: Study, boundary: Boundary, samples: int = 2048) -> pd.DataFrame:
     """Sobol indices of the probability of success over the ranges, with bootstrap intervals.
 
     Columns ``first`` and ``total`` (Saltelli et al. 2010), each with ``_low`` and ``_high``; one row a varied axis.

@@ -30,9 +30,9 @@ WIDER = 0.025
 """The same of what says more of a link whose mass or centre is named already, and takes its place."""
 
 MOST = 0.5
-"""Share of its channels' residual energy, near rest too, from which on an effect with a memory of where the joint
-turned is named for what it does near rest: joints that stick and rounded signs look like one, and leave most of it.
-A joint that stands quite still while it sticks lets go after no travel at all: that is not one, either."""
+"""Share of its channel's residual energy beyond what is left in motion from which on an effect with a memory of where
+the joint turned is named for what it does near rest: joints that stick and rounded signs look like one, and leave most
+of it. A joint that stands quite still while it sticks lets go after no travel at all: that is not one, either."""
 
 DRIVEN_MOST = 0.25
 """Share of its own channel's residual energy from which on a drive's spring or play is named for what it explains along
@@ -90,7 +90,8 @@ def tried(ground: Grounds, options: Sequence[Option], null: Null) -> Trial | Non
             others.append(judge(ground.near_rest, near))
         if effect.remembers:
             j = judge(ground.near_rest.alone(), near)
-            others += [j] if j is not None and j.explained > MOST and not _sticks(j, options) else []
+            if j is not None and j.explained > MOST * ground.excess(j.channels[0]) and not _sticks(j, options):
+                others.append(j)
     if effect.at_rest and plain is not None and plain.case.share() > WORTH:
         # What is plain in motion may be worth its name for what it does near rest.
         share = ground.near_rest.alone().explained(plain.variant, whole.columns(plain.variant))

@@ -3,6 +3,9 @@
 Asperities bend like bristles before they slip. The bent share z of the level follows Dahl's model; the law is what that
 differs from a friction that jumps, so that beside Coulomb friction of the same level it is Dahl's friction. It shows in
 the torque of a joint that seems to stand still.
+
+Over travel in one direction Dahl's equation has a closed solution, so that the bent share stays between -1 and 1
+however short the travel is: between two samples the joint may turn once, where its speed, linear in time, crosses zero.
 """
 
 import casadi as ca
@@ -13,6 +16,18 @@ from ._direction import direction
 
 def _rate(s: Symbols, p: Symbols) -> list[ca.SX]:
     return [(s["qd"] - ca.fabs(s["qd"]) * s["bent"]) / p["travel"] - 1e-6 * s["bent"]]
+
+
+def _advance(s: Symbols, later: Symbols, p: Symbols, h: ca.SX) -> list[ca.SX]:
+    before, after = s["qd"], later["qd"]
+    turns, both = before * after < 0, ca.fabs(before) + ca.fabs(after)
+    bent = s["bent"]
+    for speed in (before, after):
+        # Half the step each or, where it turns, as long as it takes to come to rest.
+        way = ca.sign(ca.if_else(turns, speed, before + after))
+        travelled = 0.5 * h * ca.if_else(turns, speed**2 / ca.fmax(both, 1e-300), 0.5 * both)
+        bent = way + (bent - way) * ca.exp(-travelled / p["travel"])
+    return [bent]
 
 
 def _law(s: Symbols, p: Symbols) -> ca.SX:
@@ -42,6 +57,7 @@ EFFECT = Effect(
     law=_law,
     states=("bent",),
     rate=_rate,
+    advance=_advance,
     at_rest=True,
     remembers=True,
     experiment="move {at} to and fro by ever smaller strokes around rest and draw its torque over its position",
