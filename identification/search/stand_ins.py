@@ -3,7 +3,7 @@
 An effect outside the vocabulary is often mimicked in part: a damaged tooth by a ripple, a seal that drags over one
 stretch by several small effects at once. Each then lowers the error on every recording, and none is the answer. What
 tells is that a curve without a name, in blocks that it was not fitted to, leaves far less of the channel than all names
-together, fitted to all blocks.
+together, fitted to all blocks: a curve in their place, or one on top of them.
 """
 
 from collections.abc import Sequence
@@ -55,8 +55,9 @@ def stand_ins(
     def better(c: int) -> bool:
         # Each name was judged on top of those before it, so that what they gain adds up.
         gained = sum(t.gained for t in confirmed if c in t.judged.channels)
-        x = curves[c]
-        return left[c] > MUCH and x.share > PLAIN and 1.0 - x.share < LEFT * left[c] and x.gain > AHEAD * gained
+        x, more = curves[c], found.closing.nameless.get(c)
+        leaves = min(1.0 - x.share, left[c] * (1.0 - (more.share if more else 0.0)))
+        return left[c] > MUCH and x.share > PLAIN and leaves < LEFT * left[c] and x.gain > AHEAD * gained
 
     poor = {c for c in curves if better(c)}
     doubtful = tuple(t for t in confirmed if poor and _mainly(final, t.judged.placed, experiments) in poor)
