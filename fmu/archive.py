@@ -113,6 +113,8 @@ def _entry_problems(archive: zipfile.ZipFile) -> Iterator[str]:
     for entry in entries:
         name, parts = entry.orig_filename, PurePosixPath(entry.orig_filename.replace("\\", "/")).parts
         shown = ascii(name[:80])
+        if not entry.filename:  # what stands before a NUL; every file has a name
+            yield f"entry {shown} has no name"
         if name.startswith(("/", "\\")) or ".." in parts or re.match(r"[A-Za-z]:", name) or "\0" in name:
             yield f"entry {shown} leads outside the archive"
         elif "\\" in name:

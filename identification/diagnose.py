@@ -30,7 +30,6 @@ from .search.choice import Taken
 from .search.forward import Found, carry, search
 from .search.rest import fitted
 from .search.stand_ins import stand_ins
-from .snare.diagnose import diagnose_captures
 
 Array = NDArray[np.float64]
 
@@ -78,6 +77,9 @@ def diagnose(
     """
     demand_apart(recordings, holdout)
     if isinstance(model.tree, SnareTree):
+        # Loaded here: numba takes longer to load than a short arm to fit.
+        from .snare.diagnose import diagnose_captures
+
         return Answer(*diagnose_captures(model, recordings, holdout, progress=progress, seed=seed, jobs=jobs))
     demand_one_process(model, jobs)
     progress("reading and conditioning the recordings")

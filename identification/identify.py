@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,7 +19,9 @@ from .fitting.consistent_inertia import ConsistentInertia, consistent_inertia
 from .fitting.experiment import Experiment, demand_apart, load_experiments, scales, with_silence
 from .fitting.fit import Fit, channel_rms, fit
 from .fitting.friction_curve import friction_curves, identifiable
-from .snare.identify import IdentifiedCaptures, identify_captures
+
+if TYPE_CHECKING:
+    from .snare.identify import IdentifiedCaptures
 
 
 @dataclass(frozen=True)
@@ -108,7 +110,7 @@ def identify(
     progress: Callable[[str], None] = lambda _: None,
     seed: int = 0,
     jobs: int | None = None,
-) -> Identified | IdentifiedCaptures:
+) -> "Identified | IdentifiedCaptures":
     """Fit all parameters of a model to all recordings jointly.
 
     Parameters
@@ -133,6 +135,9 @@ def identify(
     for recording in holdout:
         demand_apart(recordings, recording)
     if isinstance(model.tree, SnareTree):
+        # Loaded here: numba takes longer to load than a short arm to fit.
+        from .snare.identify import identify_captures
+
         return identify_captures(model, recordings, holdout, progress=progress, jobs=jobs)
     demand_one_process(model, jobs)
     progress("reading and conditioning the recordings")

@@ -14,7 +14,6 @@ from .fitting.assembly import Assembly
 from .fitting.base_parameters import INERTIAL
 from .fitting.experiment import load_experiments, scales
 from .simulate_floating import simulate_floating
-from .snare.simulate import simulate_capture
 
 
 def simulate(model: Model, motion: str | Path | None) -> xr.Dataset:
@@ -41,6 +40,9 @@ def simulate(model: Model, motion: str | Path | None) -> xr.Dataset:
     """
     tree = model.tree
     if isinstance(tree, SnareTree):
+        # Loaded here: numba takes longer to load than a short arm to fit.
+        from .snare.simulate import simulate_capture
+
         return simulate_capture(model, motion)
     if motion is None:
         raise InputError(f"{model.path}: system = {model.system!r} follows a motion; give --motion RECORDING")
