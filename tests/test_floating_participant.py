@@ -96,6 +96,25 @@ def test_a_servo_holds_the_start_until_told_otherwise(arm):
     np.testing.assert_allclose(participant.outputs()[first : first + 7], POSE, atol=1e-12)
 
 
+@pytest.mark.parametrize(("switch", "last"), [(0.0, 0.4), (1.0, 0.0)], ids=["off", "on"])
+def test_the_last_input_alone_switches_the_motors(arm, switch, last):
+    """Told to move the third joint, an arm at rest does so with its motors on, and without them has no reason to."""
+    participant = FloatingArmParticipant(arm, space_arm_drive(arm), q=POSE, servo=not switch)
+    participant.initialize()
+    target = POSE + np.array([0.0, 0.0, 0.3, 0.0, 0.0, 0.0, last])
+    participant.set_inputs(np.concatenate([np.zeros(6), target, [switch]]))
+    for k in range(5):
+        participant.step(0.1 * k, 0.1)
+    seen = dict(zip(participant.names("output"), participant.outputs(), strict=True))
+    moved = np.array([seen[f"q.joint{i}"] for i in range(1, 8)]) - POSE
+    if switch:
+        assert 0.01 < moved[2] < 0.3
+    else:
+        np.testing.assert_allclose(moved, 0.0, atol=1e-12)
+    momentum = [seen[f"momentum.{kind}.{axis}"] for kind in ("linear", "angular") for axis in "xyz"]
+    np.testing.assert_allclose(momentum, 0.0, atol=1e-6)  # nothing from outside, either way
+
+
 def test_parameters_change_the_motion_and_are_checked(arm):
     ends = []
     for level in (10.0, 40.0):

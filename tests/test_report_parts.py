@@ -1,11 +1,15 @@
 """What the report is made of: lines thinned for drawing, means in bins, numbers in print."""
 
+import re
+
 import numpy as np
 import pytest
 from diagnoses import missing_physics, spelt
 
+from snarelab.identification.diagnosis import Trace
 from snarelab.identification.report.curves import binned
 from snarelab.identification.report.findings import missing
+from snarelab.identification.report.fit import _changed
 from snarelab.identification.report.words import chance, number, percent, spans, unit_words, with_std, words
 from snarelab.report.drawing import thinned
 
@@ -78,3 +82,21 @@ def test_what_has_no_name_stands_below_what_has() -> None:
     assert title == "What is missing"
     assert content.index("at a &lt; b</h3>") < content.index("<h3>Without a name</h3>\n<p>a &lt; b</p>")
     assert "Without a name" not in missing(missing_physics())[2]
+
+
+def test_of_rivals_the_probabilities_stand_to_the_right_and_the_words_to_the_left() -> None:
+    content = missing(missing_physics())[2]
+    (rivals,) = re.findall(r"<caption>What else it could be.*?</table>", content.split("Joint elasticity at")[0], re.S)
+    assert re.findall(r'class="n">([^<]*)<', rivals) == ["Probability", "8\u202f%", "3\u202f%"]
+    assert [cell for cell in re.findall(r"<td>([^<]*)<", rivals) if re.match(r"\d|over|under", cell)] == []
+
+
+@pytest.mark.parametrize(("share", "twice"), [(0.0, False), (0.009, False), (0.011, True), (1.0, True)])
+def test_a_model_is_drawn_twice_where_it_changed_by_over_a_hundredth_of_what_was_left(share, twice) -> None:
+    """On a channel of many newton metres: what it carries is no measure of what was left of it."""
+    t = np.arange(1000) / 100
+    left, carried = np.sin(2 * np.pi * t), 50 * np.cos(t)
+    still = Trace("a.csv", "train", "tau.joint1", "N*m", t, t, t, carried + left, carried, carried)
+    moved = Trace("a.csv", "train", "tau.joint2", "N*m", t, t, t, carried + left, carried, carried + share * left)
+    assert _changed([moved]) is twice
+    assert _changed([still, moved]) is twice  # one that changed is enough

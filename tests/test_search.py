@@ -10,7 +10,7 @@ from bench.arm import random_arm
 from bench.concealed_arm import run_case
 from snarelab.identification.fitting.assembly import Assembly
 from snarelab.identification.fitting.experiment import Scales
-from snarelab.identification.search.candidates import variants
+from snarelab.identification.search.candidates import Variant, variants
 from snarelab.identification.search.choice import choose
 from snarelab.identification.search.evidence import Channel, Evidence
 from snarelab.models.effects import get_effect
@@ -81,6 +81,24 @@ def test_where_a_payload_sits_is_read_off_its_slopes(tmp_path):
     assert [len(some) for some in shift.subsets()] == [1, 1, 1, 2, 2, 2, 3]
     np.testing.assert_allclose(variant.start(np.array([0.4, 0.008, 0.0, -0.02])), [0.4, 0.02, 0.0, -0.05])
     np.testing.assert_array_equal(variant.start(np.zeros(4)), np.zeros(4))
+
+
+@pytest.mark.parametrize(
+    ("effect", "at", "counted"),
+    [
+        ("com_offset", "link1", {1: 3, 2: 3, 3: 1}),  # a link's few columns: every set of them, 2³ - 1
+        ("external_torque", "base", {1: 3, 3: 1}),  # as few, of no link
+        ("inertia_error", "link1", {1: 10, 10: 1}),  # a link's, but too many for 2¹⁰ - 1
+        ("harness_stiffness", "joint1", {1: 1, 2: 1}),  # a spring's rest torque alone would be a bias
+    ],
+)
+def test_every_set_of_columns_is_tried_of_a_links_few_and_else_single_ones_and_all(effect, at, counted):
+    placed = Placed(get_effect(effect), at)
+    n = len(placed.effect.parameters)
+    sets = Variant(placed, np.zeros(n), np.arange(n), np.zeros(n), np.ones(n)).subsets()
+    sizes = [len(some) for some in sets]
+    assert {size: sizes.count(size) for size in sizes} == counted
+    assert len({tuple(some) for some in sets}) == len(sets)
 
 
 def test_a_small_payload_of_which_one_joint_shows_little_is_named():

@@ -21,7 +21,7 @@ from .rest import moving
 LEFT = 0.7
 """Names stand in for something else where a curve leaves less than this share of the energy that they leave, ..."""
 
-AHEAD = 1.3
+LOUDER = 1.3
 """... gains this much more than they did, in blocks that neither was fitted to, ..."""
 
 PLAIN = 0.5
@@ -57,7 +57,7 @@ def stand_ins(
         gained = sum(t.gained for t in confirmed if c in t.judged.channels)
         x, more = curves[c], found.closing.nameless.get(c)
         leaves = min(1.0 - x.share, left[c] * (1.0 - (more.share if more else 0.0)))
-        return left[c] > MUCH and x.share > PLAIN and leaves < LEFT * left[c] and x.gain > AHEAD * gained
+        return left[c] > MUCH and x.share > PLAIN and leaves < LEFT * left[c] and x.gain > LOUDER * gained
 
     poor = {c for c in curves if better(c)}
     doubtful = tuple(t for t in confirmed if poor and _mainly(final, t.judged.placed, experiments) in poor)
