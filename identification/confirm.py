@@ -113,7 +113,8 @@ def _missed(
         # What was named for leaving little near rest must still do so, now that the others are there.
         floor, after, before = (_energy(x, c, final) for x in (both[0], with_it, rms))
         most = (before - after) / max(after - floor, LEAST * after) * (1 - MOST) / MOST
-        rises[1] = min(rises[1], most)
+        # In motion as well, it must be missed over all samples: fits with and without it do not weigh them alike.
+        rises = [min(rises[1], max(most, rises[0]))]
     return _Missed(max(rises), trial, rest)
 
 

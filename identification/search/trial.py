@@ -29,7 +29,7 @@ WORTH = 0.05
 WIDER = 0.025
 """The same of what says more of a link whose mass or centre is named already, and takes its place."""
 
-MOST = 0.5
+MOST = 0.75
 """Share of its channel's residual energy beyond what is left in motion from which on an effect with a memory of where
 the joint turned is named for what it does near rest: joints that stick and rounded signs look like one, and leave most
 of it. A joint that stands quite still while it sticks lets go after no travel at all: that is not one, either."""
