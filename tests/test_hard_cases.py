@@ -50,6 +50,17 @@ def test_named_and_nothing_else(number, concealed, tmp_path):
     assert judge(answer, found.to_json()).place
 
 
+def test_bristles_under_a_disturbance_are_told_beside_the_level_they_carry(tmp_path):
+    """Half of what Coulomb friction leaves is the disturbance, so that they explain a fifth of it, all of the excess."""
+    answer, found = diagnosed(41, tmp_path / "case", 90300)
+    assert answer.kinds == ("coulomb_friction",)
+    (joint,) = {truth.at for truth in answer.truths}
+    assert [(e.name, e.at) for e in found.effects] == [("coulomb_friction", joint), ("presliding_hysteresis", joint)]
+    error = judge(answer, found.to_json()).error
+    assert error
+    assert error[1] < 1.05  # times the disturbance and the noise
+
+
 def test_bursts_are_an_effect_without_a_name(tmp_path):
     """Four times the disturbance's RMS, at times that no state of the arm goes with."""
     answer, found = diagnosed(9, tmp_path / "case")
