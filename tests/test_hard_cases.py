@@ -51,7 +51,7 @@ def test_named_and_nothing_else(number, concealed, tmp_path):
 
 
 def test_bristles_under_a_disturbance_are_told_beside_the_level_they_carry(tmp_path):
-    """Half of what Coulomb friction leaves is the disturbance, so that they explain a fifth of it, all of the excess."""
+    """Most of what Coulomb friction leaves is the disturbance: they explain a fifth of it, which is all the excess."""
     answer, found = diagnosed(41, tmp_path / "case", 90300)
     assert answer.kinds == ("coulomb_friction",)
     (joint,) = {truth.at for truth in answer.truths}
