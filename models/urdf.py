@@ -204,7 +204,7 @@ def parse_plant(path: Path, robot: ET.Element, root: str) -> Any:
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import MultibodyPlant
 
-    bare = ET.Element("robot", {"name": robot.get("name", path.stem)})
+    bare = ET.Element("robot", {"name": "robot"})  # the URDF's own may be empty, which Drake does not bear
     for element in robot:
         if element.tag in ("link", "joint"):
             kept = ET.SubElement(bare, element.tag, element.attrib)
@@ -217,7 +217,7 @@ def parse_plant(path: Path, robot: ET.Element, root: str) -> Any:
         if root != "world":
             plant.WeldFrames(plant.world_frame(), plant.GetBodyByName(root).body_frame())
         plant.Finalize()
-    except (RuntimeError, ValueError) as problem:
+    except (RuntimeError, ValueError, SystemExit) as problem:  # the last is what Drake's failed conditions become
         reason = re.sub(r"^\S*literal-string\S*\s*(error: )?", "", " ".join(str(problem).split()))
         raise InputError(f"{path}: Drake cannot read it: {reason}") from None
     return plant
