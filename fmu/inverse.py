@@ -5,16 +5,16 @@ one: where a position sensor is late, ``sensor.q.<joint>`` is what it reads of i
 `simulate`, which knows all of it, turns the delay round; an FMU cannot know a motion ahead.) On a floating base its
 motion is given too, and the force and moment that it needs from outside come out: none, where the model is complete.
 
-Hidden states are stepped by ROS2 (Verwer, Spee, Blom and Hundsdorfer 1999), with the motion linear between
-communication points, just as `snarelab.models.hidden_state` steps them between samples.
+Hidden states are stepped with the motion linear between communication points, as `snarelab.models.hidden_state` steps
+them between samples.
 """
 
 from collections.abc import Callable
 
 import casadi as ca
-import numpy as np
 
 from ..models.floating.tree import n_carriers
+from ..models.hidden_state import ros2
 from ..models.model import Model, Placed
 from ..models.rig.rig import Rig
 from ..models.rigid_body import symbolic_torque
@@ -23,7 +23,6 @@ from .equations import Equations, Ledger
 from .placed_laws import PlacedLaws, identifier
 from .suspension import PLACES, rig_reach, rig_signals
 
-_GAMMA = 1 - np.sqrt(0.5)
 _Signals = dict[str, ca.SX]
 
 
@@ -188,18 +187,16 @@ class _Follower:
         return own | {"q": u[j], "qd": u[n + j], "qdd": u[2 * n + j]}
 
     def _stepped(self, p: Placed, x: ca.SX, here: _Signals, there: _Signals, h: ca.SX) -> ca.SX:
-        """One step of ROS2 (see `snarelab.models.hidden_state`)."""
+        """One step, as `snarelab.models.hidden_state` takes it between samples."""
+        if p.effect.advance:
+            return self.laws.advanced(p, here | _named(p, x), there, h)
         state = ca.SX.sym("state", x.numel())
         read = {name: ca.SX.sym(name, x.numel()) for name, x in here.items()}
         u, rate = ca.vertcat(*read.values()), self.laws.rate(p, read | _named(p, state))
         parameters = self.ledger.parameters()[0]
         f = ca.Function("f", [state, u, parameters], [rate, ca.jacobian(rate, state), ca.jacobian(rate, u)])
         first, last = ca.vertcat(*here.values()), ca.vertcat(*there.values())
-        at_first, by_state, by_input = f(x, first, parameters)
-        matrix, drift = ca.SX.eye(x.numel()) - _GAMMA * h * by_state, _GAMMA * h * by_input @ (last - first)
-        k1 = ca.solve(matrix, h * at_first + drift)
-        k2 = ca.solve(matrix, h * f(x + k1, last, parameters)[0] - 2 * k1 - drift)
-        return x + 1.5 * k1 + 0.5 * k2
+        return ros2(lambda x, u: f(x, u, parameters), x, first, last, h)
 
 
 def _named(p: Placed, x: ca.SX) -> _Signals:

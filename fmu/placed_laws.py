@@ -98,6 +98,11 @@ class PlacedLaws:
         assert p.effect.rate is not None
         return ca.vertcat(*p.effect.rate(signals, self._parameters[p.key]))
 
+    def advanced(self, p: Placed, signals: Mapping[str, ca.SX], later: Mapping[str, ca.SX], h: ca.SX) -> ca.SX:
+        """Hidden states h seconds on, of an effect that gives its closed solution."""
+        assert p.effect.advance is not None
+        return ca.vertcat(*p.effect.advance(signals, later, self._parameters[p.key], h))
+
     def steady(self, p: Placed, signals: Mapping[str, ca.SX]) -> ca.SX:
         """Hidden states with zero rate at given signals."""
         x = ca.SX.sym("x", len(p.effect.states))

@@ -18,10 +18,10 @@ sensitivities dx/dp are the exact derivatives of these steps, carried along in t
 """
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -245,21 +245,29 @@ def _step(
         next_signals = dict(zip(signals, later.values(), strict=True))
         next_x = ca.vertcat(*effect.advance({**signals, **states}, next_signals, named, h))
     else:
-        next_x = _integrated(rate, u, next_u, x, p, h)
+        f = ca.Function("f", [x, u, p], [rate, ca.jacobian(rate, x), ca.jacobian(rate, u)])
+        next_x = ros2(lambda state, read: f(state, read, p), x, u, next_u, h)
     next_sensitivity = ca.jacobian(next_x, x) @ sensitivity + ca.jacobian(next_x, p)
     inputs = [_stacked(x, sensitivity), *signals.values(), *later.values(), ca.vertcat(p, h)]
     names = ["states", *signals, *later, "p_and_h"]
     return _compiled(effect, "step", inputs, [_stacked(next_x, next_sensitivity)], names)
 
 
-def _integrated(rate: ca.SX, u: ca.SX, next_u: ca.SX, x: ca.SX, p: ca.SX, h: ca.SX) -> ca.SX:
-    """One step of ROS2."""
-    f = ca.Function("f", [u, x, p], [rate, ca.jacobian(rate, x), ca.jacobian(rate, u)])
-    here, by_state, by_input = f(u, x, p)
+def ros2(f: Callable[[ca.SX, ca.SX], Any], x: ca.SX, u: ca.SX, later: ca.SX, h: ca.SX) -> ca.SX:
+    """One step of ROS2.
+
+    Parameters
+    ----------
+    f : callable
+        Of states and signals: the rate, and its derivatives by states and by signals.
+    x, u, later, h : casadi.SX
+        States, signals, signals a sample later, and the time between [s].
+    """
+    here, by_state, by_input = f(x, u)
     matrix = ca.SX.eye(x.numel()) - _GAMMA * h * by_state
-    drift = _GAMMA * h * by_input @ (next_u - u)
+    drift = _GAMMA * h * by_input @ (later - u)
     k1 = ca.solve(matrix, h * here + drift)
-    k2 = ca.solve(matrix, h * f(next_u, x + k1, p)[0] - 2 * k1 - drift)
+    k2 = ca.solve(matrix, h * f(x + k1, later)[0] - 2 * k1 - drift)
     return x + 1.5 * k1 + 0.5 * k2
 
 

@@ -12,6 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import distributed  # noqa: F401 (brings the defaults that its configuration is changed from)
 import pandas as pd
 import pytest
 from dask import config as dask_config
@@ -171,12 +172,11 @@ def test_scheduler_and_workers_of_their_own(command, tmp_path):
     path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
     address_file = tmp_path / "scheduler.json"
     environment = {**os.environ, "PYTHONPATH": path}
-    distributed = [sys.executable, "-m", "distributed.cli"]
     options = ["--scheduler-file", str(address_file)]
     servers = [
         subprocess.Popen(
             [
-                *distributed[:2],
+                *(sys.executable, "-m"),
                 "distributed.cli.dask_scheduler",
                 "--host",
                 "127.0.0.1",
@@ -196,7 +196,7 @@ def test_scheduler_and_workers_of_their_own(command, tmp_path):
             time.sleep(0.05)
         servers += [
             subprocess.Popen(
-                [*distributed[:2], "distributed.cli.dask_worker", "--nthreads", "1", "--no-dashboard", *options],
+                [*(sys.executable, "-m"), "distributed.cli.dask_worker", "--nthreads", "1", "--no-dashboard", *options],
                 env=environment,
                 cwd=tmp_path,
                 stderr=subprocess.DEVNULL,

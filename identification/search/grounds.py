@@ -107,7 +107,7 @@ class Grounds:
     heard: Array
 
     def excess(self, channel: int) -> float:
-        """Share of a channel's residual energy that were not there if all samples left what those in motion leave."""
+        """Share of a channel's residual energy that goes if all samples leave what those in motion leave."""
         whole, moving = (np.mean(x.raw.channels[channel].residual ** 2) for x in (self.near_rest, self.measured))
         return max(1.0 - float(moving / max(whole, 1e-300)), 0.0)
 
