@@ -100,21 +100,24 @@ def _missed(
     if not _known(final, t):
         return _Missed(0.0, trial, rest)
     # A joint at rest holds what it is given: there, only laws for what happens at rest can be missed.
-    both = [channel_rms(x.assembly, in_motion, x.theta)[0] for x in (final, rest)]
-    pairs = [(*both, CONFIRM)]
+    moving_with, moving_without = (channel_rms(x.assembly, in_motion, x.theta)[0] for x in (final, rest))
+
+    def rise(after: Array, before: Array) -> float:
+        return (_energy(before, c, final) / _energy(after, c, final) - 1) / CONFIRM
+
+    rises = [rise(moving_with, moving_without)]
     if effect.at_rest or effect.exceeds_at_rest:
-        pairs.append((with_it, rms, CONFIRM))
+        rises.append(rise(with_it, rms))
     if effect.exceeds_at_rest:
         creeping = fitted(final.assembly, locked)
-        both = [channel_rms(x.assembly, creeping, x.theta)[0] for x in (final, rest)]
-        pairs.append((*both, CONFIRM))
-    rises = [(_energy(b, c, final) / _energy(a, c, final) - 1) / bar for a, b, bar in pairs]
+        creeping_with, creeping_without = (channel_rms(x.assembly, creeping, x.theta)[0] for x in (final, rest))
+        rises.append(rise(creeping_with, creeping_without))
     if effect.remembers:
         # What was named for leaving little near rest must still do so, now that the others are there.
-        floor, after, before = (_energy(x, c, final) for x in (both[0], with_it, rms))
+        floor, after, before = (_energy(x, c, final) for x in (moving_with, with_it, rms))
         most = (before - after) / max(after - floor, LEAST * after) * (1 - MOST) / MOST
         # In motion as well, it must be missed over all samples: fits with and without it do not weigh them alike.
-        rises = [min(rises[1], max(most, rises[0]))]
+        rises = [min(rise(with_it, rms), max(most, rises[0]))]
     return _Missed(max(rises), trial, rest)
 
 

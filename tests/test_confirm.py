@@ -78,3 +78,50 @@ def test_a_name_needs_one_amplitude_that_is_known_to_be_other_than_zero(deviatio
     variant = SimpleNamespace(amplitudes=range(len(deviations)))
     taken: Any = SimpleNamespace(judged=SimpleNamespace(placed=SimpleNamespace(effect=effect), variant=variant))
     assert _known(final, taken) is known
+
+
+@pytest.mark.parametrize(
+    ("flags", "motion", "everywhere", "floor", "kept"),
+    [
+        ({}, 1.08, 1.003, 1.0, True),
+        ({"at_rest": True}, 1.0, 1.08, 1.0, True),
+        # The fit with it keeps samples near rest, the one without does not: what differs in motion alone is the fits.
+        ({"at_rest": True, "remembers": True}, 1.08, 1.003, 1.0, False),
+        ({"remembers": True}, 1.08, 1.08, 1.0, True),
+        # Energy 1.08 before and 1 after: of what stands above 0.98 in motion it takes 4/5, above 0.96 only 2/3.
+        ({"remembers": True}, 1.0, 1.08, 0.98, True),
+        ({"remembers": True}, 1.0, 1.08, 0.96, False),
+    ],
+)
+def test_what_remembers_is_missed_over_all_samples_and_there_in_motion_or_for_most_of_the_excess(
+    flags, motion, everywhere, floor, kept, monkeypatch
+):
+    """Energies held out: with the effect 1 over all samples and ``floor`` in motion, without it so many times that."""
+    energy = {
+        ("final", "all"): 1.0,
+        ("rest", "all"): everywhere,
+        ("final", "motion"): floor,
+        ("rest", "motion"): floor * motion,
+        ("without", "all"): 2.0,  # the same fit with the effect struck out
+    }
+
+    def channel_rms(assembly, samples, theta):
+        which = "without" if theta == "carried" else assembly
+        return np.sqrt([energy[which, samples]]), np.ones(1)
+
+    effect = SimpleNamespace(**{"at_rest": False, "exceeds_at_rest": False, "remembers": False, **flags})
+    judged = SimpleNamespace(channels=(0,), placed=SimpleNamespace(effect=effect))
+    final: Any = SimpleNamespace(assembly="final", theta="final", sigma=np.ones(1))
+    rest = SimpleNamespace(assembly="rest", theta="rest")
+    for name, stand_in in {
+        "channel_rms": channel_rms,
+        "without": lambda *_: "rest",
+        "carry": lambda *_: "carried",
+        "fitted": lambda *_: "fitted",
+        "fit": lambda *_, **__: rest,
+        "_known": lambda *_: True,
+    }.items():
+        monkeypatch.setattr(module, name, stand_in)
+    taken: Any = SimpleNamespace(judged=judged)
+    samples: Any = ("train", "all", "motion")
+    assert (module._missed(taken, final, *samples).rise > 1) is kept

@@ -61,6 +61,14 @@ def test_bristles_under_a_disturbance_are_told_beside_the_level_they_carry(tmp_p
     assert error[1] < 1.05  # times the disturbance and the noise
 
 
+def test_a_cable_that_hardens_is_no_harness(tmp_path):
+    """The spring that stands in for it leaves most; a curve on top of the spring takes that, and gains more."""
+    answer, found = diagnosed(66, tmp_path / "case", 90300)
+    assert answer.kinds == ("hardening cable",)
+    assert found.verdict == "unknown_effect", found.sentence
+    assert not found.effects
+
+
 def test_bursts_are_an_effect_without_a_name(tmp_path):
     """Four times the disturbance's RMS, at times that no state of the arm goes with."""
     answer, found = diagnosed(9, tmp_path / "case")

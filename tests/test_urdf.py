@@ -243,3 +243,22 @@ def test_a_tree_built_by_hand_is_checked(fault, words):
     tree_of()
     with pytest.raises(InputError, match=words):
         tree_of(**fault)
+
+
+def test_a_condition_that_fails_in_drake_is_a_refusal(tmp_path, monkeypatch):
+    """Drake's own checks would end the process: its bindings raise SystemExit for them."""
+
+    class Failing:
+        def __init__(self, _plant):
+            pass
+
+        def AddModelsFromString(self, _text, _kind):
+            raise SystemExit("condition '!name.empty()' failed.")
+
+    monkeypatch.setattr("pydrake.multibody.parsing.Parser", Failing)
+    (tmp_path / "arm.urdf").write_text(
+        '<robot name="arm"><link name="base"/><link name="tip"/><joint name="j" type="revolute"><parent link="base"/>'
+        '<child link="tip"/><axis xyz="0 0 1"/></joint></robot>'
+    )
+    with pytest.raises(InputError, match=r"Drake cannot read it: condition '!name.empty\(\)' failed"):
+        load_urdf(tmp_path / "arm.urdf")
