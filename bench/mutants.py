@@ -42,7 +42,7 @@ _COVERAGE = """
 [run]
 branch = true
 source = .
-patch = subprocess
+patch = subprocess, _exit
 parallel = true
 [report]
 omit = */tests/*, */bench/*, */proof/*, */docs/*

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from snarelab.errors import InputError
+from snarelab.tolerance import renew
 from snarelab.tolerance.guard import (
     FARTHEST,
     Guarded,
@@ -77,6 +78,30 @@ def test_renewing_changes_values_only(tmp_path):
     assert [line.partition("value")[0] for line in rewritten(text, same).splitlines()] == [
         line.partition("value")[0] for line in text.splitlines()
     ]
+
+
+def test_renewing_says_what_moved_and_writes_it(tmp_path, monkeypatch, capsys):
+    """Measured by stand-ins, as the measurements take minutes: they are tests of their own."""
+    text = (
+        '[ground]\nfirst_contact = { value = 2.6, allowed = 0.01, unit = "s" } # seen\n'
+        '[envelope]\nradial_y = { value = 0.014, allowed = 0.004, unit = "m" }\n'
+        '[arrival]\nfirst_contact = { value = 7.0, allowed = 0.03, unit = "s" }\n'
+    )
+    (tmp_path / "t.toml").write_text(text)
+    exact = []
+    monkeypatch.setattr(renew, "FARTHEST", {"radial_y": 0.08})
+    monkeypatch.setattr(renew, "envelope_end", lambda axis, to: exact.append((axis, to)) or 0.015)
+    monkeypatch.setattr(renew, "ground_numbers", lambda: {"first_contact": 2.625})
+    monkeypatch.setattr(renew, "arrival_numbers", lambda: {"first_contact": 7.1})
+    assert renew.main([str(tmp_path / "t.toml")]) == 0
+    assert exact == [("radial_y", 0.001)]
+    changed = text.replace("2.6,", "2.625,").replace("0.014,", "0.015,").replace("7.0,", "7.1,")
+    assert (tmp_path / "t.toml").read_text() == changed
+    assert [file.name for file in tmp_path.iterdir()] == ["t.toml"]
+    said = capsys.readouterr().out.splitlines()
+    assert said[0].split() == ["ground.first_contact", "2.6", "->", "2.625", "s"]
+    assert renew.main([str(tmp_path / "none.toml")]) == 2
+    assert "cannot be read" in capsys.readouterr().err
 
 
 def test_a_file_without_an_allowed_change_is_refused(tmp_path):

@@ -127,6 +127,44 @@ def test_magnitudes_may_be_given_for_many_outputs_at_once():
     np.testing.assert_array_equal(found, [2.0, 0.0, np.inf])
 
 
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"tolerance": 0.0}, "tolerance 0.0 must be positive"),
+        ({"smallest": 0.0}, r"smallest step 0.0 s must be positive, at most inf s"),
+        ({"smallest": 0.2, "largest": 0.1}, r"smallest step 0.2 s must be positive, at most 0.1 s"),
+    ],
+)
+def test_step_control_that_leaves_no_step_is_refused(options, words):
+    with pytest.raises(InputError, match=words):
+        StepControl(**options)
+
+
+def test_a_magnitude_is_positive():
+    with pytest.raises(InputError, match=r"magnitude -1\.0 of a\.x must be positive"):
+        StepControl(magnitudes={"a.x": -1.0}).given_magnitudes(("a.x",))
+
+
+@pytest.mark.parametrize(
+    ("error", "degree", "rejected", "size"),
+    [
+        (0.0, 1, False, 0.02),  # twice at most
+        (0.09, 1, False, 0.02),
+        (0.36, 1, False, 0.015),  # 0.9 / 0.6
+        (0.9**3, 2, False, 0.01),
+        (0.36, 1, True, 0.01),  # no larger after a rejected one
+        (4.0, 1, True, 0.0045),
+        (1e6, 0, True, 0.002),  # a fifth at least
+    ],
+)
+def test_next_size_follows_the_order_of_the_error(error, degree, rejected, size):
+    """0.9 (1 / error)^(1 / (degree + 1)) of the step, between a fifth of it and twice it."""
+    assert StepControl().next_size(0.01, error, degree, rejected) == pytest.approx(size, rel=1e-12)
+    assert StepControl(smallest=0.012, largest=0.013).next_size(0.01, error, degree, rejected) == pytest.approx(
+        min(max(size, 0.012), 0.013), rel=1e-12
+    )
+
+
 def test_smallest_step_is_accepted_and_logged():
     control = StepControl(1e-6, magnitudes={"wall.force": 1.0}, smallest=5e-3, largest=0.1)
     run = Master(impact(), 5e-3, control=control).run(6.0)

@@ -192,6 +192,10 @@ def test_ssp_written_by_hand_loads(halves, tmp_path):
             'name="force" kind="input"><ssc:Real unit="kN"/>',
             "is in kN",
         ),
+        ("resources/right2.fmu", "resources/", "'resources/' is not in the archive"),
+        (' source="resources/values.ssv"', "", "has neither values nor a source"),
+        ('<v:Real value="7"/>', '<v:Integer value="seven"/>', "parameter 'mass': value = 'seven' is no finite number"),
+        ('<v:Real value="7"/>', '<v:Real value="inf"/>', "parameter 'mass': value = 'inf' is no finite number"),
         ("<SystemStr", '<!DOCTYPE x [<!ENTITY a "b">]><SystemStr', "declares a document type"),
         ("</System>\n  <Def", "</Systm>\n  <Def", "is no XML"),
     ],
@@ -203,6 +207,50 @@ def test_mistakes_in_ssp_are_named_with_the_file(halves, tmp_path, old, new, mes
         load_setup(path, HERE)
     assert message in str(caught.value)
     assert str(caught.value).startswith(str(path))
+
+
+def test_a_circle_of_connectors_is_no_connection(halves, tmp_path):
+    circle = HAND
+    for old, new in (
+        ('startElement="mass" startConnector="x" endConnector="place"', 'startConnector="push" endConnector="place"'),
+        ('startElement="right" startConnector="force" endE', 'startElement="inner" startConnector="place" endE'),
+    ):
+        assert old in circle
+        circle = circle.replace(old, new)
+    with pytest.raises(InputError, match=r"the connections into inner_mass\.force run in a circle"):
+        load_setup(by_hand(halves, tmp_path / "circle.ssp", circle), HERE)
+
+
+def test_a_description_without_a_system_is_refused(tmp_path):
+    with zipfile.ZipFile(tmp_path / "empty.ssp", "w") as archive:
+        archive.writestr("SystemStructure.ssd", '<a version="1.0"/>')
+    with pytest.raises(InputError, match="has no System"):
+        load_setup(tmp_path / "empty.ssp", HERE)
+
+
+@pytest.mark.parametrize(
+    ("limit", "words"), [("_LARGEST", "SystemStructure.ssd: would"), ("_LARGEST_FMUS", "all FMUs")]
+)
+def test_what_unpacks_to_too_much_is_refused(halves, tmp_path, monkeypatch, limit, words):
+    monkeypatch.setattr(f"snarelab.cosim.ssp.{limit}", 1000)
+    with pytest.raises(InputError, match=words):
+        load_setup(by_hand(halves, tmp_path / "large.ssp"), HERE)
+
+
+def test_whole_numbers_and_truth_are_numbers_and_text_is_left_out(halves, tmp_path):
+    typed = HAND.replace('<v:Real value="7"/>', '<v:Integer value="7"/>').replace(
+        '<v:Real value="0.5"/>', '<v:Boolean value="true"/>'
+    )
+    text = '<v:Parameter name="note"><v:String value="a mass"/></v:Parameter><v:Parameter name="damping">'
+    typed = typed.replace('<v:Parameter name="damping">', text)
+    typed = typed.replace('<ParameterMapping source="resources/map.ssm"/>', "").replace(
+        'source="resources/values.ssv"', 'source="resources/none.ssv"'
+    )
+    path = by_hand(halves, tmp_path / "typed.ssp", typed)
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr("resources/none.ssv", '<ParameterSet version="1.0" name="none"/>')
+    setup = load_setup(path, HERE)
+    assert setup.system.given == {"inner_mass.mass": 7.0, "inner_mass.damping": 1.0}
 
 
 def test_inputs_that_an_ssp_leaves_open_keep_their_start_values(halves, tmp_path, capsys):

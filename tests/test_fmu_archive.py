@@ -85,6 +85,50 @@ def test_a_size_that_is_a_lie(good, tmp_path):
     assert (open_or_refuse / "resources" / "big").stat().st_size == 10
 
 
+def patched(source, target, entry, offset, layout, value):
+    """A copy with other bytes in the central directory's record of an entry."""
+    data = bytearray(source.read_bytes())
+    at = data.rindex(b"PK\x01\x02", 0, data.rindex(entry.encode()))
+    struct.pack_into(layout, data, at + offset, value)
+    target.write_bytes(data)
+    return target
+
+
+def test_encrypted_entries_and_backslashes_are_listed(good, tmp_path):
+    path = rewritten(good[0], tmp_path / "plain.fmu", lambda n, d: d)
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr("resources\\table.csv", "1")
+        archive.writestr("resources/secret", "x")
+    text = refused(patched(path, tmp_path / "bad.fmu", "resources/secret", 8, "<H", 1), tmp_path / "x")
+    assert "2 problems" in text
+    assert "table.csv' has a backslash, where FMI wants a slash" in text
+    assert "entry 'resources/secret' is encrypted" in text
+
+
+def test_declared_sizes_have_limits(good, tmp_path):
+    """An entry of 3.9 GiB, packed to as much by its own account, beside another; a description of 65 MiB."""
+    path = rewritten(good[0], tmp_path / "plain.fmu", lambda n, d: d)
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr("resources/a", "x")
+        archive.writestr("resources/b", "x")
+    for name in ("resources/a", "resources/b"):
+        for offset in (20, 24):
+            patched(path, path, name, offset, "<I", 0xFA000000)
+    assert "7.8 GiB when unpacked, more than 4 GiB" in refused(path, tmp_path / "x")
+    path = rewritten(good[0], tmp_path / "long.fmu", lambda n, d: d)
+    for offset, size in ((20, 1 << 20), (24, 65 << 20)):
+        patched(path, path, "modelDescription.xml", offset, "<I", size)
+    assert "modelDescription.xml has 65 MiB, more than 64" in refused(path, tmp_path / "x")
+
+
+def test_entries_are_counted(tmp_path):
+    path = tmp_path / "many.fmu"
+    with zipfile.ZipFile(path, "w") as archive:
+        for n in range(20_001):
+            archive.writestr(f"{n}", "")
+    assert refused(path, tmp_path / "x").endswith("20001 entries, more than 20000")
+
+
 def test_an_entity_bomb(good, tmp_path):
     bomb = '<!DOCTYPE x [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;&a;&a;">]>'
 
@@ -114,6 +158,10 @@ def test_an_entity_bomb(good, tmp_path):
                 d.replace(b'modelIdentifier="', b'modelIdentifier="../../') if n == "modelDescription.xml" else d
             ),
             ["modelIdentifier '../../suspended_target' is no C identifier"],
+        ),
+        (
+            lambda n, d: d.replace(b'name="stiffness"', b'name="damping"') if n == "modelDescription.xml" else d,
+            ["variable 'damping' is described twice"],
         ),
         (lambda n, d: None if n.startswith("binaries") else d, ["no binary", "for this platform", "fmpy compile"]),
         (lambda n, d: d[:5000] if n.startswith("binaries") else d, ["broken ELF file"]),

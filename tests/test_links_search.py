@@ -1,6 +1,6 @@
 """Link encoders: how sure a name is against its rivals, and where effects that the model has already start from."""
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ import pytest
 from snarelab.identification.fitting.experiment import Scales
 from snarelab.identification.links import diagnose
 from snarelab.identification.links.pair import Pair, PairFit
-from snarelab.identification.links.search import Trial, _weigh
+from snarelab.identification.links.search import Named, Searched, Trial, _weigh
 from snarelab.identification.search.choice import BOOTSTRAPS
 from snarelab.models.effects import get_effect
 from snarelab.models.model import Placed
@@ -77,3 +77,37 @@ def test_an_effect_given_without_values_starts_at_its_usual_ones_in_the_joints_o
     keys, values = begun.value.args
     assert keys == ["backlash.joint1"]
     assert values == pytest.approx([300 * 16.0, 0.1 * 16.0, 2e-3])  # stiffness, damping, and the gap that was given
+
+
+def fit(*placed, energy):
+    """Two zeros after the effects' values; a residual (4,) of this energy."""
+    return PairFit(tuple(placed), np.zeros(len(placed) + 2), np.full(4, np.sqrt(energy / 4)), np.zeros((4, 2)))
+
+
+def test_a_name_that_the_held_out_recording_does_not_confirm_is_barred_and_the_search_goes_on(monkeypatch):
+    """Drift explains more where it is fitted, but less than a twentieth of the other; a gain a third of both."""
+    drift, gain = (Placed(get_effect(name), "q_link.joint1") for name in ("sensor_drift", "sensor_gain"))
+    trained, held = {(): 12.0, (drift,): 5.0, (gain,): 8.0}, {(): 12.0, (drift,): 11.6, (gain,): 8.0}
+    searches, none = [], cast(Any, None)
+
+    def search(_pair, placed, values, _n, rejected, _seed):
+        searches.append((placed, tuple(rejected), len(values)))
+        wanted = [p for p in (drift, gain) if p.key not in rejected and p not in placed][:1] if not placed else []
+        tried = [Trial(p, fit(p, energy=trained[(p,)]), np.ones(2), 1.0, 9.0, 0.5, True) for p in wanted]
+        named = tuple(Named(t, 0.9, ()) for t in tried)
+        last = tried[-1].fit if tried else fit(*placed, energy=trained[placed])
+        return Searched(named, fit(*placed, energy=trained[placed]), last, (), none, 1.0)
+
+    monkeypatch.setattr(diagnose, "search_pair", search)
+    monkeypatch.setattr(diagnose, "fit_pair", lambda _pair, placed, _theta: fit(*placed, energy=trained[placed]))
+    monkeypatch.setattr(diagnose, "held_out", lambda _p, _l, found: fit(*found.placed, energy=held[found.placed]))
+    monkeypatch.setattr(diagnose, "_nameless", lambda *_: 0.0)
+    runs: Any = (None, None)
+    pair = Pair("joint1", "revolute", Scales(speed=2.0, travel=0.5, torque=8.0), runs)
+    given: Any = type("Given", (), {"effects": (), "values": {}})
+    found = diagnose._diagnose(pair, pair, given, 1, 0)
+    assert found.rejected == (drift,)
+    assert [s.placed for s in found.steps] == [(), (gain,)]
+    (proof,) = found.proofs
+    assert (proof.without, proof.within) == pytest.approx((np.sqrt(3.0), np.sqrt(2.0)))
+    assert searches == [((), (), 0), ((), (drift.key,), 0)]

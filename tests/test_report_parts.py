@@ -77,6 +77,34 @@ def test_numbers_and_units_in_print() -> None:
     assert spans(((80.1, 96.44), (100.0, 101.0))) == "80.1–96.4, 100.0–101.0 s"
 
 
+def test_edges_of_numbers_in_print() -> None:
+    """Where a rounding or a form begins: each pair is the last of one and the first of the other."""
+    assert [number(x) for x in (99960.0, 999600.0, 1.23e-4, 9.99e-5)] == [
+        "100000",
+        "1.00\u2009×\u200910⁶",
+        "0.000123",
+        "9.99\u2009×\u200910⁻⁵",
+    ]
+    assert [percent(x) for x in (0.0, 4.9e-5, 5e-5, 0.0994, 0.0996)] == [
+        "0.00\u202f%",
+        "under 0.01\u202f%",
+        "0.01\u202f%",
+        "9.94\u202f%",
+        "10.0\u202f%",
+    ]
+    assert [chance(x) for x in (0.0, 0.0099, 0.01, 0.99, 0.991)] == [
+        "under 1\u202f%",
+        "under 1\u202f%",
+        "1\u202f%",
+        "99\u202f%",
+        "over 99\u202f%",
+    ]
+    nothing = float("nan")
+    assert (number(nothing), percent(float("inf")), chance(nothing), spans(())) == ("–", "–", "–", "–")
+    assert spans(tuple((k, k + 0.5) for k in range(8))).endswith("7.0–7.5 s")
+    assert spans(tuple((k, k + 0.5) for k in range(9))).endswith("7.0–7.5 s, and 1 more")
+
+
 def test_what_has_no_name_stands_below_what_has() -> None:
     title, content = missing(spelt("a < b"))[1:]
     assert title == "What is missing"

@@ -142,6 +142,25 @@ def test_what_a_recording_says_of_its_start(tmp_path):
     np.testing.assert_allclose(capture.measured.position[1:-1, 1], y[1:-1], atol=1.2e-4)
 
 
+def turned(table, rate, known=None):
+    """Columns of a turn about x at a rate [rad/s], where they are known."""
+    known = table.time >= 0 if known is None else known
+    half = 0.5 * rate * table.time
+    columns = {"w": np.cos(half), "x": np.sin(half), "y": 0.0 * half, "z": 0.0 * half}
+    return {f"quat.target.{a}": v.where(known) for a, v in columns.items()}
+
+
+def test_a_target_that_turns_although_the_model_holds_it_is_noted(tmp_path):
+    """0.1 rad/s over 2.5 s, the start a mean over the first half second: 0.225 rad, 13 degrees."""
+    table = pd.read_csv(swinging(tmp_path, "a.csv"))
+    table.assign(**turned(table, 0.1)).to_csv(tmp_path / "b.csv", index=False)
+    (capture,) = load_captures(load_model(written(tmp_path, PLAIN)), [tmp_path / "b.csv"])
+    assert any("the target turned by 13 deg" in note and "give [capture] inertia" in note for note in capture.notes)
+    rotating = written(tmp_path, PLAIN + "[capture]\ninertia = [0.1, 0.1, 0.1]\n", "turns.toml")
+    (capture,) = load_captures(load_model(rotating), [tmp_path / "b.csv"])
+    assert not any("turned" in note for note in capture.notes)
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -150,6 +169,7 @@ def test_what_a_recording_says_of_its_start(tmp_path):
         (lambda t: t[::10], "a sample every 0.1 s"),
         (lambda t: t.assign(**{"angle.ring": 0.5}), "ring open"),
         (lambda t: t.assign(**{"pos.target.x": t["pos.target.x"].where(t.time > 0.6)}), "no sample in the first"),
+        (lambda t: t.assign(**turned(t, 0.0, t.time > 0.6)), "quat.target has no sample in the first 0.5 s"),
     ],
 )
 def test_a_recording_that_cannot_be_used_is_named(tmp_path, change, words):
