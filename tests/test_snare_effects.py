@@ -5,7 +5,7 @@ import pytest
 
 from snarelab.errors import InputError
 from snarelab.models.snare.drive import ring_motion
-from snarelab.models.snare.line import LINE_SIZE, line_pull, line_slope
+from snarelab.models.snare.line import DAMPING, LINE_SIZE, STIFFNESS, line_pull, line_slope
 from snarelab.models.snare.model import SnareModel
 from snarelab.models.snare.parameters import SnareParameters
 from snarelab.models.snare.ring_drive import RingDrive
@@ -16,6 +16,7 @@ P = SnareParameters()
 FAR = (0.6, 0.3, 0.0)
 """Out of the cables' reach [m]."""
 GRAVITY, LENGTH, CLEARANCE = 9.81, 2.0, 5e-3
+STILL = (0.0, 0.0, 0.0)
 
 
 def held_open(_time):
@@ -33,7 +34,7 @@ def hung_line(clearance, stiffness=2000.0, weight=245.0):
 def test_inside_its_clearance_a_line_pulls_nowhere_sideways():
     line = hung_line(CLEARANCE)
     for aside in (0.0, 0.2, 0.5, 0.7):
-        force, _ = line_pull(line, (-LENGTH, aside * CLEARANCE, 0.0))
+        force, _, _ = line_pull(line, (-LENGTH, aside * CLEARANCE, 0.0), STILL)
         assert force[0] == pytest.approx(245.0, rel=1e-5)
         # The corner is rounded over a tenth of the clearance; a pendulum would pull by 245 N/2 m times the distance.
         assert abs(force[1]) <= 0.02 * 245.0 / LENGTH * CLEARANCE
@@ -43,7 +44,7 @@ def test_beyond_it_the_line_swings_about_the_rim():
     line = hung_line(CLEARANCE)
     for aside in (3.0, 10.0):
         y = aside * CLEARANCE
-        force, _ = line_pull(line, (-LENGTH, 0.6 * y, 0.8 * y))
+        force, _, _ = line_pull(line, (-LENGTH, 0.6 * y, 0.8 * y), STILL)
         past = y - CLEARANCE
         reach = np.hypot(LENGTH, past)
         tension = 2000.0 * (reach - (LENGTH - 245.0 / 2000.0))
@@ -57,10 +58,37 @@ def test_the_line_stores_what_it_takes():
     slopes = np.empty((3, 3))
     for point in rng.normal(size=(20, 3)) * [0.01, 0.008, 0.008] - [LENGTH, 0, 0]:
         steps = 1e-6 * np.eye(3)
-        energies = [line_pull(line, tuple(point + s))[1] - line_pull(line, tuple(point - s))[1] for s in steps]
-        np.testing.assert_allclose(line_pull(line, tuple(point))[0], -np.array(energies) / 2e-6, atol=1e-4)
-        line_slope(line, tuple(point), slopes)
+        energies = [np.diff([line_pull(line, tuple(point + x), STILL)[1] for x in (-s, s)])[0] for s in steps]
+        np.testing.assert_allclose(line_pull(line, tuple(point), STILL)[0], -np.array(energies) / 2e-6, atol=1e-4)
+        line_slope(line, tuple(point), STILL, slopes)
         np.testing.assert_allclose(slopes, slopes.T, atol=1e-2)  # a force with an energy: to the differences' rounding
+
+
+def test_a_line_damps_by_the_rate_of_its_own_length_only():
+    """f(v) − f(0) is along −∂l/∂u, and takes c l̇² of power, l̇ by differences along the path."""
+    line, rng = hung_line(CLEARANCE), np.random.default_rng(3)
+    line[DAMPING] = 40.0
+    for point in rng.normal(size=(20, 3)) * [0.01, 0.008, 0.008] - [LENGTH, 0, 0]:
+        velocity = rng.normal(size=3)
+        ahead, behind = (line_pull(line, tuple(point + t * velocity), STILL)[1] for t in (1e-6, -1e-6))
+        rate = (np.sqrt(2 * ahead / line[STIFFNESS]) - np.sqrt(2 * behind / line[STIFFNESS])) / 2e-6
+        moving, still = (np.array(line_pull(line, tuple(point), tuple(v))[0]) for v in (velocity, 0 * velocity))
+        assert (moving - still) @ velocity == pytest.approx(-40.0 * rate**2, rel=1e-5)
+        np.testing.assert_allclose(np.cross(moving - still, still), 0.0, atol=1e-9 * np.linalg.norm(still) ** 2)
+
+
+@pytest.mark.parametrize("clearance", [0.0, CLEARANCE])
+def test_a_suspended_target_bounces_down_by_its_damping_with_and_without_play(clearance):
+    """x = v/ω_d exp(−δt) sin(ω_d t), δ = c/(2m): the line carries all of it, play is sideways."""
+    speed, stiffness, damping = -0.02, 800.0, 40.0
+    target = Target(
+        "spring", position=FAR, velocity=(speed, 0, 0), stiffness=stiffness, damping=damping, clearance=clearance
+    )
+    history = SnareModel(P, target, drive=held_open).run(2.0, every=0.05)
+    decay = damping / (2 * target.mass)
+    rate = np.sqrt(stiffness / target.mass - decay**2)
+    expected = speed / rate * np.exp(-decay * history.times) * np.sin(rate * history.times)
+    np.testing.assert_allclose(history.target_position[:, 0] - FAR[0], expected, atol=1e-3 * abs(speed) / rate)
 
 
 @pytest.mark.parametrize("support", ["spring", "pendulum"])

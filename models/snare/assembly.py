@@ -19,7 +19,7 @@ from .engine import exudyn, items
 from .forces import MOST_CONTACTS, MOST_CROSSINGS, system_forces, system_jacobian
 from .geometry import N_CABLES
 from .law import law_constants
-from .line import CLEARANCE, DOWN, FREE_LENGTH, LINE_SIZE, LOCAL, STIFFNESS, TAUT, TOP
+from .line import CLEARANCE, DAMPING, DOWN, FREE_LENGTH, LINE_SIZE, LOCAL, STIFFNESS, TAUT, TOP
 from .parameters import SnareParameters
 from .pin import pin_cylinders
 from .target import Target
@@ -215,6 +215,7 @@ class Assembly:
             stiffness = TAUT if target.support == "pendulum" else target.stiffness
             self.line[STIFFNESS], self.line[CLEARANCE] = stiffness, target.clearance
             self.line[FREE_LENGTH] = target.line_length - target.mass * strength / stiffness
+            self.line[DAMPING] = 0.0 if target.support == "pendulum" else target.damping
             self.line[DOWN], self.line[TOP], self.line[LOCAL] = gravity / strength, above, local
         elif target.support == "pendulum":
             system.AddObject(items.DistanceConstraint(markerNumbers=[top, foot], distance=target.line_length))

@@ -80,7 +80,7 @@ def system_forces(q, rates, fixed, moving):
     add_damping(positions, velocities, n_elements, size, law[DAMPING], forces)
     if line[0] > 0.0:
         arm = rotate(pin[3:6], (line[9], line[10], line[11]))
-        pull, _ = line_pull(line, add(row(pin, 0), arm))
+        pull, _, _ = line_pull(line, add(row(pin, 0), arm), add(row(pin, 1), cross(row(pin, 2), arm)))
         push, moment = add(push, pull), add(moment, cross(arm, pull))
     for k in range(min(n_pin, 3)):
         result[n_cables + k] = push[k]
@@ -111,20 +111,23 @@ def system_jacobian(q, rates, fixed, moving, factor, rate_factor):
         count = add_bearing_jacobian(positions, n_elements, friction, rate_factor, triplets, count)
         count = add_damping_jacobian(positions, n_elements, size, law[DAMPING], rate_factor, triplets, count)
     if line[0] > 0.0:
-        count = _add_line_jacobian(q.size - n_pin, pin, line, factor, triplets, count)
+        count = _add_line_jacobian(q.size - n_pin, pin, line, factors, triplets, count)
     return triplets[:count].copy()
 
 
 @compiled
-def _add_line_jacobian(first, pin, line, factor, triplets, count):
-    """Append those of −factor ∂f/∂q for the target's position; what its turning changes matters to no result."""
+def _add_line_jacobian(first, pin, line, factors, triplets, count):
+    """Append those for the target's position; what its turning changes matters to no result."""
     slopes = np.empty((3, 3))
-    line_slope(line, add(row(pin, 0), rotate(pin[3:6], (line[9], line[10], line[11]))), slopes)
+    arm = rotate(pin[3:6], (line[9], line[10], line[11]))
+    point, velocity = add(row(pin, 0), arm), add(row(pin, 1), cross(row(pin, 2), arm))
+    line_slope(line, point, velocity, slopes)
+    _, _, longer = line_pull(line, point, velocity)
     for i in range(3):
         for k in range(3):
             triplets[count, 0] = first + i
             triplets[count, 1] = first + k
-            triplets[count, 2] = -factor * slopes[i, k]
+            triplets[count, 2] = -factors[0] * slopes[i, k] + factors[1] * line[12] * longer[i] * longer[k]
             count += 1
     return count
 

@@ -167,7 +167,7 @@ class Recorder:
             energy += 0.5 * target.umbilical * float(np.sum((a.pin[0] - target.position) ** 2))
         if target.clearance:
             arm = rotation @ a.line[LOCAL]
-            energy += line_pull(a.line, tuple(a.pin[0] + arm))[1]
+            energy += line_pull(a.line, tuple(a.pin[0] + arm), (0.0, 0.0, 0.0))[1]
         elif target.support == "spring":
             local = np.asarray(target.hang_point) if target.rotates else np.zeros(3)
             line = np.linalg.norm(a.hang_top - a.pin[0] - rotation @ local)
