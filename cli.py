@@ -139,7 +139,6 @@ def _identify(given: argparse.Namespace) -> None:
 
 def _diagnose(given: argparse.Namespace) -> None:
     from .identification.diagnose import diagnose
-    from .identification.report.page import write_report
     from .identification.search.next_experiment import next_experiment
     from .models.model_file import load_model
     from .models.model_write import save_model
@@ -163,6 +162,8 @@ def _diagnose(given: argparse.Namespace) -> None:
     if planned:
         write_recording(planned.motion, given.next_experiment)
     if given.report:
+        from .identification.report.page import write_report  # it draws, which takes half a second to load
+
         write_report(found, given.report)
     if given.save_model:
         save_model(answer.model, given.save_model, f"{found.sentence}\nsnarelab diagnose {__version__}")

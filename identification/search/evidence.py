@@ -41,6 +41,13 @@ class Channel:
     noise: Array
     block: NDArray[np.int_]
 
+    @cached_property
+    def rows(self) -> list[tuple[int, slice]]:
+        """Runs of samples in one block, each with the block's number."""
+        edges = np.flatnonzero(np.diff(self.block)) + 1
+        starts, stops = np.concatenate([[0], edges]), np.concatenate([edges, [len(self.block)]])
+        return [(int(self.block[a]), slice(int(a), int(b))) for a, b in zip(starts, stops, strict=True)]
+
 
 @dataclass(frozen=True)
 class Products:
@@ -54,6 +61,11 @@ class Products:
     """(B, k): Cᵀy."""
     nulls: Array
     """(k, R): Cᵀ of R sign-flipped noises."""
+
+    def only(self, columns: NDArray[np.int_]) -> "Products":
+        """Those of some of the columns."""
+        own = self.own[:, columns[:, None], columns]
+        return Products(own, self.cross[:, :, columns], self.right[:, columns], self.nulls[columns])
 
 
 @dataclass(frozen=True)
@@ -90,7 +102,7 @@ class Evidence:
         self.energy = np.zeros(n_blocks)
         noise = np.zeros((n_parameters, n_blocks))
         for c in channels:
-            for b, rows in self._rows(c):
+            for b, rows in c.rows:
                 x = c.columns[rows]
                 self.matrix[b][np.ix_(c.index, c.index)] += x.T @ x
                 self.right[b, c.index] += x.T @ c.residual[rows]
@@ -102,11 +114,6 @@ class Evidence:
         self._fitted = self._total.solve(self.right.sum(0))
         self._null_fitted = self._total.solve(self.nulls)
 
-    def _rows(self, c: Channel) -> list[tuple[int, slice]]:
-        edges = np.flatnonzero(np.diff(c.block)) + 1
-        starts, stops = np.concatenate([[0], edges]), np.concatenate([edges, [len(c.block)]])
-        return [(int(c.block[a]), slice(int(a), int(b))) for a, b in zip(starts, stops, strict=True)]
-
     def products(self, columns: Sequence[tuple[int, Array]]) -> Products:
         """Sums for a candidate given as (channel number, whitened columns (n, k)), same k on every channel."""
         k = columns[0][1].shape[1]
@@ -116,13 +123,25 @@ class Evidence:
         noise = np.zeros((k, self.n_blocks))
         for number, values in columns:
             c = self.channels[number]
-            for b, rows in self._rows(c):
+            for b, rows in c.rows:
                 part = values[rows]
                 own[b] += part.T @ part
                 cross[b, c.index] += c.columns[rows].T @ part
                 right[b] += part.T @ c.residual[rows]
                 noise[:, b] += part.T @ c.noise[rows]
         return Products(own, cross, right, noise @ self.signs)
+
+    def side_by_side(
+        self, columns: Sequence[tuple[int, Array]], p: Products, others: Mapping[int, Array], q: Products
+    ) -> Products:
+        """Sums for columns with others after them, from what each has alone."""
+        between = np.zeros((self.n_blocks, p.own.shape[1], q.own.shape[1]))
+        for number, values in columns:
+            for b, rows in self.channels[number].rows:
+                between[b] += values[rows].T @ others[number][rows]
+        own = np.block([[p.own, between], [between.transpose(0, 2, 1), q.own]])
+        cross, right = (np.concatenate(x, axis=-1) for x in ((p.cross, q.cross), (p.right, q.right)))
+        return Products(own, cross, right, np.concatenate([p.nulls, q.nulls]))
 
     def gain(
         self, p: Products, low: Array, high: Array, least: float | None = None, counted: int | None = None

@@ -1,7 +1,8 @@
 """A candidate before the evidence: on which samples it is judged, beside what, and what they say of it."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -41,19 +42,31 @@ class Case:
     beside: "Case | None" = None
 
     @property
+    def _n_own(self) -> int:
+        return len(self.low) - (0 if self.beside is None else len(self.beside.low))
+
+    @property
     def own(self) -> Products:
         """Of the candidate's columns alone."""
-        k = len(self.low) - (0 if self.beside is None else len(self.beside.low))
-        p = self.products
-        return Products(p.own[:, :k, :k], p.cross[:, :, :k], p.right[:, :k], p.nulls[:k])
+        return self.products.only(np.arange(self._n_own))
+
+    def only(self, columns: NDArray[np.int_]) -> "Case":
+        """The candidate with some of its columns, and all that stand beside them."""
+        if len(columns) == self._n_own:
+            return self
+        kept = np.concatenate([columns, np.arange(self._n_own, len(self.low))])
+        return replace(self, products=self.products.only(kept), low=self.low[kept], high=self.high[kept])
 
     def gain(self) -> Gain:
         """Log-likelihood gained by the candidate, and the amplitudes of all columns (k,)."""
         if self.beside is None:
-            return self.evidence.gain(self.products, self.low, self.high)
-        own = len(self.low) - len(self.beside.low)
-        whole = self.evidence.gain(self.products, self.low, self.high, ABSORBED, own)
+            return self._plain_gain
+        whole = self.evidence.gain(self.products, self.low, self.high, ABSORBED, self._n_own)
         return replace(whole, total=whole.total - self.beside.gain().total)
+
+    @cached_property
+    def _plain_gain(self) -> Gain:
+        return self.evidence.gain(self.products, self.low, self.high)
 
     def share(self) -> float:
         """Share of the innovations' energy that the candidate explains, 0 to 1."""
@@ -158,10 +171,16 @@ class Samples:
     whiten: Callable[[int, Sequence[Array]], Array]
     plain: Callable[[int, Sequence[Array]], Array]
     beside: Mapping[int, Parts]
+    store: dict[Hashable, tuple[dict[int, Array], Case]] = field(default_factory=dict, repr=False)
+    """Of the columns beside candidates, what was made of them."""
 
     def case(self, variant: Bounded, columns: Mapping[int, Parts]) -> Case:
         """A candidate's columns on whitened samples."""
-        return self._case(self.evidence, self.whiten, variant, columns)
+        return self.cases([(variant, columns)])[0]
+
+    def cases(self, candidates: Sequence[tuple[Bounded, Mapping[int, Parts]]]) -> list[Case]:
+        """The same of candidates that reach the same channels; all at once costs little more than one."""
+        return self._cases(self.evidence, self.whiten, candidates)
 
     def alone(self) -> "Samples":
         """The same samples with nothing beside a candidate."""
@@ -169,30 +188,47 @@ class Samples:
 
     def explained(self, variant: Bounded, columns: Mapping[int, Parts]) -> float:
         """Share of the plain residual's energy that a candidate explains, 0 to 1."""
-        case = self._case(self.raw, self.plain, variant, columns)
+        (case,) = self._cases(self.raw, self.plain, [(variant, columns)])
         energy = sum(float(np.sum(self.raw.channels[c].residual ** 2)) for c in columns)
         if case.beside is not None:
             energy -= 2 * case.beside.gain().total
         return 2 * case.gain().total / max(energy, 1e-300)
 
-    def _case(
+    def _cases(
         self,
         evidence: Evidence,
         bring: Callable[[int, Sequence[Array]], Array],
-        variant: Bounded,
-        columns: Mapping[int, Parts],
-    ) -> Case:
-        own = {c: bring(c, parts) for c, parts in columns.items()}
-        if not self.beside:
-            return Case(evidence, evidence.products(list(own.items())), variant.low, variant.high, tuple(own))
-        others = {c: bring(c, self.beside[c]) for c in columns}
-        zero = np.zeros(next(iter(others.values())).shape[1])
-        beside = Case(evidence, evidence.products(list(others.items())), zero, zero + np.inf, tuple(own))
-        products = evidence.products([(c, np.hstack([own[c], others[c]])) for c in own])
-        low, high = np.concatenate([variant.low, zero]), np.concatenate([variant.high, zero + np.inf])
-        return Case(evidence, products, low, high, tuple(own), beside)
+        candidates: Sequence[tuple[Bounded, Mapping[int, Parts]]],
+    ) -> list[Case]:
+        reached = tuple(candidates[0][1])
+        own = []
+        for c in reached:
+            parts = zip(*(columns[c] for _, columns in candidates), strict=True)
+            own.append((c, bring(c, [np.concatenate(x, axis=1) for x in parts])))
+        low, high = (np.concatenate([getattr(v, side) for v, _ in candidates]) for side in ("low", "high"))
+        whole = Case(evidence, evidence.products(own), low, high, reached)
+        if self.beside:
+            others, beside = self._others(evidence, bring, reached)
+            products = evidence.side_by_side(own, whole.products, others, beside.products)
+            low, high = np.concatenate([low, beside.low]), np.concatenate([high, beside.high])
+            whole = Case(evidence, products, low, high, reached, beside)
+        ends = np.cumsum([len(v.low) for v, _ in candidates])
+        return [whole.only(np.arange(end - len(v.low), end)) for (v, _), end in zip(candidates, ends, strict=True)]
+
+    def _others(
+        self, evidence: Evidence, bring: Callable[[int, Sequence[Array]], Array], reached: tuple[int, ...]
+    ) -> tuple[dict[int, Array], Case]:
+        """Columns that stand beside a candidate, and what they explain alone."""
+        key = (evidence is self.raw, reached)
+        if key not in self.store:
+            others = {c: bring(c, self.beside[c]) for c in reached}
+            zero = np.zeros(next(iter(others.values())).shape[1])
+            products = evidence.products(list(others.items()))
+            self.store[key] = others, Case(evidence, products, zero, zero + np.inf, reached)
+        return self.store[key]
 
     def foreseen(self, variant: Bounded, columns: Mapping[int, Parts], spread: float) -> float:
         """The same share in blocks that were not fitted to; may be negative."""
         energy = sum(float(np.sum(self.raw.channels[c].residual ** 2)) for c in columns)
-        return float(2 * np.sum(self._case(self.raw, self.plain, variant, columns).fresh_gains(spread)) / energy)
+        (case,) = self._cases(self.raw, self.plain, [(variant, columns)])
+        return float(2 * np.sum(case.fresh_gains(spread)) / energy)

@@ -121,6 +121,7 @@ class _Judge:
     def __init__(self, ground: Grounds) -> None:
         self._ground = ground
         self._log_size = np.log(ground.asked.evidence.size)
+        self._prices: dict[bytes, float] = {}
 
     def free(self, variant: Variant) -> tuple[str, ...]:
         """Names of the parameters that a variant has."""
@@ -129,29 +130,37 @@ class _Judge:
 
     def __call__(self, samples: Samples, options: Sequence[Option], null: Null | None = None) -> Judged | None:
         """The best point of an effect's grid and set of amplitudes; None where no point gains anything."""
-        best: tuple[float, float, Variant, Array, Case, dict[int, Parts]] | None = None
+        best: tuple[float, float, int, NDArray[np.int_], Array, Case] | None = None
+        cases = samples.cases(options)
         for subset in options[0][0].subsets():
-            price = 0.5 * self._log_size * len(self.free(_with(options[0][0], subset)))
-            for whole, columns in options:
-                variant = _with(whole, subset)
-                own = {c: [x[:, subset] for x in parts] for c, parts in columns.items()}
-                case = samples.case(variant, own)
+            price = self._price(_with(options[0][0], subset))
+            for number, whole in enumerate(cases):
+                case = whole.only(subset)
                 gain = case.gain()
                 if gain.total <= 0:
                     continue
                 if best is None or gain.total - price > best[0]:
-                    best = (gain.total - price, price, variant, gain.amplitudes[: len(subset)], case, own)
+                    best = (gain.total - price, price, number, subset, gain.amplitudes[: len(subset)], case)
                 if null is not None:
-                    null.enter(tuple(own), samples.evidence.null_gains(case.own) - price)
+                    null.enter(case.reached, samples.evidence.null_gains(case.own) - price)
         if best is None:
             return None
-        score, price, variant, amplitudes, case, own = best
+        score, price, number, subset, amplitudes, case = best
+        variant = _with(options[number][0], subset)
+        own = {c: [x[:, subset] for x in parts] for c, parts in options[number][1].items()}
         columns = {c: self._ground.noise.whiten(c, parts) for c, parts in own.items()}
         explained = samples.explained(variant, own)
         everywhere = self._ground.readings.everywhere.columns
         return Judged(
             variant, variant.placed, amplitudes, score, price, explained, tuple(own), case, columns, everywhere
         )
+
+    def _price(self, variant: Variant) -> float:
+        """What a gain with so many parameters pays; the same all over an effect's grid."""
+        key = variant.amplitudes.tobytes()
+        if key not in self._prices:
+            self._prices[key] = 0.5 * self._log_size * len(self.free(variant))
+        return self._prices[key]
 
     def beyond_noise(self, j: Judged, samples: Samples, reading: Reading) -> float:
         """Share of its joint's own residual that a drive explains, less what the encoders' noise may account for."""
