@@ -184,7 +184,7 @@ def free_parameters(assembly: Assembly, experiment: Experiment, state: Evaluatio
     parameters = variant.parameters.copy()
     parameters[variant.amplitudes] = 1.0
     terms, _ = _terms(assembly, experiment, state, placed, parameters)
-    moves = np.sum([np.sum(columns**2, axis=0) for _, _, columns in terms], axis=0) > 0
+    moves = np.any([np.any(columns, axis=0) for _, _, columns in terms], axis=0)
     amplitudes = {p.name for p in placed.effect.parameters if _is_linear(p) and len(variant.amplitudes)}
     on = {placed.effect.parameters[i].name for i in variant.amplitudes}
     return tuple(
