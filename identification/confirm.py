@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 CONFIRM = 0.05
 """An effect is confirmed if the held-out residual energy of its channels, in motion, rises by this share when it is
-taken out."""
+taken out, and that over all samples rises too."""
 
 SURE = 2.0
 """Standard deviations from zero that one of an effect's amplitudes must have: two names that can swap what they explain
@@ -97,7 +97,8 @@ def _missed(
     adds = channel_rms(assembly, locked, carry(final, assembly))[0]
     if _energy(adds - with_it, c, final) <= LEAST * _energy(with_it, c, final):
         return _Missed(0.0, trial, rest)
-    if not _known(final, t):
+    # Nor is a name confirmed that leaves the recording as a whole no better.
+    if not _known(final, t) or _energy(rms, c, final) <= _energy(with_it, c, final):
         return _Missed(0.0, trial, rest)
     # A joint at rest holds what it is given: there, only laws for what happens at rest can be missed.
     moving_with, moving_without = (channel_rms(x.assembly, in_motion, x.theta)[0] for x in (final, rest))
@@ -116,7 +117,7 @@ def _missed(
         # What was named for leaving little near rest must still do so, now that the others are there.
         floor, after, before = (_energy(x, c, final) for x in (moving_with, with_it, rms))
         most = (before - after) / max(after - floor, LEAST * after) * (1 - MOST) / MOST
-        # In motion as well, it must be missed over all samples: fits with and without it do not weigh them alike.
+        # Over all samples it must be missed as much: fits with and without it do not weigh them alike.
         rises = [min(rise(with_it, rms), max(most, rises[0]))]
     return _Missed(max(rises), trial, rest)
 

@@ -218,7 +218,7 @@ def reliably_positive(gains: Array, errors: float = 2.0) -> bool:
         return True
     # Wilcoxon's test drops zeros; with any among them SciPy would go through all signs one by one.
     moved = gains[gains != 0]
-    return bool(0 < len(moved) and len(gains) <= FEW and wilcoxon(moved, alternative="greater")[1] < norm.sf(errors))
+    return bool(len(moved) > 0 and len(gains) <= FEW and wilcoxon(moved, alternative="greater")[1] < norm.sf(errors))
 
 
 def _saturated(along: Readings, pool: Sequence[Sequence[Option]]) -> list[Array]:
