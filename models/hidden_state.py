@@ -57,7 +57,7 @@ class _Built(NamedTuple):
     """X = [x; dx/dp by rows] is what a sample hands to the next."""
 
     signals: tuple[str, ...]  # those that law and rate read
-    law: SampleFunction  # (*signals, X, p) -> value, total d/dp, and d/dthrough if any
+    law: SampleFunction  # (*signals, X, p) -> value, total d/dp unless bare, and d/dthrough if any
     rate: SampleFunction | None  # (*signals, x, p) -> rate, d/dx, d/dp
     step: SampleFunction | None  # (X, *signals, *signals a sample later, [p; h]) -> X a sample later
 
@@ -108,7 +108,7 @@ def simulate_states(
     InputError
         If a signal is missing or does not fit the others, or there is no steady state to start from.
     """
-    built = _build(effect)
+    built = _build(effect, False)
     p = np.asarray(parameters, dtype=float)
     rows = _carried(effect, built, _signals(effect, built, inputs), p, dt)
     n_x = len(effect.states)
@@ -116,7 +116,12 @@ def simulate_states(
 
 
 def evaluate_law(
-    effect: Effect, inputs: Mapping[str, np.ndarray], parameters: np.ndarray, dt: float | None = None
+    effect: Effect,
+    inputs: Mapping[str, np.ndarray],
+    parameters: np.ndarray,
+    dt: float | None = None,
+    *,
+    bare: bool = False,
 ) -> Evaluation:
     """Values of an effect's law along samples, with derivatives.
 
@@ -130,23 +135,28 @@ def evaluate_law(
         In the effect's order, absolute values in SI units.
     dt : float, optional
         Time between samples [s]; an effect with states needs it.
+    bare : bool
+        Of an effect with states, leave out the derivatives by its parameters, which take most of the time:
+        ``by_parameter`` has no columns then.
 
     Raises
     ------
     InputError
         If a signal is missing or does not fit the others, or there is no steady state to start from.
     """
-    built = _build(effect)
+    bare = bare and bool(effect.states)
+    built = _build(effect, bare)
     signals, p = _signals(effect, built, inputs), np.asarray(parameters, dtype=float)
     carried = np.zeros(0)
     if effect.states:
         if dt is None:
             raise ValueError(f"{effect.name} has states: dt is needed")
-        carried = _carried(effect, built, signals, p, dt)
+        carried = _carried(effect, built, signals, p, dt, bare)
     if not built.signals:  # a constant reads nothing that says how many samples there are
         p = np.tile(p, (len(next(iter(inputs.values()))), 1))
-    values, by_parameter, *by_signal = built.law(*signals, carried, p)
-    return Evaluation(values[:, :, 0], by_parameter, by_signal[0] if by_signal else None)
+    values, *slopes = built.law(*signals, carried, p)
+    by_parameter = np.zeros((*values.shape[:2], 0)) if bare else slopes.pop(0)
+    return Evaluation(values[:, :, 0], by_parameter, slopes[0] if slopes else None)
 
 
 @cache
@@ -167,7 +177,7 @@ def reads(effect: Effect) -> tuple[str, ...]:
 def prepare(effects: Iterable[Effect]) -> None:
     """Compile effects ahead of their first use, several at a time; what is in the cache already costs milliseconds."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        list(pool.map(_build, effects))
+        list(pool.map(_build, *zip(*((e, bare) for e in effects for bare in {False, bool(e.states)}), strict=True)))
 
 
 def _signals(effect: Effect, built: _Built, inputs: Mapping[str, np.ndarray]) -> list[np.ndarray]:
@@ -180,14 +190,17 @@ def _signals(effect: Effect, built: _Built, inputs: Mapping[str, np.ndarray]) ->
     return [array[:, None] if array.ndim == 1 else array for array in arrays]
 
 
-def _carried(effect: Effect, built: _Built, signals: list[np.ndarray], p: np.ndarray, dt: float) -> np.ndarray:
-    """States and sensitivities, stacked as the step hands them on (n_samples, n_x + n_x * n_p)."""
+def _carried(
+    effect: Effect, built: _Built, signals: list[np.ndarray], p: np.ndarray, dt: float, bare: bool = False
+) -> np.ndarray:
+    """States and, unless bare, sensitivities, stacked as the step hands them on (n_samples, n_x + n_x * n_p)."""
     if built.step is None:
         raise ValueError(f"{effect.name} has no states")
+    count = len(effect.states) * (1 if bare else 1 + len(p))
     if effect.from_zero:
-        start = np.zeros(len(effect.states) * (1 + len(p)))
+        start = np.zeros(count)
     else:
-        start = _steady_state(effect, built, [signal[:1] for signal in signals], p)
+        start = _steady_state(effect, built, [signal[:1] for signal in signals], p)[:count]
     here, later = [signal[:-1] for signal in signals], [signal[1:] for signal in signals]
     return built.step.scan(start, *here, *later, np.append(p, dt))
 
@@ -217,13 +230,13 @@ def _named(effect: Effect, x: ca.SX, p: ca.SX) -> tuple[dict[str, ca.SX], dict[s
 
 
 @cache
-def _build(effect: Effect) -> _Built:
+def _build(effect: Effect, bare: bool) -> _Built:
     p, x, all_signals, law, rate = _symbols(effect)
-    sensitivity = ca.SX.sym("S", x.numel(), p.numel())
+    sensitivity = ca.SX.sym("S", x.numel(), 0 if bare else p.numel())
     signals = {name: all_signals[name] for name in reads(effect)}
     names, u = tuple(signals), list(signals.values())
     through = all_signals.get(THROUGH.get(effect.at, ""))
-    outputs = [law, ca.jacobian(law, p) + ca.jacobian(law, x) @ sensitivity]
+    outputs = [law] if bare else [law, ca.jacobian(law, p) + ca.jacobian(law, x) @ sensitivity]
     if through is not None and any(ca.which_depends(law, through, 1, False)):
         outputs.append(ca.jacobian(law, through))
     law_function = _compiled(effect, "law", [*u, _stacked(x, sensitivity), p], outputs, [*names, "states", "p"])
@@ -247,7 +260,9 @@ def _step(
     else:
         f = ca.Function("f", [x, u, p], [rate, ca.jacobian(rate, x), ca.jacobian(rate, u)])
         next_x = ros2(lambda state, read: f(state, read, p), x, u, next_u, h)
-    next_sensitivity = ca.jacobian(next_x, x) @ sensitivity + ca.jacobian(next_x, p)
+    next_sensitivity = sensitivity  # of no columns: bare
+    if sensitivity.numel():
+        next_sensitivity = ca.jacobian(next_x, x) @ sensitivity + ca.jacobian(next_x, p)
     inputs = [_stacked(x, sensitivity), *signals.values(), *later.values(), ca.vertcat(p, h)]
     names = ["states", *signals, *later, "p_and_h"]
     return _compiled(effect, "step", inputs, [_stacked(next_x, next_sensitivity)], names)

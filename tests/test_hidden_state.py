@@ -265,12 +265,26 @@ def test_threads_share_effects():
 def test_prepared_effects_need_no_compiler_later(rebuilt, tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     prepare([DELAY, SPRING, get_effect("viscous_friction")])
-    assert len(list((tmp_path / "snarelab").iterdir())) == 3 + 3 + 1  # law, rate and step of those with states
+    # Law, rate and step of those with states, law and step without derivatives; a law alone of the other.
+    assert len(list((tmp_path / "snarelab").iterdir())) == 5 + 5 + 1
     monkeypatch.setenv("SNARELAB_CC", "none")
     compiled._notify.cache_clear()
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         evaluate_law(DELAY, everything(DELAY), usual(DELAY), 0.005)
+        evaluate_law(DELAY, everything(DELAY), usual(DELAY), 0.005, bare=True)
+
+
+@pytest.mark.parametrize("name", effects())
+def test_a_law_without_derivatives_has_the_same_values(name):
+    effect = get_effect(name)
+    inputs, parameters = everything(effect), usual(effect)
+    full, bare = (evaluate_law(effect, inputs, parameters, 0.005, bare=x) for x in (False, True))
+    np.testing.assert_allclose(bare.values, full.values, rtol=0, atol=1e-12 * np.abs(full.values).max())
+    assert (bare.by_signal is None) == (full.by_signal is None)
+    if full.by_signal is not None:
+        np.testing.assert_allclose(bare.by_signal, full.by_signal, rtol=1e-12, atol=1e-12)
+    assert bare.by_parameter.shape[2] == (0 if effect.states else len(effect.parameters))
 
 
 def test_signals_of_different_lengths_are_said():

@@ -32,6 +32,7 @@ def contributions(
     speed_scale: float,
     parameters: Array,
     early_alone: bool,
+    bare: bool = False,
 ) -> tuple[list[tuple[int, Array, Array]], Array | None, Callable[[Array], Array] | None]:
     """What one placed effect adds to the torque channels.
 
@@ -51,6 +52,8 @@ def contributions(
         All of the effect's parameters.
     early_alone : bool
         Whether a late encoder makes its own channel early, and that alone.
+    bare : bool
+        Leave out the derivative by the parameters of an effect with hidden states: (n, 0).
 
     Returns
     -------
@@ -68,10 +71,10 @@ def contributions(
         return [(c, columns[:, c] @ change, columns[:, c] @ by_parameter) for c in range(columns.shape[1])], None, None
     if isinstance(tree, Rig) and effect.at in ("sling", "boom"):
         read = rig_signals(experiment, tree, effect, placed.at)
-        values, by_parameter, _ = _by_segment(experiment, effect, read, parameters)
+        values, by_parameter, _ = _by_segment(experiment, effect, read, parameters, bare)
         return rig_terms(experiment, tree, effect, placed.at, values, by_parameter), None, None
     if effect.at == "base":
-        values, by_parameter, _ = _by_segment(experiment, effect, base_signals(experiment), parameters)
+        values, by_parameter, _ = _by_segment(experiment, effect, base_signals(experiment), parameters, bare)
         # What the effect gives to the base, nothing else has to supply.
         return [(c, -values[:, c], -by_parameter[:, c]) for c in rows(effect)], None, None
     signals = {
@@ -91,7 +94,8 @@ def contributions(
         direction = slice(None, None, -1) if encoder else slice(None)
 
         def sensed(value: Array) -> tuple[Array, Array, Array | None]:
-            found, by, by_value = _by_segment(experiment, effect, signals | {"value": value}, parameters, direction)
+            inputs = signals | {"value": value}
+            found, by, by_value = _by_segment(experiment, effect, inputs, parameters, bare, direction)
             return found[:, 0] - value, by[:, 0], by_value
 
         if encoder and not early_alone:
@@ -105,7 +109,7 @@ def contributions(
         return terms, None, _passed(experiment, effect, parameters, by_value, direction)
     if effect.states:
         signals["inertia"] = experiment.mass_matrix[:, joint, joint]
-    values, by_parameter, by_load = _by_segment(experiment, effect, signals, parameters)
+    values, by_parameter, by_load = _by_segment(experiment, effect, signals, parameters, bare)
     if isinstance(tree, Rig) and effect.at == "slide":
         return rig_terms(experiment, tree, effect, placed.at, values, by_parameter), None, None
     if effect.acts_on == "torque":
@@ -147,6 +151,7 @@ def _by_segment(
     effect: Effect,
     signals: dict[str, Array],
     parameters: Array,
+    bare: bool,
     direction: slice = slice(None),
 ) -> tuple[Array, Array, Array | None]:
     """The law over all samples; one with hidden states starts afresh, at rest, in every segment."""
@@ -156,7 +161,7 @@ def _by_segment(
     parts = []
     for segment in experiment.motion.segments:
         inputs = {name: x[segment][direction] for name, x in signals.items()}
-        values, by_parameter, _ = evaluate_law(effect, inputs, parameters, period)
+        values, by_parameter, _ = evaluate_law(effect, inputs, parameters, period, bare=bare)
         parts.append((values[direction], by_parameter[direction]))
     values, by_parameter = (np.concatenate(x) for x in zip(*parts, strict=True))
     return values, by_parameter, None

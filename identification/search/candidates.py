@@ -150,7 +150,7 @@ def candidate_columns(
         key = ("candidate", placed.key, variant.parameters.tobytes(), variant.amplitudes.tobytes())
         if key in experiment.store:
             return [(joint, experiment.store[key])]
-    terms, by_load = _terms(assembly, experiment, state, placed, variant.parameters)
+    terms, by_load = _terms(assembly, experiment, state, placed, variant.parameters, not len(variant.amplitudes))
     found = []
     for channel, values, columns in terms:
         own = columns[:, variant.amplitudes] if len(variant.amplitudes) else values[:, None]
@@ -164,13 +164,18 @@ def candidate_columns(
 
 
 def _terms(
-    assembly: Assembly, experiment: Experiment, state: Evaluation, placed: Placed, parameters: Array
+    assembly: Assembly,
+    experiment: Experiment,
+    state: Evaluation,
+    placed: Placed,
+    parameters: Array,
+    bare: bool = False,
 ) -> tuple[list[tuple[int, Array, Array]], Array | None]:
     """What an effect adds beside the model as evaluated, and its derivative by the joint's load."""
     joint = assembly.joint_of(placed)
     load, reading, speed = state.load[:, joint], state.tau[:, joint], assembly.speed_scales[joint]
     terms, by_load, _ = contributions(
-        experiment, assembly.tree, placed, joint, load, reading, speed, parameters, assembly.early_alone
+        experiment, assembly.tree, placed, joint, load, reading, speed, parameters, assembly.early_alone, bare
     )
     return terms, by_load
 
