@@ -270,6 +270,7 @@ def test_the_residual_stands_against_speed_and_position_in_their_units():
     # At either sign of speed one of the two recordings is +2 and the other -2.
     assert mean[1][np.isfinite(mean[1])] == pytest.approx(0.0, abs=0.35)
     assert len(lines(position)) == 4
+    assert position.get_ylim() == speed.get_ylim()
     low, high = speed.get_ylim()
     assert (low, high) == pytest.approx((-2.5 - 0.5, 2.5 + 0.5))
 
