@@ -259,10 +259,25 @@ def test_a_wide_bands_noise_floor_is_what_is_above_four_tenths_of_the_rate():
     assert answer._noise_floor([e], fit([0, 0, 0])) == pytest.approx([1.0] * 3, rel=0.07)
 
 
+def test_a_noise_floor_is_what_the_model_leaves_from_twice_the_band_on():
+    """Modelled is a torque a thousand times as loud. Of 8 to 32 Hz the noise is loud up to 21 Hz, in 13 of 24: the
+    median has 11 quiet ones below it, and 1 / 26 of the loud: of their exponential law's mean -ln(1 - 1 / 13)."""
+    n = 8192
+    rng = np.random.default_rng(2)
+    spectrum = np.fft.rfft(rng.normal(size=(n, 3)), axis=0)
+    spectrum[np.fft.rfftfreq(n, 1 / RATE) > 21] *= 1e-3
+    modelled = 1e3 * rng.normal(size=(n, 3))
+    e = experiment(np.fft.irfft(spectrum, n, axis=0) + modelled)
+    e = replace(e, motion=replace(e.motion, band=4.0))
+    final: Any = SimpleNamespace(assembly=SimpleNamespace(torque=lambda *_: modelled), theta=None)
+    wanted = np.sqrt(4 / 32 * -np.log(1 - 1 / 13) / np.log(2))
+    assert answer._noise_floor([e], final) == pytest.approx([wanted] * 3, rel=0.2)
+
+
 def test_a_floating_bases_noise_floor_is_its_momentums(monkeypatch):
     monkeypatch.setattr(answer, "n_carriers", lambda _: 2)
     monkeypatch.setattr(answer, "momentum_floor", lambda _: np.array([7.0, 8.0]))
-    floors = answer._noise_floor([noisy([1.0, 1.0, 1.0])], fit([0, 0, 0]))
+    floors = answer._noise_floor([noisy([1.0, 1.0, 1.0])] * 2, fit([0, 0, 0]))
     assert floors[:2].tolist() == [7.0, 8.0]
     assert floors[2] == pytest.approx(np.sqrt(4 / 32), rel=0.07)
 

@@ -184,7 +184,7 @@ def test_places_stand_by_the_share_that_is_told_of_each_channel(monkeypatch):
     names = ("joint1", "joint2")
     motions = [motion(np.zeros((n, 2)), np.ones((n, 2)), joints=names) for n in (3, 2)]
     runs = [replace(run(m.q, m.tau, joint=1, joints=names), load=np.arange(len(m.time)) + 5.0) for m in motions]
-    steps = (fit(residual=[1, 2, 3, 4, 5]), fit(residual=[1, 1, 1, 1, 1]))
+    steps = (fit(residual=[1, 2, 3, 4, 5]), fit(residual=[9] * 5), fit(residual=[1, 1, 1, 1, 1]))
     links = [link(), link(joint="joint2", runs=runs, steps=steps, proofs=(proof(GAIN),))]
     places = tuple(Location(f"tau.joint{k}", 0.5, (), "") for k in (2, 1, 3))
     said = replace(TORQUES, location=places)

@@ -1,5 +1,6 @@
 """Link encoders: how sure a name is against its rivals, and where effects that the model has already start from."""
 
+from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
@@ -57,6 +58,32 @@ def test_three_rivals_probabilities_add_up_to_one_and_stand_in_order():
     assert named.margin + sum(odds) == pytest.approx(1.0, rel=1e-12)
     assert odds == sorted(odds, reverse=True)
     assert all(odd > 0 for odd in odds)
+
+
+@pytest.mark.parametrize(("score", "counted"), [(20.0, False), (20.1, True)])
+def test_what_scores_a_fifth_of_the_best_is_no_rival(score, counted):
+    named = _weigh(trial(0, [50.0, 50.0], 100.0), [trial(1, [5.0, 5.0], score)], plain(), 0)
+    assert len(named.rivals) == counted
+    assert named.margin == pytest.approx(1 - (0.5 / (BOOTSTRAPS + 1) if counted else 0))
+
+
+def test_what_is_paid_for_parameters_counts_in_every_bootstrap():
+    """Each block gains the same, 10 and 11 in all: the dearer by 2 never wins, the dearer by half a one always."""
+    for price, margin in ((3.0, BOOTSTRAPS + 0.5), (1.5, 0.5)):
+        rival = replace(trial(1, [5.5, 5.5], 9.0), price=price)
+        named = _weigh(trial(0, [5.0, 5.0], 9.0), [rival], plain(), 0)
+        assert named.margin == pytest.approx(margin / (BOOTSTRAPS + 1))
+
+
+@pytest.mark.parametrize(("cosine", "separable"), [(0.97, True), (0.99, False), (-1.0, True)])
+def test_what_explains_the_same_is_not_told_apart_though_it_never_wins(cosine, separable):
+    """What each explains is its part of a residual of ones: along the first axis, and at this cosine to it."""
+    other = np.array([cosine, np.sqrt(1 - cosine**2), 0.0])
+    best, rival = trial(0, [9.0, 7.0], 16.0), trial(1, [4.0, 3.0], 7.0)
+    rival = replace(rival, fit=replace(rival.fit, residual=1.0 - 3 * other))
+    ((_, probability, told),) = _weigh(best, [rival], plain(), 1).rivals
+    assert probability < 0.05
+    assert told is separable
 
 
 def test_an_effect_given_without_values_starts_at_its_usual_ones_in_the_joints_own_scale(monkeypatch):

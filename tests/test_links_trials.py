@@ -1,8 +1,6 @@
 """The encoders' search, part by part: grids, blocks, curves, what is foreseen and what is held against chance."""
 
 from itertools import pairwise
-from types import SimpleNamespace
-from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -10,7 +8,7 @@ from encoder_pairs import RATE, pair, placed, run
 
 from snarelab.identification.links import search
 from snarelab.identification.links.pair import PairFit, fit_pair
-from snarelab.identification.links.search import Trial, library, search_pair
+from snarelab.identification.links.search import library, search_pair
 from snarelab.identification.search.noise import Whitener
 
 N = 256
@@ -265,63 +263,51 @@ def test_the_search_names_what_is_there_and_stops():
     assert searched.whiten.sigma == pytest.approx(1e-3, rel=0.1)
 
 
-def scripted(monkeypatch, scores):
-    """A search whose trials have these scores, by round and effect; what is not there does not pass. Their keys."""
-    rounds: list[list[str]] = []
-
-    def trial(_pair, candidate, found, *_):
-        number = len(found.placed) - found.placed.count(DRIFT)
-        rounds.extend([] for _ in range(number + 1 - len(rounds)))
-        rounds[number].append(candidate.key)
-        score = scores[number].get(candidate.key) if number < len(scores) else None
-        fit = SimpleNamespace(placed=(*found.placed, candidate), theta=np.append(found.theta, 1.0))
-        made: Any = Trial(candidate, fit, np.zeros(1), 1.0, score or 0.0, 0.5, score is not None)  # pyright: ignore
-        return made
-
-    def fitted(_pair, effects, theta, *_):
-        return SimpleNamespace(placed=tuple(effects), theta=theta)
-
-    monkeypatch.setattr(search, "_trial", trial)
-    monkeypatch.setattr(search, "fit_pair", fitted)
-    monkeypatch.setattr(search, "_noise", lambda *_: PLAIN)
-    monkeypatch.setattr(search, "_weigh", lambda best, others, *_: (best.placed.key, [t.placed.key for t in others]))
-    return rounds
-
-
-LATE, SPRING, PLAY = (x.key for x in (placed("sensor_delay", "q_link.joint1"), *library(pair())[4:]))
-MOTOR = "sensor_delay.q.joint1"
+def test_the_noise_is_learnt_from_what_every_candidate_and_curve_together_leave(monkeypatch):
+    """Columns: the fit's own, each candidate's value and slopes in the middle of its grid, and the curves."""
+    seen = []
+    monkeypatch.setattr(search, "whitener", lambda *given: seen.append(given) or ("found", None))
+    t = np.arange(N) / RATE
+    both = pair(run(np.sin(3 * t), 0.1 * t, load=np.cos(t)), run(np.cos(2 * t), 0.2 * t, load=np.sin(t)))
+    first = fit_pair(both, [], np.zeros(2))
+    late = placed("sensor_delay", "q_link.joint1")
+    assert search._noise(both, first, [GAIN, late]) == "found"
+    ((residual, columns, segments),) = seen
+    assert residual is first.residual
+    assert segments == (slice(0, N), slice(N, 2 * N))
+    q = np.r_[np.sin(3 * t), np.cos(2 * t)]
+    np.testing.assert_allclose(columns[:, :2], np.repeat(np.eye(2), N, axis=0))
+    np.testing.assert_allclose(columns[:, 2:4], np.stack([0 * q, q], 1), atol=1e-12)
+    # The fifth of eight delays is 5 ms: so late a wave is known in closed form, and lines between samples are within (3 / 64)² / 12.
+    delayed = np.r_[np.sin(3 * (t - 0.005)) - np.sin(3 * t), np.cos(2 * (t - 0.005)) - np.cos(2 * t)]
+    late_rows = np.r_[20:N, N + 20 : 2 * N]
+    np.testing.assert_allclose(columns[late_rows, 4], delayed[late_rows], atol=2e-4)
+    np.testing.assert_allclose(columns[:, 6:], search.smooth(both))
 
 
-def test_a_special_case_goes_first_and_a_second_delay_is_never_tried(monkeypatch):
-    """Play scores most, but contains the spring; the spring named, play goes next. Rivals stand in order of score."""
-    scores = [{PLAY: 90.0, SPRING: 50.0, LATE: 70.0, GAIN.key: 60.0}, {PLAY: 40.0, SPRING: 30.0}, {PLAY: 20.0}, {}]
-    rounds = scripted(monkeypatch, scores)
-    searched = search_pair(pair(run(WAVE, 0 * WAVE)), [], np.zeros(0), 1)
-    assert list(searched.named) == [(LATE, [GAIN.key, SPRING]), (SPRING, []), (PLAY, [])]
-    assert rounds[0] == [p.key for p in library(pair())]
-    assert rounds[1] == [GAIN.key, DRIFT.key, SPRING, PLAY]  # neither delay again
-    assert rounds[2] == [GAIN.key, DRIFT.key, PLAY]
-    assert [t.placed.key for t in searched.opening] == rounds[0]
-    assert [t.score for t in searched.opening][:3] == [0.0, 70.0, 60.0]
+def test_a_trial_starts_from_the_best_of_its_grid_and_ends_between_its_points():
+    """A delay of 13.7 ms, between grid points of 10 and 20 ms, of a wave that has one in closed form."""
+    n = 640
+    t = np.arange(n) / RATE
+
+    def q(t):
+        return np.sin(3 * t) + 0.3 * np.sin(11 * t)
+
+    one = noisy(q(t - 0.0137) - q(t), sigma=1e-4, n=n, q=q(t))
+    noise = Whitener(np.zeros(0), 1e-4, 12)
+    trial, _, _ = tried(one, placed("sensor_delay", "q_link.joint1"), noise)
+    assert trial.fit.theta[0] == pytest.approx(0.0137, rel=0.01)
+    assert trial.explained > 0.99
+    assert trial.price == pytest.approx(0.5 * np.log(n - 12))
 
 
-def test_what_is_barred_is_tried_but_not_taken_and_what_is_given_is_not_tried(monkeypatch):
-    """Of two recordings that differ by 1 and 3 on average: the start is the given drift's value, then these zeros."""
-    rounds = scripted(monkeypatch, [{LATE: 70.0, GAIN.key: 60.0}, {}])
-    both = pair(run(WAVE, 1 + 0 * WAVE), run(WAVE, 3 + 0 * WAVE))
-    searched = search_pair(both, [DRIFT], np.array([0.25]), 1, [LATE])
-    assert [key for key, _ in cast(Any, searched.named)] == [GAIN.key]
-    assert rounds[0] == [MOTOR, LATE, GAIN.key, SPRING, PLAY]
-    assert searched.first.theta.tolist() == [0.25, 1.0, 3.0]
-    assert searched.bar == pytest.approx(np.log(5 * 200))
-
-
-def test_the_search_ends_after_eight_rounds(monkeypatch):
-    """Of six effects at most five can be named at once; here the barred ones make no difference, so a vocabulary of
-    nine is put in."""
-    names = ("coulomb_friction", "viscous_friction", "quadratic_friction", "torque_ripple", "sensor_gain")
-    pool = [placed(name, "joint1") for name in names]
-    pool += [placed(name, "joint1") for name in ("sensor_bias", "sensor_drift", "sensor_delay", "joint_elasticity")]
-    monkeypatch.setattr(search, "library", lambda _: pool)
-    scripted(monkeypatch, [{p.key: 50.0 for p in pool}] * 12)
-    assert len(search_pair(pair(run(WAVE, 0 * WAVE)), [], np.zeros(0), 1).named) == 8
+def test_every_parameter_that_moves_the_fit_is_paid_for():
+    """A stiff spring and a damper that ring with the load: both are seen, and both cost."""
+    n = 640
+    t = np.arange(n) / RATE
+    load = 8 * np.sin(0.5 * t) + 8 * np.sign(np.sin(4 * t))
+    spring = placed("joint_elasticity", "joint1")
+    twist = run(t, 0 * t, load=load).term(spring, np.array([1000.0, 60.0]))[0]
+    trial, _, _ = tried(noisy(twist, sigma=1e-5, n=n, load=load), spring, Whitener(np.zeros(0), 1e-5, 0))
+    np.testing.assert_allclose(trial.fit.theta[:2], [1000.0, 60.0], rtol=0.02)
+    assert trial.price == pytest.approx(np.log(n))

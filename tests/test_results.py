@@ -1,7 +1,7 @@
 """How results print and show themselves in a notebook, and what they pass on, from small invented answers."""
 
 import re
-from dataclasses import replace
+from dataclasses import FrozenInstanceError, replace
 from html import unescape
 from types import SimpleNamespace
 from typing import Any
@@ -154,3 +154,11 @@ def test_a_report_is_written_of_the_diagnosis(monkeypatch):
     monkeypatch.setattr(results, "write_report", lambda *given: seen.append(given))
     DiagnosisResult(SAID, MODEL).write_report("report.html")
     assert seen == [(SAID, "report.html")]
+
+
+@pytest.mark.parametrize(("result", "name"), [(DiagnosisResult(SAID, MODEL), "model"), (IDENTIFIED, "condition")])
+def test_a_result_cannot_be_changed(result, name):
+    with pytest.raises(FrozenInstanceError):
+        setattr(result, name, None)
+    with pytest.raises(FrozenInstanceError):
+        setattr(KNOWN, "value", 0.0)  # noqa: B010  what a type checker would refuse
