@@ -278,7 +278,7 @@ def test_the_noise_is_learnt_from_what_every_candidate_and_curve_together_leave(
     q = np.r_[np.sin(3 * t), np.cos(2 * t)]
     np.testing.assert_allclose(columns[:, :2], np.repeat(np.eye(2), N, axis=0))
     np.testing.assert_allclose(columns[:, 2:4], np.stack([0 * q, q], 1), atol=1e-12)
-    # The fifth of eight delays is 5 ms: so late a wave is known in closed form, and lines between samples are within (3 / 64)² / 12.
+    # The fifth of eight delays is 5 ms; straight lines between samples are within (3 / 64)² / 8 of a wave.
     delayed = np.r_[np.sin(3 * (t - 0.005)) - np.sin(3 * t), np.cos(2 * (t - 0.005)) - np.cos(2 * t)]
     late_rows = np.r_[20:N, N + 20 : 2 * N]
     np.testing.assert_allclose(columns[late_rows, 4], delayed[late_rows], atol=2e-4)

@@ -315,6 +315,14 @@ def test_a_card_has_the_effects_name_probability_parameters_and_no_rivals_said()
     ]
     assert "<p>Seen.</p>\n" in content
     assert '<p class="quiet">No rival explanation is left.</p>' in content
+    assert re.findall('<t[hd][^>]*class="n"[^>]*>([^<]*)', content) == [
+        "Value",
+        "Std",
+        "7.01",
+        "± 0.04",
+        "2.0",
+        "± 0.5",
+    ]
     bare = findings._card(Finding("x", "y", 0.5, 0.5, {}, "", (Rival("backlash", "j", 0.25, True, ""),)))
     assert "Parameters" not in bare
     assert "<h3>X at y</h3>" in bare
