@@ -318,3 +318,11 @@ def test_a_sample_that_is_missing_on_either_side_is_no_point():
     np.testing.assert_array_equal(lines(figure.axes[0])[0][1], np.arange(3, 1276) - 1.0)
     empty = drawn(curves.residual_curves([trace(measured=np.full(1281, np.nan))], False))
     assert lines(empty.axes[0]) == []
+
+
+def test_a_channel_that_is_known_only_where_nothing_moves_has_no_points():
+    """The coordinate moves in its second half, where nothing is measured: one bin of no width could not be filled."""
+    moves = np.concatenate([np.zeros(20), np.linspace(0, 1, 20)])
+    known = np.where(np.arange(40) < 20, 1.0, np.nan)
+    one = trace(measured=known, speed=moves, position=moves, before=np.zeros(40), after=np.zeros(40), time=moves)
+    assert all(not axes.collections for axes in drawn(curves.residual_curves([one], True)).axes)

@@ -145,6 +145,12 @@ def test_four_pictures_at_most_are_open_and_those_that_did_not_change_are_folded
     assert re.findall(r"<summary>(.*?)</summary>", below) == ([label] if label else [])
 
 
+def test_a_channel_that_got_worse_is_open_beside_those_that_got_better():
+    content = fit._open_and_folded([(True, "[better]"), (False, "[as before]"), (True, "[worse]")])
+    assert content.startswith("[better][worse]<details>")
+    assert "[as before]" in content
+
+
 MISFIT = ChannelFit("a", "N*m", Misfit(4, 3, 0.4, 0.3), Misfit(8, 2, 0.8, 0.2), 0.125)
 
 

@@ -68,7 +68,7 @@ def binned(coordinate: Array, residual: Array, bins: int = _BINS) -> tuple[Array
 def _curve(axes: Axes, coordinate: Array, residual: Array, colour: str, label: str) -> None:
     finite = np.isfinite(coordinate) & np.isfinite(residual)
     coordinate, residual = coordinate[finite], residual[finite]
-    if coordinate.size == 0:
+    if not _moves(coordinate):
         return
     some = np.linspace(0, coordinate.size - 1, min(_POINTS, coordinate.size)).astype(int)
     axes.plot(

@@ -178,9 +178,10 @@ def _rms(signal: Array) -> float:
 
 def _open_and_folded(pictures: Sequence[tuple[bool, str]]) -> str:
     """Pictures of the channels that changed (of any, where none did) open, four at most; the others folded."""
+    ordered = sorted(pictures, key=lambda p: not p[0])
     open_ones = min(_OPEN, sum(changed for changed, _ in pictures) or _OPEN)
     rest = len(pictures) - open_ones
-    markup = [picture for _, picture in pictures]
+    markup = [picture for _, picture in ordered]
     label = f"{rest} more channel{'s' if rest > 1 else ''}"
     return "".join(markup[:open_ones]) + folded(label, "".join(markup[open_ones:]))
 
