@@ -93,6 +93,7 @@ class Searched:
     ("costs", "tried", "reached", "best"),
     [
         ([5, 5, 5], 3, 3, 0),
+        ([0, 0, 0], 3, 3, 0),
         ([5, 7, 5, 6, 5], 5, 3, 0),
         ([5, 5, 3, 3, 3], 5, 3, 2),  # those that were best before no longer count
         ([1.0, 1.0009, 1.0009], 3, 3, 0),  # a thousandth is none
