@@ -1,0 +1,270 @@
+"""Candidates by hand: which effects are tried where, grids of shapes, sets of columns, and starting values."""
+
+from types import SimpleNamespace as Made
+from typing import Any
+
+import numpy as np
+import pytest
+
+from snarelab.identification.search import candidates as module
+from snarelab.identification.search.candidates import (
+    Variant,
+    candidate_columns,
+    free_parameters,
+    has_whole_law,
+    library,
+    refines,
+    variants,
+    widens,
+)
+from snarelab.models.effect import Parameter
+from snarelab.models.effects import effects, get_effect
+from snarelab.models.model import Placed
+from snarelab.models.tree import Joint, Link, Tree
+
+AXIS, TURNS = np.array([0.0, 0.0, 1.0]), np.eye(3)
+
+
+def variant(name, amplitudes, parameters=None, at="joint1"):
+    effect = get_effect(name)
+    values = np.zeros(len(effect.parameters)) if parameters is None else np.array(parameters, float)
+    size = np.zeros(len(amplitudes))
+    return Variant(Placed(effect, at), values, np.array(amplitudes, int), size, size)
+
+
+@pytest.mark.parametrize(
+    ("name", "amplitudes", "sets"),
+    [
+        ("viscous_friction", [0], [[0]]),
+        ("joint_elasticity", [], [[0]]),  # its whole contribution is the one column
+        ("stribeck_friction", [0], [[0]]),
+        ("harness_stiffness", [0, 1], [[0], [0, 1]]),  # a torque at zero alone would be a bias
+        ("com_offset", [0, 1, 2], [[0], [1], [2], [0, 1], [0, 2], [1, 2], [0, 1, 2]]),
+        # A place says nothing without the mass.
+        (
+            "payload_mass",
+            [0, 1, 2, 3],
+            [[0], *([0, k] for k in (1, 2, 3)), [0, 1, 2], [0, 1, 3], [0, 2, 3], [0, 1, 2, 3]],
+        ),
+        ("inertia_error", range(10), [*([k] for k in range(10)), list(range(10))]),  # too many for every set
+        ("wheel_friction", range(6), [list(range(6))]),  # none of them alone
+    ],
+)
+def test_columns_are_tried_alone_and_together_or_in_every_set(name, amplitudes, sets):
+    assert [s.tolist() for s in variant(name, list(amplitudes)).subsets()] == sets
+
+
+@pytest.mark.parametrize(
+    ("name", "amplitudes", "parameters", "found", "start"),
+    [
+        ("stribeck_friction", [0], [0.0, 0.3], [2.5], [2.5, 0.3]),
+        ("joint_elasticity", [], [300.0, 2.0], [1.4], [300.0, 2.0]),
+        ("payload_mass", [0, 1, 2, 3], [1.0, 0, 0, 0], [2.0, 1.0, -0.4, 0.0], [2.0, 0.5, -0.2, 0.0]),
+        ("payload_mass", [0, 1, 2, 3], [1.0, 0, 0, 0], [0.0, 1.0, -0.4, 0.0], [0.0, 1.0, -0.4, 0.0]),  # no mass
+        ("harness_stiffness", [0, 1], [0.0, 0.0], [3.0, 6.0], [3.0, 6.0]),
+    ],
+)
+def test_a_start_has_the_amplitudes_found_and_places_by_their_mass(name, amplitudes, parameters, found, start):
+    made = variant(name, amplitudes, parameters)
+    np.testing.assert_allclose(made.start(np.array(found)), start)
+    np.testing.assert_array_equal(made.parameters, parameters)
+
+
+def assembly(**scales) -> Any:
+    """Scales by the word that a parameter refers to them; bounds ten times its own."""
+    return Made(
+        scale=lambda _placed, x: scales.get(x.relative_to, 1.0),
+        bounds=lambda _placed, x: (10 * x.low, 10 * x.high),
+        joint_of=lambda _: 1,
+        speed_scales=[5.0, 7.0],
+        tree=None,
+        early_alone=False,
+    )
+
+
+def test_a_grid_is_every_combination_of_shapes_in_the_joints_scale():
+    found = variants(assembly(rate=2.0), Placed(get_effect("joint_elasticity"), "joint1"))
+    stiffness, damping = (10, 30, 100, 300, 1000, 3000), (0.01, 0.1, 1.0)
+    np.testing.assert_allclose([v.parameters for v in found], [(2.0 * k, 2.0 * d) for k in stiffness for d in damping])
+    assert {(v.low.tolist()[0], v.high.tolist()[0], len(v.amplitudes)) for v in found} == {(0.0, 1.6, 0)}
+    found = variants(assembly(speed=4.0), Placed(get_effect("stribeck_friction"), "joint1"))
+    np.testing.assert_allclose([v.parameters for v in found], [(0.0, 4.0 * x) for x in (0.01, 0.03, 0.1, 0.3)])
+    assert [v.amplitudes.tolist() for v in found] == 4 * [[0]]
+    assert (found[0].low[0], found[0].high[0]) == (0.0, np.inf)
+
+
+def shape(name, n):
+    return Parameter(name, "1", "", grid=tuple(float(k) for k in range(1, n + 1)))
+
+
+@pytest.mark.parametrize(("sizes", "step"), [((6, 6), 1), ((37,), 2), ((72,), 2), ((73,), 3), ((10, 10), 3)])
+def test_a_grid_finer_than_thirty_six_points_is_thinned_evenly(sizes, step):
+    effect: Any = Made(parameters=tuple(shape(f"s{k}", n) for k, n in enumerate(sizes)))
+    found = variants(assembly(), Placed(effect, "joint1"))
+    whole = list(np.ndindex(*sizes))
+    np.testing.assert_allclose([v.parameters - 1 for v in found], whole[::step])
+
+
+def test_the_place_of_a_mass_has_its_slope_at_one_kilogram():
+    (only,) = variants(assembly(), Placed(get_effect("payload_mass"), "link1"))
+    np.testing.assert_array_equal(only.parameters, [1.0, 0.0, 0.0, 0.0])
+    assert only.amplitudes.tolist() == [0, 1, 2, 3]
+    np.testing.assert_array_equal(only.low, [0.0, -10.0, -10.0, -10.0])
+    np.testing.assert_array_equal(only.high, [np.inf, 10.0, 10.0, 10.0])
+
+
+def test_several_masses_have_slopes_of_all_of_them_and_of_each_alone():
+    masses = [Parameter(f"mass_{a}", "kg", "") for a in "xy"]
+    places = [Parameter(f"place_{a}", "m", "", grid=(0.0,)) for a in "xy"]
+    effect: Any = Made(parameters=(*masses, *places, shape("frequency", 2)))
+    found = [v.parameters.tolist() for v in variants(assembly(), Placed(effect, "base"))]
+    wanted = [[1, 1, 0, 0], [1, 0, 0, 0], [0, 1, 0, 0]]
+    assert found == [[*row, f] for f in (1.0, 2.0) for row in wanted]
+
+
+def arm(*given, inertia="fixed") -> Any:
+    """Two joints, and effects as (name, place, held parameters ...)."""
+    joints = tuple(Joint(f"joint{k + 1}", "revolute", AXIS, k - 1, TURNS, AXIS) for k in range(2))
+    links = tuple(Link(f"link{k + 1}", np.arange(1.0, 11.0)) for k in range(2))
+    tree = Tree("arm", joints, links, np.zeros(3))
+    placed = tuple(Placed(get_effect(name), at, tuple(hold)) for name, at, *hold in given)
+    return Made(effects=placed, joints=("joint1", "joint2"), tree=tree, inertia=inertia)
+
+
+def keys(model):
+    found = [p.key for p in library(model)]
+    assert len(found) == len(set(found))
+    return set(found)
+
+
+def test_every_effect_is_tried_at_every_place_that_has_it_not():
+    whole = keys(arm())
+    at_joints = {f"{e.name}.joint{k}" for e in effects().values() if e.at == "joint" for k in (1, 2)}
+    at_links = {f"{e.name}.link{k}" for e in effects().values() if e.at == "link" for k in (1, 2)}
+    sensors = {f"{e.name}.tau.joint{k}" for e in effects().values() if e.at == "sensor" for k in (1, 2)}
+    assert whole == at_joints | at_links | sensors | {"sensor_delay.q.joint1", "sensor_delay.q.joint2"}
+    assert keys(arm(inertia="free")) == whole - at_links
+    assert keys(arm(("viscous_friction", "joint2"))) == whole - {"viscous_friction.joint2"}
+
+
+@pytest.mark.parametrize("late", ["tau.joint1", "q.joint1"])
+def test_of_a_late_torque_and_a_late_encoder_one_alone_is_tried(late):
+    """Either makes the joint's torque late against its motion, or early."""
+    gone = keys(arm()) - keys(arm(("sensor_delay", late)))
+    assert gone == {"sensor_delay.tau.joint1", "sensor_delay.q.joint1"}
+
+
+def test_slides_of_the_first_joint_are_its_friction():
+    gone = keys(arm()) - keys(arm(("slide_friction", "joint1")))
+    names = ("makkar_friction", "viscous_friction", "coulomb_friction", "stribeck_friction")
+    assert gone == {f"{name}.joint1" for name in names}
+    assert keys(arm(("slide_friction", "joint2"))) == keys(arm())
+
+
+def test_a_whole_law_of_friction_is_free_in_every_parameter():
+    law, held = ("makkar_friction", "joint1"), ("makkar_friction", "joint2", "viscous")
+    model = arm(law, held, ("slide_friction", "joint2", "viscous"), ("viscous_friction", "joint2"))
+    assert has_whole_law(model.effects, "joint1")
+    assert not has_whole_law(model.effects, "joint2")
+    assert has_whole_law(arm(("slide_friction", "joint2")).effects, "joint2")
+    refined = {
+        e.name
+        for e in effects().values()
+        if e.at == "joint" and refines(model, Placed(e, "joint1")) and not refines(model, Placed(e, "joint2"))
+    }
+    shapes = {"makkar_friction", "viscous_friction", "coulomb_friction", "stribeck_friction"}
+    assert refined == shapes | {"quadratic_friction"}
+
+
+def test_an_effect_widens_what_it_contains_at_the_same_link():
+    model = arm(("payload_mass", "link1"), ("joint_elasticity", "joint1"))
+    assert widens(model, Placed(get_effect("inertia_error"), "link1"))
+    assert not widens(model, Placed(get_effect("inertia_error"), "link2"))
+    assert not widens(model, Placed(get_effect("com_offset"), "link1"))
+    assert not widens(model, Placed(get_effect("backlash"), "joint1"))  # a joint's spring is no link's
+
+
+VALUES, COLUMNS = np.array([1.0, 2.0]), np.array([[3.0, 4.0], [5.0, 6.0]])
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """`contributions` answered with one channel's term, and what it was asked with; a derivative by load if told."""
+    calls, answer = [], {"by_load": None, "columns": COLUMNS}
+
+    def given(_e: Any, _tree: Any, placed: Any, joint: Any, *more: Any) -> Any:
+        calls.append((placed.key, joint, *more))
+        return [(3, VALUES, answer["columns"])], answer["by_load"], None
+
+    monkeypatch.setattr(module, "contributions", given)
+    return calls, answer
+
+
+def experiment() -> Any:
+    return Made(store={}, to_band=lambda x, channel: 10.0 * x + channel)
+
+
+def state(**passed) -> Any:
+    return Made(load=np.array([[0, 1], [0, 2]]), tau=np.array([[0, 8], [0, 9]]), passed=passed.get("on", {}))
+
+
+def test_columns_of_the_amplitudes_or_the_whole_law_in_the_band(asked):
+    calls, _ = asked
+    ((channel, found),) = candidate_columns(assembly(), experiment(), state(), variant("harness_stiffness", [1]))
+    assert channel == 3
+    np.testing.assert_array_equal(found, [[43.0], [63.0]])
+    ((_, found),) = candidate_columns(assembly(), experiment(), state(), variant("joint_elasticity", []))
+    np.testing.assert_array_equal(found, [[13.0], [23.0]])
+    _, joint, load, reading, speed, parameters, early_alone = calls[0]
+    assert (joint, load.tolist(), reading.tolist(), speed, early_alone) == (1, [1, 2], [8, 9], 7.0, False)
+    assert parameters.tolist() == [0.0, 0.0]
+
+
+def test_sensors_that_the_model_has_see_a_joints_torque_but_not_one_anothers_change(asked):
+    del asked
+    halved = state(on={3: [lambda x: x / 2, lambda x: x + 1]})
+    ((_, found),) = candidate_columns(assembly(), experiment(), halved, variant("harness_stiffness", [0]))
+    np.testing.assert_array_equal(found, [[10 * 2.5 + 3], [10 * 3.5 + 3]])
+    sensor = variant("sensor_gain", [0], at="tau.joint1")
+    ((_, found),) = candidate_columns(assembly(), experiment(), halved, sensor)
+    np.testing.assert_array_equal(found, [[33.0], [53.0]])
+
+
+@pytest.mark.parametrize(
+    ("name", "amplitudes", "by_load", "sensed", "asked_twice"),
+    [
+        ("harness_stiffness", [0], None, False, False),
+        ("harness_stiffness", [0], VALUES, False, True),  # it changes with the model
+        ("harness_stiffness", [0], None, True, True),
+        ("joint_elasticity", [], None, False, True),  # hidden states follow the load
+        ("payload_mass", [0], None, False, True),
+    ],
+)
+def test_columns_that_nothing_changes_are_kept(asked, name, amplitudes, by_load, sensed, asked_twice):
+    calls, answer = asked
+    answer["by_load"] = by_load
+    e, own = experiment(), assembly()
+    now = state(on={1: [lambda x: x]}) if sensed else state()
+    one, two = (candidate_columns(own, e, now, variant(name, amplitudes)) for _ in range(2))
+    assert len(calls) == (2 if asked_twice else 1)
+    np.testing.assert_array_equal(one[0][1], two[0][1])
+    if not asked_twice:
+        assert two[0][0] == 1  # the joint's own channel
+        for other in (variant(name, [1]), variant(name, [0], [1.0, 0.0])):
+            candidate_columns(own, e, now, other)
+        assert len(calls) == 3
+
+
+def test_parameters_count_if_they_move_the_torque_once_the_amplitudes_are_on(asked):
+    calls, answer = asked
+    # The spring's rest torque is an amplitude that is not switched on; without a derivative none counts.
+    found = free_parameters(assembly(), experiment(), state(), variant("harness_stiffness", [0]))
+    assert found == ("stiffness",)
+    assert calls[0][5].tolist() == [1.0, 0.0]
+    assert free_parameters(assembly(), experiment(), state(), variant("stribeck_friction", [0])) == ("level", "speed")
+    assert free_parameters(assembly(), experiment(), state(), variant("joint_elasticity", [])) == (
+        "stiffness",
+        "damping",
+    )
+    answer["columns"] = COLUMNS * [1.0, 0.0]
+    assert free_parameters(assembly(), experiment(), state(), variant("stribeck_friction", [0])) == ("level",)
