@@ -114,3 +114,12 @@ def test_every_channel_has_its_own_windows_and_rest(monkeypatch):
     assert answer[0].share == pytest.approx(26 / (22 + 32))
     moving[1][:, 1] = True
     assert list(found(monkeypatch, recordings, moving, heard=((0.0, 0.0), (0.0, 0.0)))) == [0, 1]
+
+
+@pytest.mark.parametrize(("name", "stand_in"), [("n_carriers", lambda _: 6), ("Rig", Made)])
+def test_nothing_is_said_where_every_joint_moves_what_carries_the_others(monkeypatch, name, stand_in):
+    """A floating base; a suspension."""
+    loud = [steps(*10 * [1], 4, 4)[:, None]]
+    assert list(found(monkeypatch, loud)) == [0]
+    monkeypatch.setattr(module, name, stand_in)
+    assert found(monkeypatch, loud) == {}

@@ -1,5 +1,7 @@
 """The noise model, against processes whose spectrum and innovations are known."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import scipy.signal
@@ -127,3 +129,54 @@ def test_a_recording_of_short_runs_still_has_a_noise_model(length):
     found, innovations = whitener(x, np.zeros((1200, 0)), pieces)
     assert found.sigma == pytest.approx(1.0, rel=0.15)
     assert len(innovations) == len(pieces) * (length - LONGEST)
+
+
+def autoregression(x, order, keep):
+    """Coefficients and mean square left of the samples in ``keep`` by those before them, by least squares."""
+    past = np.stack([x[keep - k - 1] for k in range(order)], 1) if order else np.zeros((len(keep), 0))
+    a = np.linalg.lstsq(past, x[keep], rcond=None)[0]
+    return a, np.mean((x[keep] - past @ a) ** 2)
+
+
+@pytest.mark.parametrize(
+    ("longest", "from_all"), [(4 * LONGEST + 1, False), (4 * LONGEST, True)], ids=["one long run", "short ones alone"]
+)
+@pytest.mark.parametrize("last", [True, False])
+def test_short_runs_are_learnt_from_only_where_there_is_no_long_one(longest, from_all, last):
+    """Runs up to four memories long count as short, wherever in the recording they stand; each gives up its head."""
+    sizes = [30, longest, LONGEST, 40][:: 1 if last else -1]
+    edges = np.cumsum([0, *sizes])
+    segments = [slice(int(a), int(b)) for a, b in pairwise(edges)]
+    x = process([0.9], n=int(edges[-1]), seed=3)
+    found, _ = whitener(x, np.zeros((len(x), 0)), segments)
+    counted = [s for s in segments if (s.stop - s.start > LONGEST if from_all else s.stop - s.start == longest)]
+    keep = np.concatenate([np.arange(s.start + LONGEST, s.stop) for s in counted])
+    a, variance = autoregression(x, len(found.coefficients), keep)
+    assert len(a) > 0
+    np.testing.assert_allclose(found.coefficients, a, rtol=1e-9)
+    assert found.sigma == pytest.approx(np.sqrt(variance), rel=1e-9)
+
+
+@pytest.mark.parametrize(("n_columns", "freedom"), [(100, 300), (350, 100)])
+def test_the_innovations_variance_is_per_degree_of_freedom_left_but_no_fewer_than_a_quarter(n_columns, freedom):
+    """Of 400 samples; a column of zeros takes no freedom. Coefficients tell the order, so that the rest follows."""
+    rng = np.random.default_rng(5)
+    columns = np.linalg.qr(rng.normal(size=(400, n_columns)))[0]
+    columns = np.column_stack([columns, np.zeros(400)])
+    y = rng.normal(size=400)
+    found, _ = whitener(y, columns, [slice(0, 400)])
+    # The ridge holds each unit amplitude by 1e-3 of what 400 samples say.
+    inner = columns[:, :-1] * np.sqrt(400)
+    noise = y - inner @ np.linalg.solve(inner.T @ inner + 1e-6 * 400 * np.eye(n_columns), inner.T @ y)
+    _, variance = autoregression(noise, len(found.coefficients), np.arange(LONGEST, 400))
+    assert found.sigma == pytest.approx(np.sqrt(variance * 400 / freedom), rel=1e-6)
+
+
+@pytest.mark.parametrize(("share", "all_count"), [(0.5, False), (0.51, True)])
+def test_where_more_than_half_is_missing_all_counts(share, all_count):
+    """White noise of unit size, and of ten in the first samples, which are missing."""
+    n = 4000
+    missing = np.arange(n) < share * n
+    x = process([], n=n, seed=8) * np.where(missing, 10.0, 1.0)
+    found, _ = whitener(x, np.zeros((n, 0)), [slice(0, n)], missing)
+    assert found.sigma == pytest.approx(np.sqrt(share * 100 + 1 - share) if all_count else 1.0, rel=0.05)
