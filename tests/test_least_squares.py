@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.optimize
 
-from snarelab.identification.fitting.least_squares import Normal, Objective, minimise
+from snarelab.identification.fitting.least_squares import Normal, Objective, _secant, bounded_step, minimise
 
 INF = np.inf
 reference: Any = scipy.optimize.least_squares
@@ -190,3 +190,39 @@ def test_running_out_of_steps_is_said():
     assert not found.settled
     assert found.steps == 8
     assert found.normal.cost < 0.5 * np.sum(rosenbrock([-1.2, 1.0]) ** 2)
+
+
+@pytest.mark.parametrize(
+    ("scale", "damping", "low", "high", "wanted"),
+    [
+        # ½ (2x² + 2xy + 2y²) - 3x - 3y is least at (1, 1).
+        ((1.0, 1.0), 0.0, (-9.0, -9.0), (9.0, 9.0), (1.0, 1.0)),
+        ((1.0, 1.0), 0.0, (-9.0, -9.0), (0.5, 9.0), (0.5, 1.25)),  # y = (3 - x) / 2
+        ((1.0, 1.0), 0.0, (2.0, -9.0), (9.0, 9.0), (2.0, 0.5)),
+        ((1.0, 1.0), 0.0, (-9.0, -9.0), (0.5, 0.7), (0.5, 0.7)),
+        ((1.0, 1.0), 3.0, (-9.0, -9.0), (9.0, 9.0), (0.5, 0.5)),  # 3 more on the diagonal: 6x = 3
+        ((2.0, 1.0), 1.0, (-9.0, -9.0), (9.0, 9.0), (6 / 17, 15 / 17)),  # 4 and 1 more: 6x + y = 3 = x + 3y
+        ((0.0, 1.0), 0.0, (-9.0, -9.0), (9.0, 9.0), (0.0, 1.5)),  # without influence it stays
+        ((1.0, 1.0), 0.0, (0.0, -9.0), (0.0, 9.0), (0.0, 1.5)),  # without room, too
+        ((0.0, 0.0), 0.0, (-9.0, -9.0), (9.0, 9.0), (0.0, 0.0)),
+    ],
+)
+def test_a_step_is_the_bounded_minimum_of_the_damped_quadratic(scale, damping, low, high, wanted):
+    here = Normal(0.0, np.array([-3.0, -3.0]), np.array([[2.0, 1.0], [1.0, 2.0]]))
+    found = bounded_step(here, np.array(scale), damping, np.array(low), np.array(high))
+    np.testing.assert_allclose(found, wanted, atol=1e-9)
+
+
+def test_the_curvature_learnt_explains_the_last_step_and_is_sized_to_it():
+    """Dennis, Gay and Welsch: afterwards it turns the step into what the normal matrix left of the gradient's change.
+    Along the third axis, of which the step says nothing, it is scaled by |3| / |20|, what it foretold."""
+    matrix, move, change = np.diag([1.0, 2.0, 5.0]), np.array([1.0, 1.0, 0.0]), np.array([4.0, 2.0, 0.0])
+    for bend, third in ((np.zeros((3, 3)), 0.0), (10.0 * np.eye(3), 1.5), (0.1 * np.eye(3), 0.1)):
+        found = _secant(bend, change, matrix, move)
+        np.testing.assert_allclose(found @ move, [3.0, 0.0, 0.0], atol=1e-12)
+        np.testing.assert_allclose(found, found.T, atol=1e-12)
+        np.testing.assert_allclose(found[2], [0.0, 0.0, third], atol=1e-12)
+    bend = np.eye(3)
+    assert _secant(bend, -change, matrix, move) is bend  # the gradient fell along the step
+    across = np.array([1.0, -1.0, 0.0])
+    assert _secant(bend, across, matrix, move) is bend
