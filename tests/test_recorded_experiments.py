@@ -48,6 +48,50 @@ def test_a_bridge_leads_over_every_channel_of_what_it_is_given():
     np.testing.assert_allclose(bridge(deep)[:, :, 1], 2 * found)
 
 
+def test_a_bridge_of_several_samples_goes_a_part_of_the_way_at_each():
+    """From 1 at sample 0 to 16 at sample 3 it is 5 a sample, in every column."""
+    bridge = Bridge(np.array([1, 2]), np.array([0, 0]), np.array([3, 3]), np.array([1 / 3, 2 / 3]))
+    x = np.arange(1.0, 5.0) ** 2
+    np.testing.assert_allclose(bridge(x), [1, 6, 11, 16])
+    np.testing.assert_allclose(bridge(np.stack([x, -x], 1)), np.stack([bridge(x), -bridge(x)], 1))
+    np.testing.assert_allclose(bridge(x[:, None, None] * np.ones((2, 3)))[:, 1, 2], [1, 6, 11, 16])
+
+
+def test_a_floating_bases_own_momentum_stands_on_the_measured_side(monkeypatch):
+    """The base is the sixth link, and the first six channels are its own: 2 there for a unit of each parameter."""
+
+    class Floating:
+        links = (*(5 * [None]), Made(phi=np.arange(1.0, 11.0)), None)
+
+    monkeypatch.setattr(module, "FloatingTree", Floating)
+    regressor = np.zeros((N, 7, 70))
+    regressor[:, :, 50:60], regressor[:, :, 60:] = 2.0, 99.0
+    e = run(np.full((N, 7), 1000.0), body=Made(tree=Floating()))
+    e.__dict__["regressor"] = regressor
+    np.testing.assert_allclose(e.carried, np.tile([*(6 * [110.0]), 0.0], (N, 1)))
+    np.testing.assert_allclose(module._balanced(e).motion.tau, 1000.0 - e.carried)
+
+
+@pytest.mark.parametrize(("measured", "excess"), [({}, 0.0), ({"left": np.full(N, 450.0)}, 50.0)])
+def test_slings_carry_the_weight_and_what_more_they_were_measured_to_pull(monkeypatch, measured, excess):
+    """Weight asks 3 and 4; a newton of the left sling, in balance at 400, takes 0.5 off the first joint."""
+
+    class Suspended:
+        slings = (Made(name="left", tension=400.0), Made(name="right", tension=300.0))
+
+    def force(_rig, sling, q):
+        assert sling.name == "left"
+        return np.tile(np.array([[9.0, 9.0, 0.5], [9.0, 9.0, 0.0]]), (len(q), 1, 1))
+
+    monkeypatch.setattr(module, "Rig", Suspended)
+    monkeypatch.setattr(module, "sling_map", force)
+    weight: Any = Made(tree=Suspended(), torque=lambda q, qd, qdd: np.tile([3.0, 4.0], (len(q), 1)) + 7 * (qd + qdd))
+    e = replace(run(np.ones((N, 2)), q=np.ones((N, 2)), qd=np.ones((N, 2)), body=weight), tension=measured)
+    np.testing.assert_allclose(e.carried, np.tile([3.0 - 0.5 * excess, 4.0], (N, 1)))
+    plain = run(np.ones((N, 2)), body=Made(tree=Made()))
+    assert not plain.carried.any()
+
+
 def test_bridges_and_samples_that_count_are_each_channels_own():
     e = run(np.arange(2.0 * N).reshape(N, 2) ** 2)
     bridges = tuple(Bridge(np.array([k]), np.array([0]), np.array([4]), np.array([0.5])) for k in (1, 2))
