@@ -75,9 +75,10 @@ class Told:
     """Draws that are known: frequencies of 2 and 1 turns in the time, falling as 1/k, sines of harmonics alone."""
 
     def __init__(self, harmonics, turns=2.0, falling=1.0):
-        self.harmonics, self.uniforms = harmonics, [turns, falling, 0.5]
+        self.harmonics, self.uniforms, self.ranges = harmonics, [turns, falling, 0.5], []
 
-    def uniform(self, _low, _high):
+    def uniform(self, low, high):
+        self.ranges.append((low, high))
         return self.uniforms.pop(0)
 
     def normal(self, size):
@@ -105,6 +106,8 @@ def test_a_motion_is_a_fourier_series_under_a_ramp_of_least_jerk():
     assert size * np.abs(wave).max() == pytest.approx(0.95, rel=1e-12)  # 1 rad either way; speed and ramp allow more
     np.testing.assert_allclose(qd, np.gradient(q, time) * (np.arange(800) % 799 > 0), atol=1e-12)
     assert motion.attrs == {"path": "next experiment", "notes": []}
+    # One to three turns of the slowest; waves that fall with none to the square of their number; a middle place.
+    assert rng.ranges == [(1.0, 3.0), (0, 2), (0.35, 0.65)]
 
 
 def test_every_joint_has_its_own_recorded_range():
@@ -197,14 +200,17 @@ def designed(monkeypatch):
         table = {"sensor_gain": sigma, "rotor_inertia": first, "harness_stiffness": second}
         return np.array(table[assembly.name]), None
 
-    def motion(*_):
+    def motion(_joints, train, duration, rate, _rng):
+        assert train == [recorded, other]
+        assert (duration, rate) == (20.0, pytest.approx(10.0))
         drawn_motions.append(xr.Dataset(coords={"time": np.arange(3.0)}, attrs={"number": len(drawn_motions)}))
         return drawn_motions[-1]
 
     time = np.array([0.0, 0.1, 0.2, 5.0])
     recorded = Made(name="recorded", motion=Made(band=3.0, time=time), store={})
+    other = Made(name="recorded", motion=Made(band=3.0, time=7 * time), store={})  # the first one's clock is taken
     parts = {
-        "load_experiments": lambda *_: [recorded],
+        "load_experiments": lambda *_: [recorded, other],
         "RigidBody": lambda tree: tree,
         "scales": lambda _: {},
         "Assembly": Model,
