@@ -110,3 +110,9 @@ def test_a_joint_that_stands_or_hangs_with_the_others_has_two_curves_alone(monke
     monkeypatch.setattr(curves, "n_carriers", lambda _: 0)
     monkeypatch.setattr(curves, "Rig", Made)
     assert list(nameless_columns(several, states, 0)) == [TOGETHER, SPEED]
+
+
+def test_one_recording_alone_has_the_same_curves():
+    several, states = random_runs()
+    assert list(nameless_columns(several[:1], states[:1], 1))[:2] == [TOGETHER, SPEED]
+    assert len(nameless_columns(several[:1], states[:1], 1)) == 4 + 8 + 1  # eight places, and one other joint

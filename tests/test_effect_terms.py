@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from snarelab.identification.fitting import effect_terms
 from snarelab.identification.fitting.effect_terms import _RESPONSE as LONGEST
 from snarelab.identification.fitting.effect_terms import _causal, _impulse_response, _link_change, contributions
 from snarelab.models.effects import get_effect
@@ -190,3 +191,14 @@ def test_the_impulse_response_of_a_delay_has_unit_sum_and_its_delay_as_its_middl
     assert response @ np.arange(len(response)) == pytest.approx(4.0, abs=1e-4)
     instant = _impulse_response(get_effect("sensor_delay"), np.array([0.0]), PERIOD)
     assert instant[0] == pytest.approx(1.0, abs=1e-3)
+
+
+def test_what_an_effect_gives_to_a_floating_base_nothing_else_has_to_supply(monkeypatch):
+    """A moment of (1, 2, 3) from outside is taken off the base's channels 3 to 5, and so is its derivative."""
+    read = {name: np.zeros((N, 3)) for name in ("spin", "spin_gained", "impulse", "spin_rate", "acceleration")}
+    monkeypatch.setattr(effect_terms, "base_signals", lambda _: read | {"time": TIME})
+    terms, *_ = added(run(), "external_torque", "base", [1.0, 2.0, 3.0], joint=5)
+    assert [c for c, *_ in terms] == [3, 4, 5]
+    for k, (_, moment, by) in enumerate(terms):
+        np.testing.assert_allclose(moment, -(k + 1.0))
+        np.testing.assert_allclose(by, np.tile(-np.eye(3)[k], (N, 1)))
