@@ -215,7 +215,8 @@ def test_columns_of_the_amplitudes_or_the_whole_law_in_the_band(asked):
     np.testing.assert_array_equal(found, [[43.0], [63.0]])
     ((_, found),) = candidate_columns(assembly(), experiment(), state(), variant("joint_elasticity", []))
     np.testing.assert_array_equal(found, [[13.0], [23.0]])
-    _, joint, load, reading, speed, parameters, early_alone = calls[0]
+    assert [call[-1] for call in calls] == [False, True]  # amplitudes are columns of the law's derivative
+    _, joint, load, reading, speed, parameters, early_alone, _ = calls[0]
     assert (joint, load.tolist(), reading.tolist(), speed, early_alone) == (1, [1, 2], [8, 9], 7.0, False)
     assert parameters.tolist() == [0.0, 0.0]
 
