@@ -1,7 +1,7 @@
 """The order in which a held-out recording rules effects out: the one missed least goes first, with few trials."""
 
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -127,3 +127,92 @@ def test_a_name_is_missed_in_motion_or_where_its_law_holds_and_over_all_samples(
     taken: Any = SimpleNamespace(judged=judged)
     samples: Any = ("train", "all", "motion")
     assert (module._missed(taken, final, *samples).rise > 1) is kept
+
+
+def missed(monkeypatch, rms, *, flags=None, known=True, sigma=(1.0, 1.0), channels=(0, 1)):
+    """An effect on these channels, taken out of a fit; ``rms`` by fit and samples, of a measured 2 and 4 (RMS)."""
+
+    def channel_rms(assembly, samples, theta):
+        return np.array(rms["carried" if theta == "carried" else assembly, samples]), np.array([2.0, 4.0])
+
+    effect = SimpleNamespace(**{"at_rest": False, "exceeds_at_rest": False, "remembers": False, **(flags or {})})
+    judged = SimpleNamespace(channels=channels, placed=SimpleNamespace(effect=effect))
+    rest = SimpleNamespace(assembly="rest", theta="rest")
+    for name, stand_in in {
+        "channel_rms": channel_rms,
+        "without": lambda *_: "rest",
+        "carry": lambda *_: "carried",
+        "fitted": lambda _assembly, samples: "creeping" if samples == "all" else "fitted",
+        "fit": lambda *_, **__: rest,
+        "_known": lambda *_: known,
+    }.items():
+        monkeypatch.setattr(module, name, stand_in)
+    samples: Any = ("train", "all", "motion")
+    return module._missed(*cast(Any, (SimpleNamespace(judged=judged), SimpleNamespace(
+        assembly="final", theta="final", sigma=np.array(sigma)), *samples)))  # fmt: skip
+
+
+RMS = {
+    ("final", "all"): [1.0, 1.0],
+    ("rest", "all"): [1.2, 1.5],  # relative to 2 and 4 the first channel loses 0.1, the second 0.125
+    ("carried", "all"): [3.0, 3.0],
+    ("final", "motion"): [1.0, 1.0],
+    ("rest", "motion"): [1.1, 1.0],
+    ("final", "creeping"): [1.0, 1.0],
+    ("rest", "creeping"): [1.3, 1.0],
+}
+
+
+@pytest.mark.parametrize(
+    ("flags", "share"),
+    [
+        ({}, 2.21 / 2 - 1),  # in motion: 1.1² + 1
+        ({"at_rest": True}, 3.69 / 2 - 1),  # over all samples: 1.2² + 1.5²
+        ({"exceeds_at_rest": True}, 3.69 / 2 - 1),
+    ],
+)
+def test_the_rise_is_the_share_by_which_the_energy_grows_over_a_twentieth(monkeypatch, flags, share):
+    found = missed(monkeypatch, RMS, flags=flags)
+    assert found.rise == pytest.approx(share / 0.05, rel=1e-9)
+    assert found.trial == pytest.approx((0.25, 0.375))  # the second channel misses it most
+
+
+def test_samples_that_creep_count_for_what_exceeds_at_rest_alone(monkeypatch):
+    """Its own samples show 1.3² + 1 of 2, where all of them show less."""
+    rms = RMS | {("rest", "all"): [1.0, 1.1]}
+    assert missed(monkeypatch, rms, flags={"exceeds_at_rest": True}).rise == pytest.approx((2.69 / 2 - 1) / 0.05)
+    assert missed(monkeypatch, rms, flags={"at_rest": True}).rise == pytest.approx((2.21 / 2 - 1) / 0.05)
+
+
+def test_channels_are_weighted_as_the_fit_weights_them(monkeypatch):
+    """With a sigma of 0.5 the first one's squares count four times: (4 · 1.21 + 1)/(4 + 1) of the energy."""
+    assert missed(monkeypatch, RMS, sigma=(0.5, 1.0)).rise == pytest.approx((5.84 / 5 - 1) / 0.05)
+    assert missed(monkeypatch, RMS, channels=(0,)).rise == pytest.approx(0.21 / 0.05)
+    assert missed(monkeypatch, RMS, channels=(0,)).trial == pytest.approx((0.5, 0.6))
+
+
+@pytest.mark.parametrize(("change", "adds"), [(0.99e-3, False), (1.01e-3, True)])
+def test_what_moves_a_millionth_of_the_energy_or_less_adds_nothing(monkeypatch, change, adds):
+    """One channel of 1, moved by a thousandth: a millionth of its energy."""
+    found = missed(monkeypatch, RMS | {("carried", "all"): [1.0 + change, 1.0]}, channels=(0,))
+    assert found.rise == pytest.approx(0.21 / 0.05 if adds else 0.0)
+    assert found.trial == pytest.approx((0.5, 0.6))
+
+
+def test_an_effect_whose_size_is_not_known_is_not_missed(monkeypatch):
+    found = missed(monkeypatch, RMS, known=False)
+    assert found.rise == 0.0
+    assert found.fit.assembly == "rest"
+
+
+@pytest.mark.parametrize(("rise", "stays"), [(1.0, False), (1.001, True)])
+def test_an_effect_stays_if_it_is_missed_by_more_than_the_bar(rise, stays, monkeypatch):
+    monkeypatch.setattr(module, "_missed", lambda *_: _Missed(rise, (0.1, 0.2), cast(Any, "without it")))
+    one = SimpleNamespace(judged=SimpleNamespace(placed=SimpleNamespace(key="one")))
+    told = []
+    found: Any = SimpleNamespace(fit="with it", taken=(one,))
+    done = confirm(found, [], [], told.append)
+    assert (len(done.confirmed), len(done.rejected)) == ((1, 0) if stays else (0, 1))
+    assert done.final == ("with it" if stays else "without it")
+    assert done.trials == ({"one": (0.1, 0.2)} if stays else {})
+    assert len(told) == (1 if stays else 2)

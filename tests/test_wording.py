@@ -1,0 +1,103 @@
+"""The words of a diagnosis: shares, lists, the experiment that is proposed, and the first sentence."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from snarelab.identification import reliability
+from snarelab.identification.diagnosis import ChannelFit, Misfit
+from snarelab.identification.wording import evidence_sentence, experiment_sentence, listed, percent, verdict_sentence
+
+
+@pytest.mark.parametrize(
+    ("share", "text"),
+    [
+        (0.0, "0 %"),
+        (0.0123, "1.2 %"),
+        (0.0999, "10 %"),
+        (0.1, "10 %"),
+        (0.104, "10 %"),
+        (0.106, "11 %"),
+        (1.234, "123 %"),
+        (-0.056, "-5.6 %"),
+        (-0.25, "-25 %"),
+    ],
+)
+def test_a_share_has_two_digits_below_ten_per_cent_and_whole_ones_above(share, text):
+    assert percent(share) == text
+
+
+@pytest.mark.parametrize(
+    ("items", "text"), [([], ""), (["a"], "a"), (["a", "b"], "a and b"), (["a", "b", "c"], "a, b and c")]
+)
+def test_a_list_ends_with_and(items, text):
+    assert listed(items) == text
+
+
+def placed(at, experiment, sentence="friction that rubs"):
+    made: Any = SimpleNamespace(at=at, effect=SimpleNamespace(experiment=experiment, sentence=sentence))
+    return made
+
+
+@pytest.mark.parametrize(
+    ("own", "other", "text"),
+    [
+        ("turn {at}", "load {at}", "load joint2"),  # the rival's own experiment, at the rival's joint
+        ("turn {at}", "turn {at}", "turn joint1"),
+        ("turn {at}", "", "turn joint1"),
+    ],
+)
+def test_the_rivals_experiment_is_proposed_where_it_is_another(own, other, text):
+    for sensor in ("tau.", "q."):
+        assert experiment_sentence(placed(f"{sensor}joint1", own), placed(f"{sensor}joint2", other)) == text
+
+
+@pytest.mark.parametrize(
+    ("channels", "where"), [(["a"], "a"), (["a", "b"], "a and b"), (["a", "b", "c"], "3 channels")]
+)
+def test_evidence_tells_what_is_explained_where_and_what_happens_without(channels, where):
+    assert evidence_sentence(placed("joint1", ""), 0.42, channels, 0.031, 0.26) == (
+        f"Friction that rubs: it explains 42 % of what the model so far left over on {where}; "
+        "taking it out again raises the error on the held-out recording from 3.1 % to 26 %."
+    )
+
+
+def channel(name, before, after):
+    """Shares held out; those of the recordings fitted say the contrary."""
+    return ChannelFit(name, "N*m", Misfit(1.0, 1.0, after, before), Misfit(1.0, 1.0, before, after), 0.0)
+
+
+FITS = [channel("tau.joint1", 0.30, 0.28), channel("tau.joint2", 0.25, 0.05)]
+"""The first is worst before; the second gains most."""
+
+
+def test_the_first_sentence_lists_places_by_effect_and_the_channel_that_gained_most():
+    some: Any = [SimpleNamespace(name=n, at=a) for n, a in (("backlash", "a"), ("sensor_gain", "b"), ("backlash", "c"))]
+    assert verdict_sentence(some, FITS, " And more.") == (
+        "The model leaves out backlash at a and c and sensor gain at b. With that added, the error of tau.joint2 on "
+        "the recording that the fit never saw falls from 25 % to 5 %. And more."
+    )
+
+
+def test_without_a_name_it_is_the_worst_channel_that_is_told():
+    assert verdict_sentence([], FITS, " Torque.") == (
+        "Something is missing on tau.joint1 that no effect of the vocabulary explains. Torque."
+    )
+    assert verdict_sentence([], FITS, "") == (
+        "The model is adequate: nothing is left out that these recordings can show. "
+        "On the recording that the fit never saw, the error of tau.joint1 is 30 %."
+    )
+
+
+@pytest.mark.parametrize(
+    ("margin", "right"), [(0.0, 0.6), (0.5, 0.6), (0.6, 0.7), (0.75, 0.85), (0.9, 0.9), (1.0, 0.9)]
+)
+def test_reliability_is_linear_between_its_knots_and_level_beyond(margin, right, tmp_path, monkeypatch):
+    (tmp_path / "reliability.json").write_text('{"margin": [0.5, 0.7, 0.8], "probability": [0.6, 0.8, 0.9]}')
+    monkeypatch.setattr(reliability, "__file__", str(tmp_path / "reliability.py"))
+    reliability._curve.cache_clear()
+    try:
+        assert reliability.probability(margin) == pytest.approx(right, rel=1e-12)
+    finally:
+        reliability._curve.cache_clear()
