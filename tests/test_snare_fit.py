@@ -148,6 +148,12 @@ def test_a_climb_tries_eight_differences_whole_and_shortened_and_then_what_is_le
     np.testing.assert_allclose(found.slopes[0][0]["position"], -COURSE[::5], atol=1e-9)
 
 
+def test_a_climb_takes_four_steps_unless_told_otherwise():
+    """Of eight differences each: 4 · 0.24 of the 1.45 there are to go."""
+    _, captures = of_friction(truth=1.45)
+    assert fit(captures, evaluate(captures, [FRICTION], [np.zeros(1)])[0]).x == pytest.approx([0.96])
+
+
 def test_a_climb_ends_where_a_step_is_a_fiftieth_of_a_difference():
     """0.02 · 0.03 = 0.0006: 0.00058 away it is left as it is, 0.00063 away (1/1.01 of which is longer) it is not."""
     for away, tried in ((0.00058, 0), (0.00063, 2)):

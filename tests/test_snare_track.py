@@ -95,9 +95,10 @@ def test_orientations_are_averaged_whatever_their_signs():
     np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1.0, rtol=1e-12)
 
 
-def test_the_mean_orientation_has_a_positive_first_number():
-    turns = -about_z([0.1, 0.3])
-    np.testing.assert_allclose(_mean_turn(np.vstack([turns, np.full(4, np.nan)])), about_z([0.2])[0], atol=1e-12)
+@pytest.mark.parametrize("angle", [-3.0, -2.0, -1.0, -0.1, 0.1, 1.0, 2.0, 3.0])
+def test_the_mean_orientation_has_a_positive_first_number(angle):
+    turns = -about_z([angle - 0.1, angle + 0.1])
+    np.testing.assert_allclose(_mean_turn(np.vstack([turns, np.full(4, np.nan)])), about_z([angle])[0], atol=1e-12)
 
 
 @pytest.mark.parametrize(("number", "largest"), [(1, 0.05), (3, 0.6)])
@@ -290,5 +291,6 @@ def test_captures_with_sensors_on_other_bodies_are_not_compared():
     one, other = (sensing(body, np.zeros((10, 3))) for body in ("effector", "target"))
     check_sensors([one, one])
     check_sensors([])
-    with pytest.raises(InputError, match=r"a\.csv: its force sensors are not those of a\.csv"):
-        check_sensors([one, other])
+    for unlike in ([one, other], [one, one, other]):
+        with pytest.raises(InputError, match=r"a\.csv: its force sensors are not those of a\.csv"):
+            check_sensors(unlike)

@@ -105,6 +105,15 @@ def test_four_more_values_stand_by_thirds_on_both_sides_of_the_best_try(truth, b
     assert best.x == pytest.approx([truth], abs=2e-3)
 
 
+def test_beside_a_single_try_four_values_stand_about_it_by_its_distance_from_nothing():
+    """Of 0.3 alone: thirds of the way down to 0, and as far up."""
+    runs, captures, found = captures_with({FRICTION: BACK_AND_FORTH}, 0.3 * BACK_AND_FORTH)
+    tried = evaluate(captures, [FRICTION], [np.array([0.3])])
+    runs.asked.clear()
+    _joint(captures, found, tried, 0.0)
+    assert [x for (x,) in runs.asked[:4]] == pytest.approx([0.2, 0.1, 0.4, 0.5])
+
+
 def test_values_outside_the_bounds_are_not_tried():
     """Friction is best at 1.4 of 0.9 and 1.4: as far again is 1.9, two thirds of the way to which are beyond 1.5."""
     runs, captures, found = captures_with({FRICTION: BACK_AND_FORTH}, 1.45 * BACK_AND_FORTH)
