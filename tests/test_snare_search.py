@@ -156,3 +156,13 @@ def test_a_model_that_cannot_be_simulated_is_refused(which, monkeypatch):
         monkeypatch.setattr(module, "started", lambda *_: lost)
     with pytest.raises(InputError, match=r"check \[capture\] against the test's set-up"):
         rounds.search()
+
+
+@pytest.mark.parametrize("pool", [[], [FRICTION]])
+def test_a_single_candidate_faces_a_bar_of_its_own_and_none_ends_the_search(pool, monkeypatch):
+    """ln(1/0.005) = 5.298: for one candidate, and where there is none."""
+    rounds = Rounds(monkeypatch, [{FRICTION: (5.31, 0.5)}], {(): 0.0, (FRICTION,): 9.0}, pool)
+    found = rounds.search()
+    assert found.bar == pytest.approx(-np.log(0.005), rel=1e-12)
+    assert names(found) == pool
+    assert len(rounds.asked) == len(pool)
