@@ -226,3 +226,11 @@ def test_inputs_are_moved_a_little_and_by_their_size_inside_their_bounds(functio
 def test_a_failure_is_told_once_by_its_name_and_its_time(error, when, said):
     system = System({"it": formula(["a"], ["y"], lambda a: a)}, [], parameters={"it.a": 0.0})
     assert str(FeedThrough(system).failure(0, error, when)) == said
+
+
+def test_whatever_an_asked_participant_raises_is_told_under_its_name():
+    """1/0 where the formula is asked what it shows at first."""
+    system = System({"it": formula(["a"], ["y"], lambda a: 1.0 / float(a))}, [], parameters={"it.a": 0.0})
+    system.participants["it"].initialize(0.0)
+    with pytest.raises(StepError, match=r"^it: ZeroDivisionError: float division by zero$"):
+        FeedThrough(system).ask(0, np.zeros(1))
