@@ -74,7 +74,7 @@ def test_a_line_damps_by_the_rate_of_its_own_length_only():
         rate = (np.sqrt(2 * ahead / line[STIFFNESS]) - np.sqrt(2 * behind / line[STIFFNESS])) / 2e-6
         moving, still = (np.array(line_pull(line, tuple(point), tuple(v))[0]) for v in (velocity, 0 * velocity))
         assert (moving - still) @ velocity == pytest.approx(-40.0 * rate**2, rel=1e-5)
-        np.testing.assert_allclose(np.cross(moving - still, still), 0.0, atol=1e-9 * np.linalg.norm(still) ** 2)
+        np.testing.assert_allclose(np.cross(moving - still, still), 0.0, atol=1e-9 * float(still @ still))
 
 
 @pytest.mark.parametrize("clearance", [0.0, CLEARANCE])

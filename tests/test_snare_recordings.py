@@ -181,6 +181,15 @@ def test_a_recording_that_cannot_be_used_is_named(tmp_path, change, words):
     assert "b.csv" in str(caught.value)
 
 
+def test_twenty_samples_a_second_are_enough(tmp_path):
+    """A clock of 0.05 s in doubles has steps of a little more, too."""
+    table = pd.read_csv(swinging(tmp_path, "a.csv"))[::5].assign(time=0.05 * np.arange(51))
+    assert np.median(np.diff(table.time)) > 0.05
+    table.to_csv(tmp_path / "b.csv", index=False)
+    (capture,) = load_captures(load_model(written(tmp_path, PLAIN)), [tmp_path / "b.csv"])
+    assert len(capture.times) == 51
+
+
 def test_captures_are_told_by_forces_on_the_same_bodies(tmp_path):
     model = load_model(written(tmp_path, PLAIN + 'effects = ["umbilical_stiffness"]\n'))
     train, other = swinging(tmp_path, "train.csv"), swinging(tmp_path, "other.csv", seed=2)

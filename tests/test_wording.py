@@ -7,7 +7,14 @@ import pytest
 
 from snarelab.identification import reliability
 from snarelab.identification.diagnosis import ChannelFit, Misfit
-from snarelab.identification.wording import evidence_sentence, experiment_sentence, listed, percent, verdict_sentence
+from snarelab.identification.wording import (
+    evidence_sentence,
+    experiment_sentence,
+    from_to,
+    listed,
+    percent,
+    verdict_sentence,
+)
 
 
 @pytest.mark.parametrize(
@@ -101,3 +108,17 @@ def test_reliability_is_linear_between_its_knots_and_level_beyond(margin, right,
         assert reliability.probability(margin) == pytest.approx(right, rel=1e-12)
     finally:
         reliability._curve.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "text"),
+    [
+        (0.14, 0.031, "from 14 % to 3.1 %"),
+        (0.1442, 0.1365, "from 14.4 % to 13.7 %"),  # both 14 % to two digits
+        (0.0567, 0.0566, "from 5.67 % to 5.66 %"),
+        (0.05674, 0.05671, "from 5.674 % to 5.671 %"),
+        (0.05, 0.05, "from 5 % to 5 %"),
+    ],
+)
+def test_two_errors_have_the_digits_that_part_them(before, after, text):
+    assert from_to(before, after) == text

@@ -87,7 +87,7 @@ def _capture(model: Model, path: str | Path, data: xr.Dataset) -> Capture:
     zero, span = float(time[0]), float(time[-1] - time[0])
     if span < SHORTEST:
         raise InputError(f"{path}: it lasts {span:.3g} s; give {SHORTEST:g} s of a capture or more")
-    if np.median(np.diff(time)) > EVERY:
+    if np.median(np.diff(time)) > EVERY * (1 + 1e-6):
         raise InputError(f"{path}: a sample every {np.median(np.diff(time)):.3g} s; give {1 / EVERY:g} Hz or more")
     times = np.asarray(EVERY * np.arange(int(span / EVERY + 1e-6) + 1), float)
     since = time - zero

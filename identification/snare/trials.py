@@ -135,7 +135,8 @@ def _explained(captures: Sequence[Capture], found: Fit, there: Fit) -> float:
     if not there.residuals:
         return 0.0
     by = variances(captures, found.residuals)
-    return 1 - _energy(there.residuals, by) / _energy(found.residuals, by)
+    left = _energy(found.residuals, by)
+    return 1 - _energy(there.residuals, by) / left if left else 0.0
 
 
 def _energy(residuals: Sequence[Blocks], by: Mapping[str, float]) -> float:
