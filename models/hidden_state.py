@@ -175,7 +175,10 @@ def reads(effect: Effect) -> tuple[str, ...]:
 
 
 def prepare(effects: Iterable[Effect]) -> None:
-    """Compile effects ahead of their first use, several at a time; what is in the cache already costs milliseconds."""
+    """Compile effects ahead of their first use, several at a time; what is in the cache already costs milliseconds.
+
+    Those with states in both forms, with derivatives and bare.
+    """
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         list(pool.map(_build, *zip(*((e, bare) for e in effects for bare in {False, bool(e.states)}), strict=True)))
 

@@ -1,11 +1,15 @@
 """Gains, shares and nulls of a candidate, against regressions done the slow way on stacked matrices."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 import scipy.optimize
 import scipy.stats
 
 from snarelab.identification.search.evidence import KNOWN, Channel, Evidence
+from snarelab.identification.search.judged import Samples
 
 N_PARAMETERS, N_BLOCKS = 5, 6
 FREE = (np.full(2, -np.inf), np.full(2, np.inf))
@@ -266,3 +270,23 @@ def test_units_do_not_matter(scale):
     gain = evidence.gain(problem.products(evidence), *FREE)
     assert gain.total == pytest.approx(wanted.total, rel=1e-6)
     np.testing.assert_allclose(gain.amplitudes * [1.0, scale], wanted.amplitudes, rtol=1e-6)
+
+
+def test_candidates_summed_at_once_gain_alone_what_each_regression_does():
+    """A grid of three candidates of two columns, each beside one more that may not be negative (NNLS by SciPy)."""
+    problem, rng = Problem(5), np.random.default_rng(11)
+    evidence = problem.evidence()
+    grid = [[rng.normal(size=c.shape) + 0.2 * c for c in problem.candidate] for _ in range(3)]
+    beside = {k: rng.normal(size=(len(c), 1)) - 0.1 * c[:, :1] for k, c in enumerate(problem.candidate)}
+    held = {0: [beside[0]], 1: [beside[1]]}
+    samples = Samples(evidence, evidence, lambda _, parts: np.concatenate(parts), lambda _, p: np.concatenate(p), held)
+    variants: Any = [SimpleNamespace(low=FREE[0], high=FREE[1])] * 3
+    cases = samples.cases([(v, {k: [x] for k, x in enumerate(c)}) for v, c in zip(variants, grid, strict=True)])
+    other = np.concatenate([beside[0], beside[1]])
+    alone = bounded(problem.x, other, problem.y, np.zeros(1), np.full(1, np.inf))[1]
+    for case, columns in zip(cases, grid, strict=True):
+        for some in (np.array([0, 1]), np.array([1])):
+            c = np.hstack([np.concatenate(columns)[:, some], other])
+            low = np.r_[np.full(len(some), -np.inf), 0.0]
+            expected = alone - bounded(problem.x, c, problem.y, low, np.full(len(low), np.inf))[1]
+            assert case.only(some).gain().total == pytest.approx(expected, rel=1e-6)
