@@ -19,6 +19,7 @@ from .iteration import Iteration, NotConverged, QuasiNewton
 from .participant import Participant, StepError
 from .system import System
 
+_RUNAWAY = 1e-3 / np.finfo(float).eps  # times the magnitude: rounding is a thousandth of it, and hides any residual
 _MOVES = (1e-3, 1.0)  # tried on an input of unknown effect, times its magnitude or 1
 
 
@@ -109,8 +110,13 @@ class FeedThrough:
             return outputs[members]
 
         guess = outputs[members]
+        scale = np.maximum(np.abs(guess), 1.0)
         try:
-            outputs[members] = self._solver.solve(ask_all, guess, np.maximum(np.abs(guess), 1.0))[0]
+            found = self._solver.solve(ask_all, guess, scale)[0]
+            if (largest := float(np.max(np.abs(found) / scale))) > _RUNAWAY:
+                self._solver.forget()
+                raise NotConverged(f"values ran away to {largest:.1e} of their magnitude, where rounding hides all")
+            outputs[members] = found
         except NotConverged as error:
             names = " -> ".join(self._layout.outputs[o] for o in members)
             raise StepError(

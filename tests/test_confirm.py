@@ -86,6 +86,7 @@ def test_a_name_needs_one_amplitude_that_is_known_to_be_other_than_zero(deviatio
         ({}, 1.08, 1.003, 1.0, True),
         # What is missed in motion and leaves the whole recording worse improves nothing.
         ({}, 1.08, 0.997, 1.0, False),
+        ({"exceeds_at_rest": True}, 1.08, 0.997, 1.0, True),
         ({"at_rest": True}, 1.0, 1.08, 1.0, True),
         # The fit with it keeps samples near rest, the one without does not: what differs in motion alone is the fits.
         ({"at_rest": True, "remembers": True}, 1.08, 1.003, 1.0, False),
@@ -105,6 +106,8 @@ def test_a_name_is_missed_in_motion_or_where_its_law_holds_and_over_all_samples(
         ("final", "motion"): floor,
         ("rest", "motion"): floor * motion,
         ("without", "all"): 2.0,  # the same fit with the effect struck out
+        ("final", "fitted"): floor,  # where a joint creeps, as in motion
+        ("rest", "fitted"): floor * motion,
     }
 
     def channel_rms(assembly, samples, theta):

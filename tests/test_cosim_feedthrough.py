@@ -90,6 +90,18 @@ def test_algebraic_loop_without_solution_is_one_clear_error():
         Master(loop(1.0), 0.01)
 
 
+def test_a_loop_that_ran_away_after_it_was_solved_is_no_solution():
+    """y = g y + x; with g = 1 once x fell below 0.99 nothing solves it, and at 1e16 a double does not see the rest."""
+    one = formula(["z", "x"], ["y"], lambda z, x: (0.5 if x > 0.99 else 1.0) * z + x)
+    system = System(
+        {"one": one, "two": formula(["y"], ["z"], lambda y: y), "mass": LeftOscillator()},
+        [("two.z", "one.z"), ("mass.x", "one.x"), ("one.y", "two.y")],
+        parameters={"mass.force": 0.0},
+    )
+    with pytest.raises(StepError, match=r"algebraic loop one\.y -> two\.z at .* ran away to"):
+        Master(system, 0.01).run(0.1)
+
+
 def test_unknown_feed_through_is_found_by_moving_inputs():
     system = System(
         {"force": formula(["x"], ["f"], lambda x: -x, depends=False), "mass": LeftOscillator()},

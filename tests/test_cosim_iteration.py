@@ -28,14 +28,6 @@ def test_quasi_newton_says_when_there_is_no_solution():
         QuasiNewton(Iteration(limit=10)).solve(lambda y: y + 1.0, np.zeros(1), np.ones(1))
 
 
-def test_a_residual_that_is_lost_in_rounding_is_no_solution():
-    """y = y + 1 has none; at 1e16 a double does not see the difference."""
-    with pytest.raises(NotConverged, match=r"ran away to 1\.0e\+16 of their magnitude"):
-        QuasiNewton(Iteration()).solve(lambda y: y + 1.0, np.full(1, 1e16), np.ones(1))
-    found, _ = QuasiNewton(Iteration()).solve(lambda y: y, np.full(1, 1e12), np.ones(1))
-    assert found == 1e12
-
-
 @pytest.mark.parametrize(
     ("options", "allowed"),
     [
