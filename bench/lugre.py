@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import mujoco
+import numba
 import numpy as np
-from numpy.typing import NDArray
 
 MICRO_DAMPING = 1e-3  # s, sigma1 / sigma0
 
@@ -55,6 +55,12 @@ class LuGre:
         return low, high, viscous if self.viscous_negative is None else self.viscous_negative
 
 
+# Rows of what a run's joints are (constants, then what changes); a column a joint.
+LEVEL, RISE, VISCOUS = 0, 2, 4  # two rows each: for qd < 0 and for qd >= 0
+STRIBECK, LOAD_FACTOR, VARIATION, WAVE, STIFFNESS, ARMATURE = range(6, 12)
+Z, LOAD, RESISTANCE, GIVEN, SLIPPING = range(5)
+
+
 class Bristles:
     """The LuGre joints of one run: ``act`` before each MuJoCo step, ``slip`` after it.
 
@@ -65,50 +71,57 @@ class Bristles:
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, laws: Mapping[str, LuGre]) -> None:
         """``laws`` by joint name; all bristles start unbent."""
         self._dofs = np.array([model.joint(joint).dofadr[0] for joint in laws], int)
-        self._armature = model.dof_armature[self._dofs]
-        self._damping = model.dof_damping
-        self._q, self._v, self._acceleration, self._applied = data.qpos, data.qvel, data.qacc, data.qfrc_applied
         self._step = model.opt.timestep
-        sides = np.array([[law.back() for law in laws.values()], [law.forth() for law in laws.values()]])
-        self._level, static, self._viscous = np.moveaxis(sides.reshape(2, -1, 3), 2, 0)
-        self._rise = static - self._level
-        shape = [
-            (law.stribeck_speed, law.load_factor, law.variation, law.period, law.deflection) for law in laws.values()
+        self._acting = data.qpos, data.qvel, data.qfrc_applied, model.dof_damping
+        self._moved = data.qvel, data.qacc
+        rows = [
+            [value for pair in zip(law.back(), law.forth(), strict=True) for value in pair]
+            + [law.stribeck_speed, law.load_factor, law.variation, 2.0 * np.pi / law.period]
+            + [law.forth()[1] / law.deflection]
+            for law in laws.values()
         ]
-        self._stribeck, self._load_factor, self._variation, self._period, deflection = np.array(shape).reshape(-1, 5).T
-        self._stiffness = static[1] / deflection
-        self._columns = np.arange(len(laws))
-        self._z, self._load, self._resistance, self._given = np.zeros((4, len(laws)))
-        self._slipping = np.ones(len(laws))
+        self._law = np.vstack([np.array(rows).reshape(-1, ARMATURE).T, model.dof_armature[self._dofs]])
+        self._law[[2, 3]] -= self._law[[0, 1]]
+        self._state = np.zeros((5, len(laws)))
+        self._state[SLIPPING] = 1.0
 
     def act(self) -> None:
         """Subtract friction from ``qfrc_applied`` for the step to come."""
-        dofs, h = self._dofs, self._step
-        if not dofs.size:
-            return
-        v = self._v[dofs]
-        side = (v >= 0.0).astype(int), self._columns
-        g = self._level[side] + self._rise[side] * np.exp(-((v / self._stribeck) ** 2))
-        g *= 1.0 + self._variation * np.sin(2.0 * np.pi / self._period * self._q[dofs])
-        g += self._load_factor * np.abs(self._load)
-        self._slipping = g / self._stiffness
-        dz, left = self._change(v)
-        bristle = self._stiffness * (self._z + dz * (1.0 + MICRO_DAMPING / h))
-        slope = np.copysign(self._z, self._z * v) / self._slipping
-        slope = self._stiffness * (h + MICRO_DAMPING) * left * np.maximum(1.0 - slope, 0.0)
-        viscous = self._viscous[side]
-        self._given, self._resistance = self._applied[dofs], bristle + viscous * v
-        self._applied[dofs] -= bristle - slope * v
-        self._damping[dofs] = slope + viscous
+        _act(self._dofs, self._step, self._law, self._state, *self._acting)
 
     def slip(self) -> None:
         """Move the bristles by the step just made, and note the torque that was handed to each link."""
-        if not self._dofs.size:
-            return
-        self._z += self._change(self._v[self._dofs])[0]
-        self._load = self._given - self._resistance - self._armature * self._acceleration[self._dofs]
+        _slip(self._dofs, self._step, self._law, self._state, *self._moved)
 
-    def _change(self, v: NDArray) -> tuple[NDArray, NDArray]:
-        """Exact change of z over a step at constant v, and the share of the old deflection that is left."""
-        decay = np.expm1(-self._step * np.abs(v) / self._slipping)
-        return (self._z - np.copysign(self._slipping, v)) * decay, 1.0 + decay
+
+@numba.njit(cache=True, error_model="numpy")
+def _act(dofs, h, law, state, q, v, applied, damping):
+    for k, dof in enumerate(dofs):
+        speed, side = v[dof], int(v[dof] >= 0.0)
+        g = law[LEVEL + side, k] + law[RISE + side, k] * np.exp(-((speed / law[STRIBECK, k]) ** 2))
+        g *= 1.0 + law[VARIATION, k] * np.sin(law[WAVE, k] * q[dof])
+        g += law[LOAD_FACTOR, k] * abs(state[LOAD, k])
+        slipping = g / law[STIFFNESS, k]
+        state[SLIPPING, k] = slipping
+        dz, left = _change(h, state[Z, k], slipping, speed)
+        bristle = law[STIFFNESS, k] * (state[Z, k] + dz * (1.0 + MICRO_DAMPING / h))
+        slope = np.copysign(state[Z, k], state[Z, k] * speed) / slipping
+        slope = law[STIFFNESS, k] * (h + MICRO_DAMPING) * left * max(1.0 - slope, 0.0)
+        viscous = law[VISCOUS + side, k]
+        state[GIVEN, k], state[RESISTANCE, k] = applied[dof], bristle + viscous * speed
+        applied[dof] -= bristle - slope * speed
+        damping[dof] = slope + viscous
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _slip(dofs, h, law, state, v, acceleration):
+    for k, dof in enumerate(dofs):
+        state[Z, k] += _change(h, state[Z, k], state[SLIPPING, k], v[dof])[0]
+        state[LOAD, k] = state[GIVEN, k] - state[RESISTANCE, k] - law[ARMATURE, k] * acceleration[dof]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _change(h, z, slipping, v):
+    """Exact change of z over a step at constant v, and the share of the old deflection that is left."""
+    decay = np.expm1(-h * abs(v) / slipping)
+    return (z - np.copysign(slipping, v)) * decay, 1.0 + decay

@@ -23,7 +23,7 @@ from scipy.ndimage import median_filter
 from scipy.signal import fftconvolve
 
 from ..errors import InputError, nearest
-from .filters import derivative_kernels, low_pass, thin, thin_half, thinned_length
+from .filters import derivative_half, derivative_kernels, low_pass, thin, thin_half, thinned_length
 
 Array = NDArray[np.float64]
 
@@ -186,9 +186,11 @@ def condition(dataset: xr.Dataset, joints: Sequence[str], band: float | None = N
     thinning = max(1, int(np.ceil(rate / (2 * band) - 1e-9)))
     band = rate / (2 * thinning)
     notes.append(f"analysis band 0 to {band:.3g} Hz ({limit}; every {thinning} samples make one)")
-    kernels = derivative_kernels(min(band, rate / 2.5), rate)
-    half = len(kernels[0]) // 2
+    half = derivative_half(min(band, rate / 2.5), rate)
     shortest = 2 * half + 1 + (2 * thin_half(thinning) + MINIMUM_RUN * thinning if fitted else 0)
+    # Beside a far slower recording the band may ask for kernels that take minutes, for runs that are all too short.
+    enough = any(len(p[0]) >= shortest for p in pieces)
+    kernels = derivative_kernels(min(band, rate / 2.5), rate) if enough else ()
     parts, segments, start = [], [], 0
     for t, pq, ptau, ptemp, step in pieces:
         if step > 1 / (2 * band):

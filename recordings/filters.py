@@ -15,9 +15,7 @@ GROUP = 16
 
 def derivative_kernels(band: float, rate: float) -> tuple[Array, Array, Array]:
     """Convolution kernels for position, rate and acceleration: windowed sinc and its derivatives, moments exact."""
-    cutoff = min(2.5 * band, 0.5 * (band + 0.5 * rate))
-    width = 2 * (cutoff - band)
-    half = int(np.ceil(72 / (2.285 * 2 * np.pi * width / rate) / 2)) + 2
+    cutoff, half = _cutoff(band, rate), derivative_half(band, rate) // 2
     k = np.arange(-half, half + 1)
     window = kaiser(2 * half + 1, 7.857)  # 80 dB
     w = 2 * np.pi * cutoff / rate
@@ -31,6 +29,16 @@ def derivative_kernels(band: float, rate: float) -> tuple[Array, Array, Array]:
     # Twice the first derivative: windowing the ideal second derivative would leave a constant error over the band.
     second = np.convolve(slope, slope)
     return np.pad(smooth, half), np.pad(slope, half), second
+
+
+def derivative_half(band: float, rate: float) -> int:
+    """Samples that the derivatives' kernels reach to either side: a Kaiser window of 80 dB."""
+    width = 2 * (_cutoff(band, rate) - band)
+    return 2 * (int(np.ceil(72 / (2.285 * 2 * np.pi * width / rate) / 2)) + 2)
+
+
+def _cutoff(band: float, rate: float) -> float:
+    return min(2.5 * band, 0.5 * (band + 0.5 * rate))
 
 
 def _with_moments(h: Array, window: Array, moments: Sequence[float]) -> Array:

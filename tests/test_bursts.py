@@ -80,6 +80,8 @@ def found(monkeypatch, residuals, moving=None, heard=((0.0,),)):
         # The median is 1, so that what exceeds 3 is out of the ordinary: of two windows of 16, 13 each of 42 in all.
         ([16, *10 * [1], 16], 26 / 42, True),
         ([*11 * [1], 16], 13 / 27, False),  # it came once
+        ([16, *10 * [1], 4], 14 / 30, False),  # without the loudest, 1 of 14 is no burst
+        ([16, *10 * [1], 6.6], 16.6 / 32.6, True),
         ([*11 * [1], 6.6], 3.6 / 17.6, False),  # 0.2045
         ([*11 * [1], 6.4], None, False),  # 3.4 of 17.4: 0.195
         ([*10 * [1], 16], None, False),  # of eleven windows a median says nothing

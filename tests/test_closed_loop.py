@@ -100,6 +100,14 @@ def bands(*several, blocks=()):
     return _bands(Made(assembly=assembly, theta=None), [e for e, _ in several])  # pyright: ignore[reportArgumentType]
 
 
+def test_a_clock_of_ten_seconds_has_a_band_too(monkeypatch):
+    """As where milliseconds are read as seconds: eight seconds, the usual window, hold no sample."""
+    monkeypatch.setitem(globals(), "PERIOD", 10.0)
+    monkeypatch.setitem(globals(), "TIME", 10.0 * np.arange(N))
+    (band,) = bands(disturbed(0.1 / 32, edge=8e-3, slow=1e-3))
+    assert 8e-3 <= band < 0.05
+
+
 @pytest.mark.parametrize(
     ("level", "inertia", "wanted"),
     [

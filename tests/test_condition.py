@@ -154,6 +154,12 @@ def test_no_run_long_enough_is_refused(band):
         condition(recording(t, q, tau), ["joint1"], band)
 
 
+def test_a_band_that_only_days_could_fill_is_refused_before_its_filters_are_made():
+    """As a recording in seconds asks for beside one in milliseconds: kernels of 10^10 samples."""
+    with pytest.raises(InputError, match=r"too few samples.*leave 0 in the 1e-08 Hz analysis band"):
+        condition(recording(clock(), sine(clock(), 1.0)[0]), ["joint1"], 1e-8)
+
+
 def test_temperature_is_kept_and_may_be_missing():
     t = clock()
     data = recording(t, np.stack([sine(t, 1.0)[0]] * 2, 1), joints=("joint1", "joint2"))

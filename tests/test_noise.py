@@ -180,3 +180,12 @@ def test_where_more_than_half_is_missing_all_counts(share, all_count):
     x = process([], n=n, seed=8) * np.where(missing, 10.0, 1.0)
     found, _ = whitener(x, np.zeros((n, 0)), [slice(0, n)], missing)
     assert found.sigma == pytest.approx(np.sqrt(share * 100 + 1 - share) if all_count else 1.0, rel=0.05)
+
+
+def test_where_no_run_is_as_long_as_the_memory_all_counts():
+    """Every sixth sample missing: no noise model could be learnt from runs of five."""
+    x = process([0.8], seed=5)
+    found, innovations = whitener(x, NOTHING, WHOLE, np.arange(N) % 6 == 0)
+    whole, wanted = whitener(x, NOTHING, WHOLE)
+    np.testing.assert_array_equal(found.coefficients, whole.coefficients)
+    np.testing.assert_array_equal(innovations, wanted)

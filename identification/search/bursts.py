@@ -27,11 +27,11 @@ LOUD = 3.0
 is out of the ordinary: that noise goes with the pose, and with how fast an encoder's steps pass."""
 
 LEAST = 0.2
-"""Share of a channel's residual energy, above that of ordinary windows, that makes it bursts."""
+"""Share of a channel's residual energy, above that of ordinary windows, that makes it bursts.
 
-AGAIN = 2
-"""Windows out of the ordinary from which on something comes and goes; what was there once, as a knock is, has not come
-again, and no law of the arm's could be held to it."""
+Something comes again if as much is left without the loudest window: what was there once, as a knock is, could not be
+held to any law of the arm's.
+"""
 
 FEWEST = 12
 """Windows of which a median says something."""
@@ -40,7 +40,7 @@ FEWEST = 12
 @dataclass(frozen=True)
 class Bursts:
     """Of one channel: the share of the residual's energy that is out of the ordinary, its frequency [Hz], and whether
-    it was there more than once."""
+    it comes again."""
 
     share: float
     frequency: float
@@ -64,10 +64,14 @@ def bursts(final: Fit, experiments: Sequence[Experiment]) -> dict[int, Bursts]:
         strength, loudest = _windows(experiments, [r[:, c] for r in residuals], [m[:, c] for m in moving])
         usual = np.median(strength) + UNEVEN * heard[c] if len(strength) >= FEWEST else np.inf
         over = np.maximum(strength - LOUD * usual, 0.0)
-        share = over.sum() / max(strength.sum(), 1e-300)
-        if share > LEAST:
-            found[c] = Bursts(float(share), loudest, bool(np.count_nonzero(over) >= AGAIN))
+        if (share := _share(over, strength)) > LEAST:
+            once = np.argmax(strength)
+            found[c] = Bursts(share, loudest, _share(np.delete(over, once), np.delete(strength, once)) > LEAST)
     return found
+
+
+def _share(over: Array, strength: Array) -> float:
+    return float(over.sum() / max(strength.sum(), 1e-300))
 
 
 def _windows(

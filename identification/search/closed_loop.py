@@ -30,6 +30,9 @@ the band kept that the unexplained torque could account for."""
 LEAST = 4.0
 """The band kept is never narrower than this many times the frequency that holds 90 % of the speed's energy."""
 
+SHORTEST = 16
+"""Samples that a spectrum is taken over at least, where eight seconds hold fewer."""
+
 
 def planned(
     found: Fit, experiments: Sequence[Experiment], before: Sequence[Experiment] | None = None
@@ -73,7 +76,7 @@ def _bands(found: Fit, experiments: Sequence[Experiment]) -> Array:
         rate = 2 * e.motion.band
         longest = max(e.motion.band_segments(), key=lambda s: s.stop - s.start)
         acceleration, speed = e.motion.to_band(e.motion.qdd)[longest], e.motion.to_band(e.motion.qd)[longest]
-        length = min(len(acceleration), int(8 * rate))
+        length = min(len(acceleration), max(int(8 * rate), SHORTEST))
         # Nothing is asked of a floating base: what disturbs it is its motion.
         for c in range(n_carriers(assembly.tree), n_joints):
             index, own = gather(blocks, c)

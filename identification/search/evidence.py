@@ -9,6 +9,7 @@ block, so that leaving a block out, a block bootstrap, and nulls with signs flip
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,10 +44,9 @@ class Channel:
 
     @cached_property
     def rows(self) -> list[tuple[int, slice]]:
-        """Runs of samples in one block, each with the block's number."""
-        edges = np.flatnonzero(np.diff(self.block)) + 1
-        starts, stops = np.concatenate([[0], edges]), np.concatenate([edges, [len(self.block)]])
-        return [(int(self.block[a]), slice(int(a), int(b))) for a, b in zip(starts, stops, strict=True)]
+        """Runs of samples in one block, each with the block's number; none where no sample of the joint moves."""
+        edges = [0, *np.flatnonzero(np.diff(self.block)) + 1, len(self.block)]
+        return [(int(self.block[a]), slice(int(a), int(b))) for a, b in pairwise(edges) if a < b]
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,8 @@ LONGEST = 12
 """Highest order tried; the order is chosen by BIC."""
 
 MOST_MISSING = 0.5
-"""Share of missing samples beyond which the noise is learnt from all of them."""
+"""Share of missing samples beyond which the noise is learnt from all of them, as it is where the others stand in pieces
+shorter than its memory."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,8 @@ def whitener(
         s for s in segments if s.stop - s.start > LONGEST
     ]
     known = np.concatenate([np.convolve(~good[s], np.ones(LONGEST + 1), mode="valid") == 0 for s in kept])
+    if np.count_nonzero(known) < 4 * LONGEST < len(known):
+        return whitener(residual, columns, segments)
     best: tuple[float, NDArray, float] | None = None
     for order in range(LONGEST + 1):
         past = np.concatenate([_lagged(noise[s], order)[LONGEST - order :] for s in kept])
