@@ -3,8 +3,7 @@
 from typing import Any
 
 from ..errors import InputError
-from ..recordings import UNITS
-from ..recordings.units import check_unit
+from ..recordings.units import check_unit, registry
 
 _PLAIN = {"": "1", "-": "1", "–": "1"}
 
@@ -23,7 +22,7 @@ def conversion(source: str, target: str) -> tuple[float, float]:
     ):
         raise InputError(f"a value in {source} cannot be read in {target}")
     if given.magnitude == wanted.magnitude == 1:  # also degrees Celsius, which have a zero of their own
-        zero, one = (UNITS.Quantity(value, given.units).to(wanted.units).magnitude for value in (0.0, 1.0))
+        zero, one = (registry().Quantity(value, given.units).to(wanted.units).magnitude for value in (0.0, 1.0))
         return float(one - zero), float(zero)
     return float((given / wanted).to("dimensionless").magnitude), 0.0
 
@@ -33,7 +32,8 @@ def quantity(unit: str) -> Any:
     text = _PLAIN.get(unit, unit)
     try:
         check_unit(text)
-        return UNITS.Quantity(text) if text[0].isdigit() else UNITS.Quantity(1, UNITS.Unit(text))
+        units = registry()
+        return units.Quantity(text) if text[0].isdigit() else units.Quantity(1, units.Unit(text))
     except Exception as error:  # pint raises half a dozen kinds
         raise InputError(f"unit {unit!r} is unknown to pint; write for example rad, deg/s, N*m or degC") from error
 

@@ -2,9 +2,8 @@
 
 import re
 from dataclasses import dataclass
-from functools import cache
 
-import pint
+from ..recordings.units import registry
 
 _BASE = {
     "kilogram": "kg",
@@ -34,11 +33,6 @@ class Unit:
     offset: float = 0.0
 
 
-@cache
-def _registry() -> pint.UnitRegistry:
-    return pint.UnitRegistry()
-
-
 def fmi_name(unit: str) -> str:
     """pint's spelling in FMI's habit: ``N*m*s^2/rad`` is ``N.m.s2/rad``."""
     return re.sub(r"\^|\*\*", "", unit.replace("**", "^").replace("*", "."))
@@ -46,9 +40,9 @@ def fmi_name(unit: str) -> str:
 
 def fmi_unit(unit: str) -> Unit:
     """Definition of a unit in pint's spelling."""
-    registry = _registry()
+    units = registry()
     if unit == "degC":
         return Unit("degC", {"K": 1}, 1.0, 273.15)
-    base = registry.Quantity(1.0, registry.parse_units(unit)).to_base_units()
+    base = units.Quantity(1.0, units.parse_units(unit)).to_base_units()
     exponents = {_BASE[str(name)]: round(float(str(power))) for name, power in base.unit_items()}
     return Unit(fmi_name(unit), exponents, float(base.magnitude))

@@ -4,11 +4,9 @@ from .find import find_recording
 from .read import read_recording
 from .signals import JointKind, Signal, default_unit
 from .timebase import Sampling, sampling
-from .units import UNITS
 from .write import demand_suffix, write_recording
 
 __all__ = [
-    "UNITS",
     "JointKind",
     "Sampling",
     "Signal",

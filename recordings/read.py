@@ -3,10 +3,9 @@
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pint
 import xarray as xr
 
 from ..errors import InputError, nearest
@@ -16,6 +15,9 @@ from .columns import Columns, check_count, split_header
 from .signals import FORMS, JointKind, Signal, default_unit, is_signal, joint_of
 from .timebase import UNIFORM, sampling
 from .units import convert, fits, parse_unit
+
+if TYPE_CHECKING:
+    import pint
 
 _READERS: Mapping[str, Callable[[Path], Columns]] = {
     ".csv": csv_table.read,
@@ -209,7 +211,7 @@ def _time_unit(header: str) -> str:
     return ending if ending in _TIME_UNITS else "s"
 
 
-def _unit(columns: Columns, header: str, signal: Signal | None) -> pint.Unit | None:
+def _unit(columns: Columns, header: str, signal: Signal | None) -> "pint.Unit | None":
     """The unit that the values are in, as the header or else [signals] says; None where neither does.
 
     A gain counts per unit that [signals] names, or else as it is.
@@ -229,7 +231,7 @@ def _in_unit(
     header: str,
     name: str,
     values: np.ndarray,
-    unit: pint.Unit | None,
+    unit: "pint.Unit | None",
     wanted: str,
     signal: Signal | None,
 ) -> np.ndarray:

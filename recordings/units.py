@@ -1,16 +1,16 @@
-"""Units, through pint."""
+"""Units, through pint, which loads where one is written."""
 
 import re
+from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pint
 
 from ..errors import InputError
 
-#: The package's one unit registry. ``Nm`` is the newton metre here: pint's own ``Nm`` is a textile unit.
-UNITS: pint.UnitRegistry = pint.UnitRegistry(on_redefinition="ignore")
-UNITS.define("newton_meter = newton * meter = Nm")
+if TYPE_CHECKING:
+    import pint
 
 _NONE = ("-", "–", "1")
 _WRITTEN = {r"(?<=/)s2\b": "s**2", r"\bN-(?=m)": "N*", r"\bNmm\b": "N*mm", r"\brev\b": "turn", r"^Celsius$": "degC"}
@@ -19,6 +19,16 @@ _WRITTEN = {r"(?<=/)s2\b": "s**2", r"\bN-(?=m)": "N*", r"\bNmm\b": "N*mm", r"\br
 
 _POWER = re.compile(r"(?:\*\*|\^)\s*[-+]?\d{1,2}(?:\.\d{1,6})?(?![\d.])(?!\s*(?:\*\*|\^))")
 _FACTOR = re.compile(r"\s*-?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?")
+
+
+@cache
+def registry() -> "pint.UnitRegistry":
+    """The package's one unit registry. ``Nm`` is the newton metre here: pint's own ``Nm`` is a textile unit."""
+    import pint  # here only: where no unit is written, nothing needs it
+
+    units = pint.UnitRegistry(on_redefinition="ignore")
+    units.define("newton_meter = newton * meter = Nm")
+    return units
 
 
 def check_unit(text: str) -> None:
@@ -36,25 +46,25 @@ def check_unit(text: str) -> None:
         raise ValueError(f"unit {text!r} has numbers that a unit has no use for")
 
 
-def parse_unit(text: str, column: str, path: Path) -> pint.Unit:
+def parse_unit(text: str, column: str, path: Path) -> "pint.Unit":
     """The unit that ``text`` writes; InputError naming the column when pint does not know it."""
     try:
         check_unit(text)
         for pattern, spelled in _WRITTEN.items() if re.fullmatch(r"[\w/*^.-]+", text) else ():
             text = re.sub(pattern, spelled, text)
-        return UNITS.Unit("" if text in _NONE else text)
+        return registry().Unit("" if text in _NONE else text)
     except Exception as error:  # pint raises half a dozen kinds, AssertionError among them
         raise InputError(
             f"{path}: column {column!r}: unit {text!r} is unknown to pint; write for example rad, deg/s, N*m or degC"
         ) from error
 
 
-def fits(unit: pint.Unit, wanted: str) -> bool:
+def fits(unit: "pint.Unit", wanted: str) -> bool:
     """True when ``unit`` has the dimension of ``wanted``; an angle has none (pint's convention)."""
-    return unit.dimensionality == UNITS.Unit(wanted).dimensionality
+    return unit.dimensionality == registry().Unit(wanted).dimensionality
 
 
-def convert(values: np.ndarray, unit: pint.Unit, wanted: str) -> np.ndarray:
+def convert(values: np.ndarray, unit: "pint.Unit", wanted: str) -> np.ndarray:
     """``values`` in ``unit``, expressed in ``wanted``; temperatures with their offset."""
-    target = UNITS.Unit(wanted)
-    return values if unit == target else np.asarray(UNITS.Quantity(values, unit).to(target).magnitude)
+    target = registry().Unit(wanted)
+    return values if unit == target else np.asarray(registry().Quantity(values, unit).to(target).magnitude)

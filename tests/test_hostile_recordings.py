@@ -11,8 +11,6 @@ from snarelab.cli import main
 SPOILT = {
     "no torque": lambda x, rng: x.assign(**{"tau.joint1": 0.0}),
     "a joint that stands": lambda x, rng: x.assign(**{"q.joint1": 0.3}),
-    "a joint that trembles": lambda x, rng: x.assign(**{"q.joint1": 0.3 + 1e-4 * rng.normal(size=len(x))}),
-    "position jumps": lambda x, rng: x.assign(**{"q.joint1": x["q.joint1"].where(x.index % 100 < 30, 0.1)}),
     "moves for a moment only": lambda x, rng: x.assign(**{"q.joint1": x["q.joint1"].where(x.index % 200 < 20, 0.0)}),
     "every third torque missing": lambda x, rng: x.assign(**{"tau.joint1": x["tau.joint1"].where(x.index % 3 > 0)}),
     "a few spikes": lambda x, rng: x.assign(**{"tau.joint1": x["tau.joint1"] + 1e5 * (rng.random(len(x)) < 0.01)}),

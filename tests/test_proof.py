@@ -25,6 +25,7 @@ from proof.judge import judge
 from proof.outside import OUTSIDE
 from proof.plant import ProofPlant, band_rms, floor, record
 from proof.robots import random_friction, random_robot
+from proof.score import score
 from proof.seal import BrokenSeal
 from snarelab.models.effects import effects
 from snarelab.models.model import places
@@ -268,7 +269,10 @@ def test_no_oracle_where_the_twin_cannot_be_recorded(monkeypatch):
 def test_answers_are_sealed_before_the_tool_runs_and_nowhere_to_be_read(tmp_path, monkeypatch):
     monkeypatch.setattr(cases, "TRAIN", 8.0)
     monkeypatch.setattr(cases, "HOLDOUT", 5.0)
-    seen, told = [], []
+    seen, told, scored = [], [], []
+    over = (1.1, 1.2)
+    monkeypatch.setattr(oracle, "run", lambda x: {"over_floor": [{"tau.joint1": x.number + o} for o in over]})
+    monkeypatch.setattr(run, "score", lambda *given: scored.append(given[2]) or score(*given))
 
     def tool(folder: Path):
         seal = json.loads((tmp_path / "sealed.json").read_text())
@@ -290,6 +294,8 @@ def test_answers_are_sealed_before_the_tool_runs_and_nowhere_to_be_read(tmp_path
             return run.prove(2, SEED, pool, folder=tmp_path, tell=told.append, run=tool)
 
     result = prove()
+    own, theirs = ([{"tau.joint1": k + o} for k in (0, 1)] for o in over)
+    assert scored == [own, *[theirs] * len(rivals.NAMES)]  # each method is held to the oracles in its own band
     answers = (tmp_path / "answers.json").read_bytes()
     assert hashlib.sha256(answers).hexdigest() == result["answers_sha256"]
     assert [a["case"] for a in json.loads(answers)] == [0, 1]
