@@ -138,7 +138,7 @@ class Sweep:
             order: [combine(row, values) for row in weights(self._hold, nodes, size, order)]
             for order in set(self._orders)
         }
-        failures: list[Exception] = []
+        failures: list[tuple[Exception, Exception]] = []
         begun = []
         for i in self._starts:
             try:
@@ -146,15 +146,16 @@ class Sweep:
                 self._participants[i].begin(time, size)
                 begun.append(i)
             except Exception as error:  # the others must come to rest before anything else is done
-                failures.append(self.failure(i, time, error))
+                failures.append((self.failure(i, time, error), error))
                 break
         for i in begun:
             try:
                 self._participants[i].finish()
             except Exception as error:  # every one must be waited for, whatever the others raise
-                failures.append(self.failure(i, time, error))
+                failures.append((self.failure(i, time, error), error))
         if failures:
-            raise failures[0]
+            failure, cause = failures[0]
+            raise failure from cause
         outputs = np.empty(len(self._layout.outputs))
         for i, participant in enumerate(self._participants):
             try:

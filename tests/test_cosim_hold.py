@@ -213,6 +213,7 @@ def test_a_failure_is_named_with_its_step_and_everyone_else_comes_to_rest(where,
     with pytest.raises(StepError) as caught:
         sweep(T, H, [np.zeros(6)], [])
     assert str(caught.value) == words
+    assert "grip" in str(caught.value.__cause__)  # whose traceback shows where in the participant it was
     assert first.finished == 1
     assert last.finished == (1 if where != "begin" and not sequential else 0)
 

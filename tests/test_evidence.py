@@ -90,14 +90,8 @@ def test_gain_is_what_the_regression_gains(problem):
 def test_a_channel_without_a_sample_says_nothing(problem):
     """A joint that never moves has none in motion."""
     none = Problem(9, sizes=(0, 0))
-    parts = zip(
-        *(
-            (*getattr(problem, part), getattr(none, part)[0])
-            for part in ("index", "columns", "residual", "noise", "block")
-        ),
-        strict=True,
-    )
-    evidence = Evidence([Channel(*part) for part in parts], N_PARAMETERS, N_BLOCKS, 20, seed=3)
+    channels = [*problem.evidence().channels, none.evidence().channels[0]]
+    evidence = Evidence(channels, N_PARAMETERS, N_BLOCKS, 20, seed=3)
     gain = evidence.gain(evidence.products([*enumerate(problem.candidate), (2, none.candidate[0])]), *FREE)
     wanted = problem.evidence().gain(problem.products(problem.evidence()), *FREE)
     assert gain.total == pytest.approx(wanted.total, rel=1e-12)
