@@ -9,7 +9,8 @@ from math import inf
 import casadi as ca
 
 from ..models.floating.arm import FloatingArm
-from ..models.floating.symbols import by_base, quaternion_rate, rotation_of
+from ..models.floating.symbols import by_base
+from ..models.rotation import quaternion_rate, rotation_of
 from .equations import Ledger
 from .placed_laws import PlacedLaws
 

@@ -5,8 +5,8 @@ The motion is given in the world frame, as recordings have it, and turned into t
 
 import casadi as ca
 
-from ..models.floating.symbols import rotation_of
 from ..models.floating.tree import CARRIERS
+from ..models.rotation import rotation_of
 from .equations import Ledger
 
 _GIVEN = (

@@ -6,6 +6,7 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 
+from ..models.effect import written_unit
 from ..models.effects import get_effect
 from ..models.floating.arm import FloatingArm
 from ..models.floating.ets_vii import ets_vii
@@ -28,17 +29,16 @@ def joint_friction() -> Equations:
     qd = ledger.input("qd.joint", "rad/s", "speed of the joint")
     words = "peak speed of the joint; friction turns over within 0.1 % of it"
     signals = {"qd": qd, "speed_scale": ledger.parameter("speed_scale.joint", "rad/s", 1.0, words, (1e-9, ca.inf))}
-    units, starts = {"T": "N*m", "S": "rad"}, {"coulomb_friction.level": 1.0, "viscous_friction.coefficient": 1.0}
+    starts = {"coulomb_friction.level": 1.0, "viscous_friction.coefficient": 1.0}
     torque = ca.SX(0)
     for name in _FRICTION:
         effect = get_effect(name)
         given = {}
         for p in effect.parameters:
-            unit = "".join(units.get(c, c) for c in p.unit)
             start = starts.get(f"{name}.{p.name}", p.zero)
             bounds = (p.low, ca.inf if p.relative_to else p.high)
             given[p.name] = ledger.parameter(
-                f"{name}.joint.{p.name}", unit, start, f"{p.meaning}: {effect.sentence}", bounds
+                f"{name}.joint.{p.name}", written_unit(p.unit), start, f"{p.meaning}: {effect.sentence}", bounds
             )
         torque += effect.law(signals, given)
     ledger.output("tau.joint", "N*m", torque, "torque that friction takes; against the speed")

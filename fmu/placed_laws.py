@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import casadi as ca
 import numpy as np
 
-from ..models.effect import Parameter
+from ..models.effect import Parameter, written_unit
 from ..models.floating.tree import n_carriers
 from ..models.hidden_state import reads
 from ..models.model import Model, Placed
@@ -76,9 +76,7 @@ class PlacedLaws:
 
     def unit(self, joint: int, unit: str, channel: str = "") -> str:
         """A unit with the joint's torque, position and channel units written out."""
-        torque, position = ("N", "m") if self._joints[joint].kind == "prismatic" else ("N*m", "rad")
-        reading = position if channel.startswith(("q.", "q_link.")) else torque
-        return "".join({"T": torque, "S": position, "U": reading}.get(c, c) for c in unit)
+        return written_unit(unit, self._joints[joint].kind, channel)
 
     def signals(self, joint: int = -1) -> dict[str, ca.SX]:
         """Signals that depend on the place alone: time, temperature, speed scale."""

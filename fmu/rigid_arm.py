@@ -8,11 +8,11 @@ from ..models.floating.arm import FloatingArm
 from ..models.floating.symbols import Tip, by_base, tip
 from ..models.rig.rig import Rig
 from ..models.rigid_body import symbolic_torque
+from ..models.rotation import quaternion_of
 from ..models.tree import Tree
 from .base import Base
 from .base_motion import carried_turning
 from .equations import Ledger
-from .symbolic import quaternion_of
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,22 +22,6 @@ def solved_symmetric(matrix: ca.SX, right: ca.SX) -> ca.SX:
     return ca.vertcat(*x)
 
 
-def quaternion_of(r: ca.SX) -> ca.SX:
-    """Quaternion (w, x, y, z), w >= 0, of a rotation matrix: the largest of four forms (Shepperd 1978)."""
-    forms = [
-        ca.vertcat(1 + r[0, 0] + r[1, 1] + r[2, 2], r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]),
-        ca.vertcat(r[2, 1] - r[1, 2], 1 + r[0, 0] - r[1, 1] - r[2, 2], r[0, 1] + r[1, 0], r[0, 2] + r[2, 0]),
-        ca.vertcat(r[0, 2] - r[2, 0], r[0, 1] + r[1, 0], 1 - r[0, 0] + r[1, 1] - r[2, 2], r[1, 2] + r[2, 1]),
-        ca.vertcat(r[1, 0] - r[0, 1], r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], 1 - r[0, 0] - r[1, 1] + r[2, 2]),
-    ]
-    best, size = forms[0], forms[0][0]
-    for k in range(1, 4):
-        larger = forms[k][k] > size
-        best, size = ca.if_else(larger, forms[k], best), ca.if_else(larger, forms[k][k], size)
-    unit = best / ca.norm_2(best)
-    return ca.if_else(unit[0] < 0, -unit, unit)
-
-
 def root(residual: ca.SX, x: ca.SX) -> ca.SX:
     """Where a residual (n,) of x (n,) is zero: Newton's method from zero, one step if it is linear, else forty."""
     function = ca.Function("residual", [x, *(free := _others(residual, x))], [residual, ca.jacobian(residual, x)])

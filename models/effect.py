@@ -67,6 +67,13 @@ class Parameter:
     alone: bool = True
 
 
+def written_unit(unit: str, joint: Literal["revolute", "prismatic"] = "revolute", channel: str = "") -> str:
+    """A parameter's unit with T, S and U written out for a kind of joint and the channel that a sensor reads."""
+    torque, position = ("N", "m") if joint == "prismatic" else ("N*m", "rad")
+    reading = position if channel.startswith(("q.", "q_link.")) else torque
+    return "".join({"T": torque, "S": position, "U": reading}.get(c, c) for c in unit)
+
+
 @dataclass(frozen=True)
 class Effect:
     """A named piece of physics: where it acts, what it is, and its law.

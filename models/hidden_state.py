@@ -74,7 +74,7 @@ class Evaluation(NamedTuple):
     by_signal : numpy.ndarray, shape (n_samples, n_out, n_signal), or None
         Derivative with respect to ``load`` (joint), ``value`` (sensor) or ``phi`` (link) of the same sample, states
         held; None where the law does not read it. What passes through the states is had by running the change of the
-        signal through the law itself: the laws with states that read it, a spring and a delay, are linear in it.
+        signal through the law itself: the laws whose states read it, a spring and a delay, are linear in it.
     """
 
     values: np.ndarray

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from ..errors import InputError
 from .compiled import SampleFunction
 from .inertia import Array
+from .rotation import exact, turn
 from .tree import Tree
 
 
@@ -33,19 +34,6 @@ class _Motion(NamedTuple):
     curvature: ca.SX
 
 
-def _exact(matrix: ArrayLike) -> ca.SX:
-    """Constants with rounded zeros and ones made exact, so that CasADi drops their products."""
-    values = np.asarray(matrix, float)
-    rounded = np.round(values)
-    return ca.SX(ca.sparsify(ca.DM(np.where(np.abs(values - rounded) < 1e-15, rounded, values))))
-
-
-def _turn(axis: Array, angle: ca.SX) -> ca.SX:
-    """Rotation matrix (3, 3) about a unit axis (Rodrigues)."""
-    along = np.outer(axis, axis)
-    return ca.cos(angle) * _exact(np.eye(3) - along) + ca.sin(angle) * ca.skew(_exact(axis)) + _exact(along)
-
-
 def _curvature(spin: ca.SX, spin_rate: ca.SX) -> ca.SX:
     x, y, z = ca.vertsplit(spin)
     dx, dy, dz = ca.vertsplit(spin_rate)
@@ -60,9 +48,9 @@ def _motions(tree: Tree, q: ca.SX, qd: ca.SX, qdd: ca.SX, gravity: ca.SX) -> lis
     motions: list[_Motion] = []
     for i, joint in enumerate(tree.joints):
         parent = base if joint.parent < 0 else motions[joint.parent]
-        axis, fixed, arm = _exact(joint.axis), _exact(joint.rotation), _exact(joint.translation)
+        axis, fixed, arm = exact(joint.axis), exact(joint.rotation), exact(joint.translation)
         if joint.kind == "revolute":
-            rotation = fixed @ _turn(joint.axis, q[i])
+            rotation = fixed @ turn(joint.axis, q[i])
         else:
             rotation, arm = fixed, arm + fixed @ axis * q[i]
         spin, spin_rate = rotation.T @ parent.spin, rotation.T @ parent.spin_rate
@@ -112,7 +100,7 @@ def symbolic_torque(tree: Tree, q: ca.SX, qd: ca.SX, qdd: ca.SX, gravity: ca.SX,
     torque = ca.SX(tree.n_joints, 1)
     for i in reversed(range(tree.n_joints)):
         joint, motion = tree.joints[i], motions[i]
-        torque[i] = ca.dot(_exact(joint.axis), moments[i] if joint.kind == "revolute" else forces[i])
+        torque[i] = ca.dot(exact(joint.axis), moments[i] if joint.kind == "revolute" else forces[i])
         if joint.parent >= 0:
             on_parent = motion.rotation @ forces[i]
             forces[joint.parent] += on_parent
@@ -126,7 +114,7 @@ def _symbolic_regressor(tree: Tree, q: ca.SX, qd: ca.SX, qdd: ca.SX, gravity: ca
     matrices = [_wrench_matrix(motion) for motion in motions]
     blocks = [[ca.SX(1, 10) for _ in tree.joints] for _ in tree.joints]
     for j, moved in enumerate(tree.joints):
-        axis, none = _exact(moved.axis), ca.SX(3, 1)
+        axis, none = exact(moved.axis), ca.SX(3, 1)
         twists = {j: (axis, none) if moved.kind == "revolute" else (none, axis)}
         for i in range(j, tree.n_joints):
             parent, motion = tree.joints[i].parent, motions[i]

@@ -17,6 +17,7 @@ import numpy as np
 from ..errors import InputError
 from ..exit_status import status_of
 from ..identification.links.diagnose import PROVED
+from ..models.effect import written_unit
 from ..models.effects import effects
 from ..models.model import Placed
 from ..models.model_file import load_model
@@ -148,7 +149,7 @@ def unit(name: str) -> str:
     if not own:
         return ("N*m/V", "V*s/rad", "kg*m^2", "rad")[MOTOR.index(name)]
     (text,) = [p.unit for p in effects()[effect].parameters if p.name == own]
-    return "".join({"T": "N*m", "S": "rad"}.get(c, c) for c in text)
+    return written_unit(text)
 
 
 def steps(

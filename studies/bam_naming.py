@@ -3,8 +3,9 @@
 A servo that sticks most of the time tells inverse dynamics little: while it sticks, any torque up to the level will
 do. In its own closed loop, where it sticks is the best witness. Each law of the vocabulary is added in turn, everything
 is fitted again, and a law is named when it explains a share of the squared position error worth a name, and, fitted
-without a controller gain, foretells that gain's recordings better, for every gain in turn. Among those that do, the
-best score wins: log-likelihood foretold less ½ log(samples) for each parameter, clusters of half a second as samples.
+without each controller gain in turn, foretells the recordings left out better, and those of no gain worse by such a
+share. Among those that do, the best score wins: log-likelihood foretold less ½ log(samples) for each parameter,
+clusters of half a second as samples; of scores as good as equal, that with the fewest parameters.
 
 Sticking makes slopes unreliable: fits go down by Gauss-Newton with coarse steps, and the best are finished without
 slopes by CMA-ES (Hansen 2016).
@@ -24,7 +25,10 @@ Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
 WORTH = 0.05
-"""Least share of the squared position error that a law must explain to be named."""
+"""Least share of the squared position error that a law must explain to be named, and that is called worse."""
+
+TIE = 2.0
+"""Difference of two scores that says nothing (Kass and Raftery 1995: not worth more than a bare mention)."""
 
 MOST_ROUNDS = 3
 MOST_LEFT_OUT = 3
@@ -84,8 +88,8 @@ class Tried:
 
     @property
     def passes(self) -> bool:
-        """Whether it is worth a name, and every gain left out was foretold better."""
-        return self.explained > WORTH and self.score > 0 and min(self.foretold.values()) > 0
+        """Whether it is worth a name, and what was left out was foretold better, for no gain much worse."""
+        return self.explained > WORTH and self.score > 0 and min(self.foretold.values()) > -WORTH
 
 
 @dataclass(frozen=True)
@@ -171,8 +175,8 @@ def name_missing(
         for name, points in candidates(base.values).items():
             progress(f"round {number}: {name.replace('_', ' ')}")
             fits = [fit(runs, {**base.values, **point}, 0) for point in points]
-            best = min(fits, key=lambda f: f.error)
-            tried.append(Tried(name, best, 1 - (best.error / base.error) ** 2))
+            lowest = min(fits, key=lambda f: f.error)
+            tried.append(Tried(name, lowest, 1 - (lowest.error / base.error) ** 2))
         tried.sort(key=lambda t: -t.explained)
         if tried and tried[0].explained > WORTH:
             progress(f"round {number}: leaving out one controller gain after another")
@@ -181,15 +185,21 @@ def name_missing(
                 if t.explained > WORTH:
                     progress(f"round {number}: the same with {t.name.replace('_', ' ')}")
                     tried[k] = _judged(runs, base, t, before)
-        passing = sorted((t for t in tried if t.passes), key=lambda t: -t.score)
-        named = None
-        if passing:
-            progress(f"round {number}: {passing[0].name.replace('_', ' ')}, fitted to the end")
-            base = fit(runs, passing[0].fit.values, EVALUATIONS)
-            named = replace(passing[0], fit=base)
+        named = best(tried)
+        if named:
+            progress(f"round {number}: {named.name.replace('_', ' ')}, fitted to the end")
+            base = fit(runs, named.fit.values, EVALUATIONS)
+            named = replace(named, fit=base)
         yield Round(tuple(tried), named)
         if named is None:
             return
+
+
+def best(tried: Sequence[Tried]) -> Tried | None:
+    """The candidate to name: of those that pass, the best score; of scores as good as equal, the fewest parameters."""
+    passing = [t for t in tried if t.passes]
+    likely = [t for t in passing if t.score > max(p.score for p in passing) - TIE]
+    return min(likely, key=lambda t: (len(t.fit.values), -t.score), default=None)
 
 
 def _left_out(runs: Sequence[ServoRun], model: Fitted) -> dict[float, float]:

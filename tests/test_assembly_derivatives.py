@@ -46,6 +46,7 @@ INSIDE = {
     "z": 0.12,
     "coefficient": 0.08,
     "level": 3.0,
+    "by_load": 0.08,
 }
 """Values away from zero, where every parameter has a say."""
 

@@ -131,7 +131,11 @@ def test_many_starts_reach_the_best_makkar_curve(body):
 
 @pytest.mark.parametrize(("steep", "fade", "extra"), [(0.01, 0.06, 2.0), (0.01, 0.12, 4.0), (0.03, 0.12, 2.0)])
 def test_the_best_makkar_curve_is_found_for_a_bump_that_is_none_of_its_own(body, steep, fade, extra):
-    """A bell-shaped bump, as LuGre friction has; scipy looks for the best curve from many random starts."""
+    """A bell-shaped bump, as LuGre friction has; scipy looks for the best curve from many random starts.
+
+    Two of the law's terms swap roles from one optimum to the next: random starts alone missed the best in half of the
+    seeds.
+    """
 
     def friction(qd):
         share = qd / np.abs(qd).max(axis=0)
@@ -139,7 +143,7 @@ def test_the_best_makkar_curve_is_found_for_a_bump_that_is_none_of_its_own(body,
 
     run = recording(body, friction)
     model = assembly(body, run, "makkar_friction")
-    found = fit(model, [run])
+    fits = [fit(model, [run], seed=seed) for seed in range(4)]
     motion, rng = run.motion, np.random.default_rng(2)
     rigid = body.torque(motion.q, motion.qd, motion.qdd)
     for joint in range(2):
@@ -155,7 +159,8 @@ def test_the_best_makkar_curve_is_found_for_a_bump_that_is_none_of_its_own(body,
             shape = top * 10 ** rng.uniform(-2, -1), 10 ** rng.uniform(0.1, 1.0), top * 10 ** rng.uniform(-2, -1)
             start = [2 * extra, shape[0], shape[1], 4.0, shape[2], 1.0]
             costs.append(scipy.optimize.least_squares(residual, start, bounds=(low, high), x_scale="jac").cost)
-        assert 0.5 * found.sigma[joint] ** 2 * len(run.measured) <= 1.01 * min(costs)
+        for found in fits:
+            assert 0.5 * found.sigma[joint] ** 2 * len(run.measured) <= 1.01 * min(costs)
 
 
 def test_standard_deviations_cover_the_truth_under_coloured_noise(body):

@@ -58,6 +58,7 @@ def test_follows_as_simulate_does_hidden_states_and_sensors_included(tmp_path, v
         "speed_scale.joint2": 5.0,
     }
     values |= {"presliding_hysteresis.joint1.level": 1.5, "presliding_hysteresis.joint1.travel": 0.02}
+    values |= {"presliding_hysteresis.joint1.by_load": 0.05}
     values |= {"joint_elasticity.joint2.stiffness": 900.0, "joint_elasticity.joint2.damping": 4.0}
     values |= {"sensor_delay.tau.joint1.delay": 0.012, "sensor_gain.tau.joint2.error": 0.05}
     values |= {"load_dependent_friction.joint2.coefficient": 0.1, "com_offset.link2.x": 0.02, "com_offset.link2.y": 0.0}

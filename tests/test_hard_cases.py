@@ -80,18 +80,20 @@ def test_bursts_are_an_effect_without_a_name(tmp_path):
     assert found.location[0].channel == channel
 
 
-@pytest.mark.parametrize(
-    ("number", "concealed", "mimic"), [(51, "damaged tooth", "torque_ripple"), (126, "one-way seal", "payload_mass")]
-)
-def test_what_only_stands_in_for_an_effect_without_a_name_is_not_named(number, concealed, mimic, tmp_path):
-    """Both times names passed on the held-out recording, and a nameless curve over the place explained far more."""
+@pytest.mark.parametrize(("number", "concealed"), [(51, "damaged tooth"), (126, "one-way seal")])
+def test_what_only_stands_in_for_an_effect_without_a_name_is_not_named(number, concealed, tmp_path):
+    """Both times names passed on the held-out recording, and a nameless curve over the place explained far more.
+
+    Which names stand in for a seal turns with the last digits, and so with the processor.
+    """
     answer, found = diagnosed(number, tmp_path / "case", 90400)
     assert answer.kinds == (concealed,)
     assert found.verdict == "unknown_effect", found.sentence
     (channel,) = answer.channels
     assert f"missing on {channel}" in found.sentence
     assert "smooth curves over position" in found.description
-    assert any(note.startswith(f"{mimic} at") for note in found.notes)
+    assert not found.effects
+    assert any(note.endswith("explains some of it, but smooth curves far more: not named") for note in found.notes)
 
 
 def test_twins_share_their_probability_and_the_sensor_is_told_first(tmp_path):

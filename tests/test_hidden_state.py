@@ -163,7 +163,10 @@ def test_bristles_over_a_sample_have_the_closed_solution(travel):
         return (qd - abs(qd) * bent) / travel
 
     states, _ = simulate_states(
-        BRISTLES, {"qd": speed, "speed_scale": np.ones_like(speed)}, np.array([1.0, travel]), 0.05
+        BRISTLES,
+        {"qd": speed, "load": 0 * speed, "speed_scale": np.ones_like(speed)},
+        np.array([1.0, travel, 0.0]),
+        0.05,
     )
     exact = [0.0]
     for begin, end in pairwise(time):  # every sample by itself: the speed has a corner there
@@ -177,7 +180,10 @@ def test_bristles_shorter_than_a_sample_stay_between_their_ends():
     speed = np.concatenate([np.zeros(5), 0.3 * np.sin(np.linspace(0.0, 40.0, 500)), np.zeros(5), [0.5]])
     for travel in (1e-9, 1e-6, 1e-4):
         states, _ = simulate_states(
-            BRISTLES, {"qd": speed, "speed_scale": np.ones_like(speed)}, np.array([1.0, travel]), 1e-3
+            BRISTLES,
+            {"qd": speed, "load": 0 * speed, "speed_scale": np.ones_like(speed)},
+            np.array([1.0, travel, 0.0]),
+            1e-3,
         )
         assert np.abs(states).max() <= 1.0
         assert states[-1, 0] == pytest.approx(1.0)

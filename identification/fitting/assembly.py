@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...models.effect import Parameter
+from ...models.effect import Parameter, written_unit
 from ...models.model import Placed
 from ...models.rig.kinematics import sling_of
 from ...models.rig.rig import Rig
@@ -168,9 +168,7 @@ class Assembly:
 
     def unit(self, p: Placed, parameter: Parameter) -> str:
         """A parameter's unit with the joint's torque and position units written out."""
-        torque, position = ("N", "m") if self.tree.joints[self.joint_of(p)].kind == "prismatic" else ("N*m", "rad")
-        channel = position if p.at.startswith("q.") else torque
-        return "".join({"T": torque, "S": position, "U": channel}.get(c, c) for c in parameter.unit)
+        return written_unit(parameter.unit, self.tree.joints[self.joint_of(p)].kind, p.at)
 
     def usual(self, p: Placed, parameter: Parameter) -> float:
         """Start of a parameter: middle of its grid, or the value at which the effect vanishes."""

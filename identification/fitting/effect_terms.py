@@ -161,10 +161,10 @@ def _by_segment(
     parts = []
     for segment in experiment.motion.segments:
         inputs = {name: x[segment][direction] for name, x in signals.items()}
-        values, by_parameter, _ = evaluate_law(effect, inputs, parameters, period, bare=bare)
-        parts.append((values[direction], by_parameter[direction]))
-    values, by_parameter = (np.concatenate(x) for x in zip(*parts, strict=True))
-    return values, by_parameter, None
+        found = evaluate_law(effect, inputs, parameters, period, bare=bare)
+        parts.append([x[direction] for x in found if x is not None])
+    values, by_parameter, *by_load = (np.concatenate(x) for x in zip(*parts, strict=True))
+    return values, by_parameter, by_load[0] if by_load else None
 
 
 def _impulse_response(effect: Effect, parameters: Array, period: float) -> Array:

@@ -1,11 +1,12 @@
 """Where to start a law that is nonlinear in its shape parameters, and how many starts agree on the best end.
 
 Given the shapes, a model is linear in its amplitudes, so a point on the grid of shapes costs one pass over the samples.
-The grid of every effect is gone through so; its local minima are the first starts, points drawn at random the next,
+The grid of every effect is gone through so; its local minima are the first starts. Then come the ends with two shapes
+of one law exchanged, since terms of a kind, as Makkar friction has them, can swap roles; then points drawn at random,
 until the best cost has been reached three times.
 """
 
-from itertools import product
+from itertools import combinations, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,6 +55,8 @@ def best_start(problem: Problem, theta: Array, sigma: Array, rng: np.random.Gene
     while len(ends) < MOST_STARTS and reached < AGREE:
         start = pending.pop(0) if pending else _random_start(problem, ends[int(np.argmin(costs))], sigma, rng)
         end = problem.minimise(start, sigma, tolerance=1e-5)
+        if all(abs(end.normal.cost - cost) > SAME * cost for cost in costs):
+            pending += _exchanged(problem, end.theta, sigma)
         ends.append(end.theta)
         costs.append(end.normal.cost)
         reached = int(np.count_nonzero(np.array(costs) <= (1 + SAME) * min(costs)))
@@ -81,6 +84,19 @@ def _is_minimum(costs: Array, k: tuple[int, ...]) -> bool:
     """Whether no neighbour on the grid, diagonal ones included, is lower."""
     around = tuple(slice(max(0, i - 1), i + 2) for i in k)
     return bool(np.isfinite(costs[k]) and costs[k] <= costs[around].min())
+
+
+def _exchanged(problem: Problem, theta: Array, sigma: Array) -> list[Array]:
+    """Starts with two shapes of one effect exchanged that have a unit in common; of its other shapes, the best."""
+    found = []
+    for grids in problem.grids:
+        for one, other in combinations([position for position, _ in grids], 2):
+            if problem.assembly.slots[one].unit == problem.assembly.slots[other].unit:
+                values = {position: (theta[position], *grid) for position, grid in grids}
+                values |= {one: (theta[other],), other: (theta[one],)}
+                shapes = [dict(zip(values, map(float, point), strict=True)) for point in product(*values.values())]
+                found.append(min((_projected(problem, theta, sigma, s) for s in shapes), key=lambda end: end[0])[1])
+    return found
 
 
 def _random_start(problem: Problem, theta: Array, sigma: Array, rng: np.random.Generator) -> Array:

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.effect import Parameter
+from ...models.effect import Parameter, written_unit
 from ...models.floating.tree import FloatingTree
 from ...models.hidden_state import evaluate_law
 from ...models.model import Model, Placed
@@ -94,8 +94,7 @@ class Pair:
 
     def unit(self, p: Parameter) -> str:
         """A parameter's unit with the joint's torque and position units written out."""
-        torque, position = ("N", "m") if self.kind == "prismatic" else ("N*m", "rad")
-        return "".join({"T": torque, "S": position, "U": position}.get(c, c) for c in p.unit)
+        return written_unit(p.unit, self.kind, "q_link.")
 
     @property
     def segments(self) -> tuple[slice, ...]:

@@ -1,8 +1,8 @@
 """Presliding hysteresis: friction that builds up over a short travel after a reversal, instead of at once.
 
-Asperities bend like bristles before they slip. The bent share z of the level follows Dahl's model; the law is what that
-differs from a friction that jumps, so that beside Coulomb friction of the same level it is Dahl's friction. It shows in
-the torque of a joint that seems to stand still.
+Asperities bend like bristles before they slip. The bent share of the level follows Dahl's model; the law is what that
+differs from a friction that jumps, so that beside Coulomb friction of the same level, and load-dependent friction of
+the same coefficient, it is Dahl's friction. It shows in the torque of a joint that seems to stand still.
 
 Over travel in one direction Dahl's equation has a closed solution, so that the bent share stays between -1 and 1
 however short the travel is: between two samples the joint may turn once, where its speed, linear in time, crosses zero.
@@ -31,7 +31,7 @@ def _advance(s: Symbols, later: Symbols, p: Symbols, h: ca.SX) -> list[ca.SX]:
 
 
 def _law(s: Symbols, p: Symbols) -> ca.SX:
-    return p["level"] * (s["bent"] - direction(s))
+    return (p["level"] + p["by_load"] * ca.fabs(s["load"])) * (s["bent"] - direction(s))
 
 
 EFFECT = Effect(
@@ -39,7 +39,8 @@ EFFECT = Effect(
     family="joint friction",
     at="joint",
     sentence="friction that builds up over a short travel after each reversal instead of at once",
-    equation="level * (bent - sgn(qd)), travel * bent' = qd - |qd| * bent; on top of Coulomb friction",
+    equation="(level + by_load * |load|) * (bent - sgn(qd)), travel * bent' = qd - |qd| * bent; on top of Coulomb "
+    "and load-dependent friction",
     source="Dahl (1968); Canudas de Wit, Olsson, Åström and Lischinsky (1995)",
     parameters=(
         Parameter("level", "T", "friction that builds up late", low=0.0),
@@ -53,6 +54,7 @@ EFFECT = Effect(
             grid=(1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 0.01, 0.03),
             relative_to="travel",
         ),
+        Parameter("by_load", "1", "share of the load by which that friction grows", low=0.0, alone=False),
     ),
     law=_law,
     states=("bent",),

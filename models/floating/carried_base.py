@@ -17,6 +17,7 @@ from ..dormand_prince import DormandPrince
 from ..effect import Effect
 from ..hidden_state import SIGNALS
 from ..inertia import Array
+from ..rotation import quaternion_rate, rotation_of
 from . import symbols
 from .arm import FloatingArm
 
@@ -116,7 +117,7 @@ class CarriedBase:
         """Momentum (6,) in the world that goes with a twist."""
         whole = ca.Function("whole", [q_ := ca.SX.sym("q", len(q))], [symbols.inertia(self.arm, q_)[:6, :]])(q)
         own = np.asarray(whole, float) @ np.concatenate([twist, qd])
-        turned = np.asarray(ca.DM(ca.evalf(symbols.rotation_of(ca.SX(start[3:7])))))
+        turned = np.asarray(ca.DM(ca.evalf(rotation_of(ca.SX(start[3:7])))))
         linear = turned @ own[:3]
         return np.concatenate([linear, turned @ own[3:] + np.cross(start[:3], linear)])
 
@@ -125,7 +126,7 @@ class CarriedBase:
     ) -> tuple[ca.SX, ca.SX, ca.SX]:
         """Rate of the states, twist and acceleration of the base."""
         position, quaternion, linear, angular = x[:3], x[3:7], x[7:10], x[10:13]
-        rotation, whole = symbols.rotation_of(quaternion), symbols.inertia(self.arm, q)
+        rotation, whole = rotation_of(quaternion), symbols.inertia(self.arm, q)
         own = ca.vertcat(rotation.T @ linear, rotation.T @ (angular - ca.cross(position, linear)))
         h_b, h_bm = whole[:6, :6], whole[:6, 6:]
         twist = ca.solve(h_b, own - h_bm @ qd)
@@ -149,7 +150,7 @@ class CarriedBase:
         push, moment = rotation @ wrench[:3], rotation @ wrench[3:]
         rates = [
             rotation @ twist[:3],
-            symbols.quaternion_rate(quaternion, twist[3:]),
+            quaternion_rate(quaternion, twist[3:]),
             push,
             ca.cross(position, push) + moment,
             hidden,

@@ -23,6 +23,7 @@ from ...errors import InputError
 from ..compiled import SampleFunction
 from ..dormand_prince import DormandPrince, Steps
 from ..inertia import Array
+from ..rotation import quaternion_of, quaternion_rate, rotation_of
 from . import symbols
 from .arm import FloatingArm
 from .joint_drive import Drive
@@ -213,7 +214,7 @@ class FloatingMotion:
         h_b, h_bm, h_m = whole[:6, :6], whole[:6, 6:], whole[6:, 6:]
         if arm.floating:
             position, quaternion, linear, angular = x[:3], x[3:7], x[7:10], x[10:13]
-            rotation = symbols.rotation_of(quaternion)
+            rotation = rotation_of(quaternion)
             own = ca.vertcat(rotation.T @ linear, rotation.T @ (angular - ca.cross(position, linear)))
             root = ca.chol(h_b).T
             half = ca.solve(root, h_bm)
@@ -239,7 +240,7 @@ class FloatingMotion:
             moment = ca.cross(place, wrench[:3]) + wrench[3:]
             moment += ca.cross(position + rotation @ mount_place, at_mount[:3]) + at_mount[3:]
             pushed = wrench[:3] + at_mount[:3]
-            base = [rotation @ twist[:3], symbols.quaternion_rate(quaternion, twist[3:]), pushed, moment]
+            base = [rotation @ twist[:3], quaternion_rate(quaternion, twist[3:]), pushed, moment]
             rates = [*base, *rates]
         tip_twist = tip.by_base @ twist + tip.by_joints @ qd
         moving = ca.vertcat(twist, qd)
@@ -250,10 +251,10 @@ class FloatingMotion:
             quaternion / ca.norm_2(quaternion),
             _turned(rotation, twist),
             place,
-            symbols.quaternion_of(rotation @ tip.rotation),
+            quaternion_of(rotation @ tip.rotation),
             _turned(rotation, tip_twist),
             position + rotation @ mount_place,
-            symbols.quaternion_of(rotation @ mount_turn),
+            quaternion_of(rotation @ mount_turn),
             _turned(rotation, symbols.by_base(mount_place) @ twist),
             total_linear,
             rotation @ inside[3:] + ca.cross(position, total_linear),

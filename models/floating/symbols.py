@@ -14,6 +14,7 @@ from typing import NamedTuple
 import casadi as ca
 
 from ..rigid_body import symbolic_torque
+from ..rotation import turn
 from .arm import FloatingArm
 
 
@@ -26,26 +27,6 @@ class Tip(NamedTuple):
     by_joints: ca.SX
 
 
-def turn(axis: ca.DM, angle: ca.SX) -> ca.SX:
-    """Rotation matrix (3, 3) about a unit axis (Rodrigues)."""
-    along = axis @ axis.T
-    return ca.cos(angle) * (ca.DM.eye(3) - along) + ca.sin(angle) * ca.skew(axis) + along
-
-
-def rotation_of(quaternion: ca.SX) -> ca.SX:
-    """Rotation matrix (3, 3) of a quaternion (w, x, y, z); base to world."""
-    unit = quaternion / ca.norm_2(quaternion)
-    w, vector = unit[0], unit[1:]
-    cross = ca.skew(vector)
-    return ca.SX.eye(3) + 2 * w * cross + 2 * cross @ cross
-
-
-def quaternion_rate(quaternion: ca.SX, spin: ca.SX) -> ca.SX:
-    """Rate (4,) of a quaternion (w, x, y, z) at the angular velocity ``spin`` (3,) in the turning frame [rad/s]."""
-    w, vector = quaternion[0], quaternion[1:]
-    return 0.5 * ca.vertcat(-ca.dot(vector, spin), w * spin + ca.cross(vector, spin))
-
-
 def poses(arm: FloatingArm, q: ca.SX) -> list[tuple[ca.SX, ca.SX]]:
     """Rotation (3, 3) and translation (3,) of each link's frame in the base's, at joint positions q (J,)."""
     found: list[tuple[ca.SX, ca.SX]] = []
@@ -54,7 +35,7 @@ def poses(arm: FloatingArm, q: ca.SX) -> list[tuple[ca.SX, ca.SX]]:
         origin = origin + turned @ ca.DM(joint.translation)
         turned = turned @ ca.DM(joint.rotation)
         if joint.kind == "revolute":
-            found.append((turned @ turn(ca.DM(joint.axis), q[i]), origin))
+            found.append((turned @ turn(joint.axis, q[i]), origin))
         else:
             found.append((turned, origin + turned @ ca.DM(joint.axis) * q[i]))
     return found
@@ -100,20 +81,3 @@ def bias(arm: FloatingArm, q: ca.SX, twist: ca.SX, qd: ca.SX, gravity: ca.SX) ->
 
 def _whole(q: ca.SX) -> ca.SX:
     return ca.vertcat(ca.SX(6, 1), q)
-
-
-def quaternion_of(rotation: ca.SX) -> ca.SX:
-    """Quaternion (w, x, y, z), w >= 0, of a rotation matrix: the best scaled row of Bar-Itzhack's (2000) matrix."""
-    r = rotation
-    trace = r[0, 0] + r[1, 1] + r[2, 2]
-    rows = [
-        ca.vertcat(1 + trace, r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]),
-        ca.vertcat(r[2, 1] - r[1, 2], 1 + 2 * r[0, 0] - trace, r[0, 1] + r[1, 0], r[0, 2] + r[2, 0]),
-        ca.vertcat(r[0, 2] - r[2, 0], r[0, 1] + r[1, 0], 1 + 2 * r[1, 1] - trace, r[1, 2] + r[2, 1]),
-        ca.vertcat(r[1, 0] - r[0, 1], r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], 1 + 2 * r[2, 2] - trace),
-    ]
-    best, size = rows[0], rows[0][0]
-    for i in (1, 2, 3):
-        larger = rows[i][i] > size
-        best, size = ca.if_else(larger, rows[i], best), ca.if_else(larger, rows[i][i], size)
-    return best / ca.norm_2(best) * ca.if_else(best[0] < 0, -1, 1)

@@ -11,6 +11,7 @@ from ..compiled import SampleFunction
 from ..floating import symbols
 from ..floating.arm import FloatingArm
 from ..inertia import Array
+from ..rotation import turn
 
 
 class TreeFrames:
@@ -26,7 +27,7 @@ class TreeFrames:
         n_joints = arm.n_joints
         c = ca.SX.sym("c", 6 + n_joints)
         place, q = c[:3], c[6:]
-        turns = [symbols.turn(ca.DM(axis), c[3 + i]) for i, axis in enumerate(np.eye(3))]
+        turns = [turn(axis, c[3 + i]) for i, axis in enumerate(np.eye(3))]
         axes = ca.horzcat(ca.DM([1, 0, 0]), turns[0][:, 1], (turns[0] @ turns[1])[:, 2])
         rotation = turns[0] @ turns[1] @ turns[2]
         tip = symbols.tip(arm, q)

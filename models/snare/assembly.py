@@ -307,7 +307,7 @@ def add_cable(system: Any, nodes: np.ndarray, parameters: SnareParameters) -> li
 
 def quaternion_matrix(orientation: Any) -> np.ndarray:
     """Rotation matrix of a quaternion, w first."""
-    return Rotation.from_quat(np.roll(orientation, -1)).as_matrix()
+    return Rotation.from_quat(orientation, scalar_first=True).as_matrix()
 
 
 def target_pose(target: Target) -> Pose:

@@ -5,7 +5,17 @@ length l: N = (1 − 3ξ² + 2ξ³, l(ξ − 2ξ² + ξ³), 3ξ² − 2ξ³, l(�
 position, slope, position, slope; `first` and `second` are derivatives by arc length s.
 """
 
+import numpy as np
+
 from .vector import compiled
+
+MASS_POINTS = np.array(
+    [
+        [0.5 + 0.5 * x, 0.5 * w]
+        for x, w in zip(*np.polynomial.legendre.leggauss(4), strict=True)
+    ]
+)  # fmt: skip
+"""ξ and weight of Gauss's four points, exact for products of two cubics."""
 
 
 @compiled

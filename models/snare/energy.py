@@ -8,7 +8,7 @@ import numpy as np
 
 from .contact import contact_force
 from .crossing import crossing_force, crossing_give
-from .cubic import combine, first_weights, second_weights, weights
+from .cubic import MASS_POINTS, combine, first_weights, second_weights, weights
 from .law import give, powers
 from .vector import add, compiled, cross, dot, length, scale, subtract
 
@@ -20,12 +20,6 @@ BENDING_POINTS = np.array([[0.5 - np.sqrt(1 / 12), 0.5], [0.5 + np.sqrt(1 / 12),
 """ξ and weight where an element's tension and bending are integrated."""
 STRAIGHT = 1e-3
 """Curvature below which a cable counts as straight [1/m]: its size has no rate there, see `damping`."""
-_MASS_POINTS = np.array(
-    [
-        [0.5 + 0.5 * x, 0.5 * w]
-        for x, w in zip(*np.polynomial.legendre.leggauss(4), strict=True)
-    ]
-)  # fmt: skip
 
 
 @compiled
@@ -62,8 +56,8 @@ def cable_energies(
             result[STRAIN] += 0.5 * share * bent
             result[BENDING_LOSS] += share * section[4] * dot(curvature, rate) ** 2 / (bent + STRAIGHT * STRAIGHT)
         for i in range(4):
-            speed = combine(weights(_MASS_POINTS[i, 0], size), rates)
-            result[KINETIC] += 0.5 * _MASS_POINTS[i, 1] * size * section[0] * dot(speed, speed)
+            speed = combine(weights(MASS_POINTS[i, 0], size), rates)
+            result[KINETIC] += 0.5 * MASS_POINTS[i, 1] * size * section[0] * dot(speed, speed)
     for index in range(n_contacts):
         _, _, normal, speed = contact_force(positions, velocities, size, cylinders, pin, law, contacts[index])
         soft = give(law, contacts[index, 2], size)

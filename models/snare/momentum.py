@@ -7,15 +7,8 @@ changes by outside forces alone, step by step, as the elements' mass matrix is c
 import numpy as np
 
 from .assembly import Assembly
-from .cubic import combine, weights
+from .cubic import MASS_POINTS, combine, weights
 from .vector import add, compiled, cross, rotate, rotate_back, row, scale
-
-_POINTS = np.array(
-    [
-        [0.5 + 0.5 * x, 0.5 * w]
-        for x, w in zip(*np.polynomial.legendre.leggauss(4), strict=True)
-    ]
-)  # fmt: skip
 
 
 @compiled
@@ -28,10 +21,10 @@ def cable_momentum(positions, velocities, n_elements, size, mass_per_length):
         element = positions[first_row : first_row + 4]
         rates = velocities[first_row : first_row + 4]
         for i in range(4):
-            shape = weights(_POINTS[i, 0], size)
+            shape = weights(MASS_POINTS[i, 0], size)
             speed = combine(shape, rates)
             turn = cross(combine(shape, element), speed)
-            mass = _POINTS[i, 1] * size * mass_per_length
+            mass = MASS_POINTS[i, 1] * size * mass_per_length
             for k in range(3):
                 result[k] += mass * speed[k]
                 result[3 + k] += mass * turn[k]
