@@ -61,7 +61,7 @@ clean:           ## remove what was built; the environment too
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "snarelab needs Python 3.11 or newer: make PYTHON=...")'
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -c 'import tomllib; p = tomllib.load(open("pyproject.toml", "rb"))["project"]; print(*p["dependencies"], *p["optional-dependencies"]["dev"], sep="\n")' > .venv/wanted.txt
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -r .venv/wanted.txt
+	$(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check -c constraints.txt -r .venv/wanted.txt
 	touch $@
 
 .venv/installed: .venv/tools $(SOURCES)
