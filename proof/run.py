@@ -1,6 +1,6 @@
 """The proof: conceal effects, seal the answers, let the tool name them, score what it says.
 
-``python -m proof --cases 142 --workers 2 --seed 700003``, from the repository's root, with the package installed.
+``python -m proof --cases 142 --workers 2 --seed 700004``, from the repository's root, with the package installed.
 What is done is kept under ``build/proof`` and not done again: recordings as long as the generator is the same,
 diagnoses as long as the tool is, rivals as long as they are.
 """

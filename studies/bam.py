@@ -183,8 +183,9 @@ def sections(
     """What is drawn, and what was not named."""
     words = [
         "Bars: share of the squared position error at gains 100, 200 and 800. Dots: the same at one of these gains, "
-        "foretold by fits to the other two. A law is named when it explains at least 5 % and every dot is above "
-        "zero; of several, the one that foretells most for its number of parameters."
+        "foretold by fits to the other two. A law is named when it explains at least 5 %, foretells more than chance "
+        "over all gains, and no dot is below -5 %; of several, the one that foretells most for its number of "
+        "parameters, and where that is a tie, the simplest."
     ]
     for t in rounds[0].tried:
         if t.foretold and not (rounds[0].named and t.name == rounds[0].named.name):

@@ -9,7 +9,7 @@ import pytest
 
 from snarelab.errors import InputError
 from snarelab.studies import bam, bam_naming, bam_servo
-from snarelab.studies.bam_naming import START, evolve, fit, name_missing, rms
+from snarelab.studies.bam_naming import START, Fitted, Tried, best, evolve, fit, name_missing, rms
 from snarelab.studies.bam_servo import DUTY, GRAVITY, ServoRun, position_error, read_run, simulate
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -139,6 +139,24 @@ def test_steps_are_fine_enough(recorded, monkeypatch):
     coarse = position_error(recorded[1], values)
     monkeypatch.setattr(bam_servo, "SUBSTEPS", 16)
     assert position_error(recorded[1], values) == pytest.approx(coarse, rel=0.02)
+
+
+def tried(name, parameters, score, *foretold):
+    """A law with so many parameters, that explains a half."""
+    return Tried(
+        name, Fitted(dict.fromkeys(map(str, range(parameters)), 0.0), 0.1), 0.5, dict(enumerate(foretold)), score
+    )
+
+
+def test_of_scores_as_good_as_equal_the_fewest_parameters_are_named():
+    """One gain foretold a little worse says nothing, and turns with the last digits of a fit that sticks."""
+    load, position = tried("load", 7, 42.4, 0.5, 0.7, -0.025), tried("position", 9, 42.6, 0.6, 0.7, -0.045)
+    assert best([position, load]) is load
+    assert best([load, tried("position", 9, 45.0, 0.6, 0.7, 0.1)]).name == "position"
+    assert best([load, tried("ripple", 6, 35.0, 0.5, 0.5, 0.3)]) is load  # simpler, and much worse
+    worse = tried("load", 7, 42.4, 0.5, 0.7, -0.06)
+    assert best([worse, position]) is position
+    assert best([worse, tried("ripple", 9, -1.0, 0.5, 0.5, 0.3)]) is None
 
 
 def test_load_dependence_takes_a_third_of_the_held_out_error(recorded):
