@@ -86,7 +86,7 @@ def _row(effect: Effect) -> str:
 
 
 def _parameter(p: Parameter) -> str:
-    unit = re.sub(r"\bT\b", "N·m", re.sub(r"\bS\b", "rad", p.unit))
+    unit = re.sub(r"\bT\b", "N·m", re.sub(r"\bS\b", "rad", p.unit.replace("/T", "/(T)")))
     unit = unit.replace("*", "·").replace("^2", "²").replace("^3", "³")
     shape = ", shape" if p.grid else ""
     return f"`{p.name}` [{'–' if unit == '1' else unit}]{shape}: {p.meaning}"

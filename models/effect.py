@@ -49,9 +49,9 @@ class Parameter:
     grid : tuple of float
         Empty for an amplitude. For a shape parameter (nonlinear in the law): starting values that span what
         hardware shows; relative to the scale named by ``relative_to`` if that is set.
-    relative_to : "", "speed", "travel", "torque" or "rate"
+    relative_to : "", "speed", "travel", "torque", "rate" or "per_torque"
         What the bounds' finite ends and the grid are multiples of: the joint's peak speed, its travel, its peak torque,
-        or peak torque per travel; "" for absolute numbers in SI units.
+        peak torque per travel, or one over its peak torque; "" for absolute numbers in SI units.
     alone : bool
         False where the parameter without the effect's others would be another effect: a spring's rest torque is a bias.
     """
@@ -63,7 +63,7 @@ class Parameter:
     low: float = float("-inf")
     high: float = float("inf")
     grid: tuple[float, ...] = ()
-    relative_to: Literal["", "speed", "travel", "torque", "rate"] = ""
+    relative_to: Literal["", "speed", "travel", "torque", "rate", "per_torque"] = ""
     alone: bool = True
 
 
@@ -71,7 +71,8 @@ def written_unit(unit: str, joint: Literal["revolute", "prismatic"] = "revolute"
     """A parameter's unit with T, S and U written out for a kind of joint and the channel that a sensor reads."""
     torque, position = ("N", "m") if joint == "prismatic" else ("N*m", "rad")
     reading = position if channel.startswith(("q.", "q_link.")) else torque
-    return "".join({"T": torque, "S": position, "U": reading}.get(c, c) for c in unit)
+    whole = unit.replace("/T", "/(T)") if "*" in torque else unit
+    return "".join({"T": torque, "S": position, "U": reading}.get(c, c) for c in whole)
 
 
 @dataclass(frozen=True)

@@ -72,9 +72,10 @@ class Evaluation(NamedTuple):
     by_parameter : numpy.ndarray, shape (n_samples, n_out, n_p)
         Total derivative, hidden states included.
     by_signal : numpy.ndarray, shape (n_samples, n_out, n_signal), or None
-        Derivative with respect to ``load`` (joint), ``value`` (sensor) or ``phi`` (link) of the same sample, states
-        held; None where the law does not read it. What passes through the states is had by running the change of the
-        signal through the law itself: the laws whose states read it, a spring and a delay, are linear in it.
+        Derivative with respect to ``load`` (joint), ``value`` (sensor) or ``phi`` (link) of the same sample; None where
+        the law does not read it. States of a joint's torque follow as they would at rest, those of the others are held:
+        what passes through these is had by running the change of the signal through the law itself, since a spring and
+        a delay are linear in it.
     """
 
     values: np.ndarray
@@ -241,7 +242,10 @@ def _build(effect: Effect, bare: bool) -> _Built:
     through = all_signals.get(THROUGH.get(effect.at, ""))
     outputs = [law] if bare else [law, ca.jacobian(law, p) + ca.jacobian(law, x) @ sensitivity]
     if through is not None and any(ca.which_depends(law, through, 1, False)):
-        outputs.append(ca.jacobian(law, through))
+        by_signal = ca.jacobian(law, through)
+        if effect.at == "joint" and effect.acts_on == "torque" and x.numel():
+            by_signal -= ca.jacobian(law, x) @ ca.solve(ca.jacobian(rate, x), ca.jacobian(rate, through))
+        outputs.append(by_signal)
     law_function = _compiled(effect, "law", [*u, _stacked(x, sensitivity), p], outputs, [*names, "states", "p"])
     if not effect.states:
         return _Built(names, law_function, None, None)

@@ -108,14 +108,16 @@ def steady_moment(s, x, y, z):
 
 
 def late_friction(s, level, travel, by_load):
-    """Dahl's curve in closed form, from reversal to reversal: exponential in the distance gone since the last."""
-    q, sign = s["q"], np.sign(s["qd"])
-    bent, turned, start = np.empty_like(q), 0, sign[0]
-    for i in range(q.size):
-        if sign[i] != sign[turned]:
-            turned, start = i, bent[i - 1]
-        bent[i] = sign[i] - (sign[i] - start) * np.exp(-abs(q[i] - q[turned]) / travel)
-    return (level + by_load * np.abs(s["load"])) * (bent - sign)
+    """Dahl's equation for the force: as stiff with load as without, and as strong as the load has it."""
+    stiffness, sign = level / travel, np.sign(s["qd"])
+    most = level * (1 + by_load * np.abs(s["load"]))
+
+    def rate(time, force):
+        speed = np.interp(time, TIME, s["qd"])
+        return stiffness * (speed - np.abs(speed) * force / np.interp(time, TIME, most))
+
+    force = solve_ivp(rate, TIME[[0, -1]], [most[0] * sign[0]], "LSODA", TIME, rtol=1e-8, atol=1e-8, max_step=DT).y[0]
+    return force - most * sign
 
 
 def friction_table(s, cosine, sine, period):
@@ -265,7 +267,7 @@ REFERENCES = {
     "quadratic_friction": Reference({"coefficient": 0.7}, lambda s, c: np.where(s["qd"] > 0, c, -c) * s["qd"] ** 2),
     "load_dependent_friction": Reference({"coefficient": 0.12}, lambda s, c: c * np.copysign(s["load"], s["qd"])),
     "position_dependent_friction": Reference({"cosine": 0.6, "sine": -0.8, "period": 1.3}, friction_table),
-    "presliding_hysteresis": Reference({"level": 3.0, "travel": 0.08, "by_load": 0.15}, late_friction),
+    "presliding_hysteresis": Reference({"level": 3.0, "travel": 0.08, "by_load": 0.05}, late_friction),
     "rotor_inertia": Reference({"inertia": 0.4}, lambda s, inertia: np.gradient(inertia * s["qd"], DT, edge_order=2)),
     "torque_ripple": Reference({"cosine": 0.3, "sine": 0.5, "period": 0.21}, ripple),
     "joint_elasticity": Reference({"stiffness": 3000.0, "damping": 15.0}, sprung_link),

@@ -42,6 +42,7 @@ def reference_of(name):
 def scale_of(parameter, s):
     travel, torque = np.ptp(s["q"]), np.abs(s["load"]).max()
     scales = {"": 1.0, "speed": s["speed_scale"][0], "travel": travel, "torque": torque, "rate": torque / travel}
+    scales["per_torque"] = 1 / torque
     return scales[parameter.relative_to]
 
 

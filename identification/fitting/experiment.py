@@ -158,6 +158,7 @@ class Scales:
             "travel": self.travel,
             "torque": self.torque,
             "rate": self.torque / self.travel,
+            "per_torque": 1 / self.torque,
         }[kind]
 
 
