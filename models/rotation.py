@@ -2,7 +2,7 @@
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 
 def exact(matrix: ArrayLike) -> ca.SX:
@@ -12,7 +12,7 @@ def exact(matrix: ArrayLike) -> ca.SX:
     return ca.SX(ca.sparsify(ca.DM(np.where(np.abs(values - rounded) < 1e-15, rounded, values))))
 
 
-def turn(axis: ArrayLike, angle: ca.SX) -> ca.SX:
+def turn(axis: NDArray[np.float64], angle: ca.SX) -> ca.SX:
     """Rotation matrix (3, 3) about a unit axis (3,) by an angle [rad] (Rodrigues)."""
     along = np.outer(axis, axis)
     return ca.cos(angle) * exact(np.eye(3) - along) + ca.sin(angle) * ca.skew(exact(axis)) + exact(along)

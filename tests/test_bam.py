@@ -152,7 +152,7 @@ def test_of_scores_as_good_as_equal_the_fewest_parameters_are_named():
     """One gain foretold a little worse says nothing, and turns with the last digits of a fit that sticks."""
     load, position = tried("load", 7, 42.4, 0.5, 0.7, -0.025), tried("position", 9, 42.6, 0.6, 0.7, -0.045)
     assert best([position, load]) is load
-    assert best([load, tried("position", 9, 45.0, 0.6, 0.7, 0.1)]).name == "position"
+    assert best([load, better := tried("position", 9, 45.0, 0.6, 0.7, 0.1)]) is better
     assert best([load, tried("ripple", 6, 35.0, 0.5, 0.5, 0.3)]) is load  # simpler, and much worse
     worse = tried("load", 7, 42.4, 0.5, 0.7, -0.06)
     assert best([worse, position]) is position
