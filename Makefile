@@ -6,10 +6,10 @@ STUDIES := emps kuka bam free-floating ground-capture zero-g-rig orbit-inspectio
 
 BENCHES := torque friction_fit diagnosis floating cosim fmu snare ecos_inspection tolerance
 
-.PHONY: help demo test check studies bench accuracy fuzz kills mutants proof fmus docs clean $(STUDIES:%=study-%)
+.PHONY: help demo test test-slow check studies bench accuracy fuzz kills mutants proof fmus docs clean $(STUDIES:%=study-%)
 
 help:            ## what can be made
-	@sed -n -e 's/^\$$(STUDIES.*## /  make study-NAME\t/p' -e 's/^\([a-z]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
+	@sed -n -e 's/^\$$(STUDIES.*## /  make study-NAME\t/p' -e 's/^\([a-z-]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
 
 demo: study-emps ## set up, then the main job: name the physics that a viscous model of EMPS leaves out
 
@@ -20,6 +20,9 @@ studies: $(filter-out study-tolerance,$(STUDIES:%=study-%)) ## every study but t
 
 test: .venv/installed ## set up, then the tests
 	$(BIN)/python -m pytest -n 2 --dist worksteal
+
+test-slow: .venv/installed ## the tests of whole studies and captures, which `make test` leaves out: two minutes; CI runs them
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m slow
 
 check: .venv/installed ## formatting, lint and types
 	$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/pyright --pythonpath $(BIN)/python

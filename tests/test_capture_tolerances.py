@@ -34,6 +34,7 @@ def check(section, after):
     assert not found, "\n".join([*map(str, found), RENEW])
 
 
+@pytest.mark.slow
 def test_the_papers_ground_capture():
     check("ground", ground_numbers())
 
@@ -46,6 +47,7 @@ def test_envelope_of_an_axis(axis):
         pytest.fail(f"envelope.{axis} has more than one end by now; look at the captures around {end.value:g}")
 
 
+@pytest.mark.slow
 def test_the_papers_arrival_in_orbit():
     check("arrival", arrival_numbers())
 

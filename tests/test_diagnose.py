@@ -80,7 +80,7 @@ def test_nothing_missing_is_adequate(tmp_path, seed):
     found = diagnosed(tmp_path, seed)
     assert found["verdict"] == "adequate", named(found)
     assert found["effects"] == []
-    assert {x["name"] for x in found["limits"]} >= {"sensor_bias", "harness_stiffness", "rotor_inertia"}
+    assert {x["name"] for x in found["limits"]} >= {"sensor_bias", "harness_stiffness", "rotor_inertia", "com_offset"}
 
 
 def test_payload_is_weighed(tmp_path):

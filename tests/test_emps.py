@@ -8,6 +8,8 @@ import pytest
 import snarelab.studies
 from snarelab.cli import main
 
+pytestmark = pytest.mark.slow
+
 MODELS = Path(snarelab.studies.__file__).parent / "emps"
 
 

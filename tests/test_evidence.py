@@ -219,10 +219,11 @@ def test_likeness_is_the_cosine_after_the_baseline():
 
 
 def test_smallest_amplitude_gains_what_is_needed():
-    problem = Problem(2, k=1)
+    problem = Problem(2, k=2)
     evidence = problem.evidence()
-    amplitude = evidence.smallest(problem.products(evidence), 7.0)
-    assert left(problem.x, problem.c[:, 0] * amplitude) == pytest.approx(7.0, rel=1e-9)
+    for column in range(2):
+        amplitude = evidence.smallest(problem.products(evidence), column, 7.0)
+        assert left(problem.x, problem.c[:, column] * amplitude) == pytest.approx(7.0, rel=1e-9)
 
 
 def test_baseline_with_columns_that_depend_on_each_other():

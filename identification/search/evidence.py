@@ -225,10 +225,10 @@ class Evidence:
         ]
         return float(both / np.sqrt(max(own[0] * own[1], 1e-300)))
 
-    def smallest(self, p: Products, needed: float) -> float:
-        """Amplitude of a one-column candidate that would gain ``needed``, the baseline fitted again beside it."""
+    def smallest(self, p: Products, column: int, needed: float) -> float:
+        """Amplitude of one of a candidate's columns that would gain ``needed``, the baseline fitted again beside it."""
         cross = p.cross.sum(0)
-        schur = float((p.own.sum(0) - cross.T @ self._total.solve(cross))[0, 0])
+        schur = float((p.own.sum(0) - cross.T @ self._total.solve(cross))[column, column])
         return float(np.sqrt(2 * needed / max(schur, 1e-300)))
 
     def _energy(self, b: int, theta: Array, p: Products | None = None, amplitudes: Array | None = None) -> float:

@@ -194,15 +194,22 @@ def _hung(found: Fit, experiments: Sequence[Experiment]) -> Array:
 
 
 def _limits(assembly: Assembly, evidence: Evidence, j: Judged, needed: float, worth: float) -> list[Limit]:
-    """The smallest amplitude of an effect that would have passed; none where it has no single amplitude."""
-    parameters, amplitudes = j.placed.effect.parameters, j.variant.amplitudes
-    if not len(amplitudes) or not all(parameters[i].grid for i in amplitudes[1:]):
-        return []
-    p = parameters[int(amplitudes[0])]
+    """The smallest that each of an effect's amplitudes would have had to be, by itself, to pass."""
+    tried = [j.placed.effect.parameters[i] for i in j.variant.amplitudes]
     # Both bars count: a score above noise, and a share of the residual worth a name.
     energy = sum(float(np.sum(evidence.channels[c].residual ** 2)) for c in j.channels)
-    value = evidence.smallest(evidence.products(list(j.columns.items())), max(needed, 0.5 * worth * energy))
-    return [Limit(j.placed.effect.name, j.placed.at, p.name, value, assembly.unit(j.placed, p))]
+    products, needed = evidence.products(list(j.columns.items())), max(needed, 0.5 * worth * energy)
+    return [
+        Limit(
+            j.placed.effect.name,
+            j.placed.at,
+            p.name,
+            evidence.smallest(products, k, needed),
+            assembly.unit(j.placed, p),
+        )
+        for k, p in enumerate(tried)
+        if p.alone and not p.grid
+    ]
 
 
 def reliably_positive(gains: Array, errors: float = 2.0) -> bool:
