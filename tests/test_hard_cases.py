@@ -61,6 +61,19 @@ def test_bristles_under_a_disturbance_are_told_beside_the_level_they_carry(tmp_p
     assert error[1] < 1.05  # times the disturbance and the noise
 
 
+def test_bristles_under_load_are_told_near_rest_too(tmp_path):
+    """Friction by load is most of what the joint's bristles carry: where they were taken to slip after the same travel
+    whatever the load, 40 % of the error was closed."""
+    answer, found = diagnosed(110, tmp_path / "case", 90500)
+    assert answer.kinds == ("load_dependent_friction",)
+    (joint,) = {truth.at for truth in answer.truths}
+    assert [(e.name, e.at) for e in found.effects] == [("load_dependent_friction", joint)]
+    error = judge(answer, found.to_json()).error
+    assert error
+    assert error[0] > 4.0
+    assert error[1] < 1.05  # times the disturbance and the noise
+
+
 def test_a_cable_that_hardens_is_no_harness(tmp_path):
     """The spring that stands in for it leaves most; a curve on top of the spring takes that, and gains more."""
     answer, found = diagnosed(66, tmp_path / "case", 90300)
