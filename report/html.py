@@ -114,12 +114,17 @@ def page(title: str, header: str, sections: Sequence[tuple[str, str, str]], foot
 def headline(text: str) -> str:
     """What was found, as plain text: its first sentence is the heading, the others stand below."""
     first, stop, rest = text.partition(". ")
-    return f"<h1>{escape(first + stop.rstrip())}</h1>\n{paragraph(rest) if rest else ''}"
+    return f"<h1>{_kept(first + stop.rstrip())}</h1>\n{paragraph(rest) if rest else ''}"
 
 
 def paragraph(text: str, kind: str = "") -> str:
     """A paragraph of plain text."""
-    return f"<p{_class(kind)}>{escape(text)}</p>\n"
+    return f"<p{_class(kind)}>{_kept(text)}</p>\n"
+
+
+def _kept(text: str) -> str:
+    """Plain text as markup; a number and its % stay on one line."""
+    return escape(text.replace(" %", "\u202f%"))
 
 
 def table(

@@ -9,6 +9,7 @@ from html import escape
 from pathlib import Path
 
 from ..files import written_whole
+from ..identification.report.words import unit_words
 from ..report.html import figure, headline, page, paragraph, table
 from .outcome import FOLDER, Quantity
 
@@ -137,7 +138,7 @@ def _numbers(quantities: Sequence[Quantity]) -> str:
     rows = [
         [
             escape(q.name.replace("_", " ")),
-            escape("" if q.unit == "1" else q.unit),
+            escape("" if q.unit == "1" else unit_words(q.unit)),
             "–" if q.paper is None else f"{q.paper:g}",
             _text(q.ours) if isinstance(q.ours, float) else _said(_text(q.ours)),
             "" if q.low is None or q.high is None else f"{q.low:.4g} to {q.high:.4g}",
