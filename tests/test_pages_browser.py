@@ -109,6 +109,7 @@ def test_paper_hides_and_cuts_nothing(browser: Browser, pages: dict[str, Path], 
 
 def test_without_scripts_the_plots_are_plain(browser: Browser, pages: dict[str, Path]) -> None:
     with opened(browser, pages["missing_physics"], scripts=False) as page:
-        assert " ".join(page.locator("h1,h1+p").all_inner_texts()) == VERDICTS["missing_physics"]().sentence.replace(" %", "\u202f%")
+        sentence = VERDICTS["missing_physics"]().sentence.replace(" %", "\u202f%")
+        assert " ".join(page.locator("h1,h1+p").all_inner_texts()) == sentence
         assert page.locator(".plot img:visible").count() > 5
         assert page.locator(".cursor,.times,[tabindex]").count() == 0
