@@ -239,7 +239,8 @@ def _parameter_table(result: dict[str, Any]) -> str:
 
 def _notice(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
     if issubclass(category, UserWarning):
-        print(f"snarelab: {one_line(message)}", file=sys.stderr)
+        line = "\r\x1b[2K" if sys.stderr.isatty() else ""  # what is under way may stand there
+        print(f"{line}snarelab: {one_line(message)}", file=sys.stderr)
 
 
 if __name__ == "__main__":

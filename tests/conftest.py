@@ -3,6 +3,7 @@
 import os
 import signal
 import sys
+import warnings
 from collections.abc import Generator
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import pytest
 
 from snarelab.errors import InputError
+from snarelab.models import compiled
 from snarelab.models.c_library import find_compiler
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -48,6 +50,21 @@ def pytest_runtest_setup(item: pytest.Item) -> Generator[None, Any, Any]:
 def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
     """Tests that build something."""
     return (yield from _skipped_without_compiler())
+
+
+@pytest.fixture(autouse=True)
+def _told_of_no_compiler() -> None:
+    """Where there is none, a process says so once: before any test, so that none depends on which comes first."""
+    if NO_COMPILER:
+        with warnings.catch_warnings(action="ignore"):
+            compiled._notify(NO_COMPILER)
+
+
+@pytest.fixture
+def compiler() -> None:
+    """For tests of what only a compiled program does, or says nothing more of."""
+    if NO_COMPILER:
+        pytest.skip(NO_COMPILER)
 
 
 @pytest.fixture(scope="session")

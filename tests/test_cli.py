@@ -13,7 +13,8 @@ from arm_commands import arguments, table
 
 import snarelab
 import snarelab.identification.identify
-from snarelab.cli import main
+from snarelab.cli import _notice, main
+from snarelab.progress import Progress
 
 
 def test_version(capfd):
@@ -42,6 +43,7 @@ def test_identify_writes_what_is_asked_and_says_it(arm_folder, capfd):
     assert {p.name for p in arm_folder.iterdir()} == names | {"out.json", "new.toml"}
 
 
+@pytest.mark.usefixtures("compiler")
 def test_the_program_itself(arm_folder):
     """As a user starts it: JSON alone on standard output, nothing on a piped standard error; one line for a mistake."""
     environment = {**os.environ, "OMP_NUM_THREADS": "1"}
@@ -76,11 +78,12 @@ def test_diagnose_of_a_recording_in_pieces(arm_folder, capfd):
     assert main(["simulate", "new.toml", "--motion", "hold.csv", "--out", "sim.parquet"]) == 0
 
 
-def test_progress_on_a_terminal_is_one_line_that_goes_away(arm_folder, monkeypatch):
-    class Terminal(io.StringIO):
-        def isatty(self):
-            return True
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
 
+
+def test_progress_on_a_terminal_is_one_line_that_goes_away(arm_folder, monkeypatch):
     screen = Terminal()
     monkeypatch.setattr(sys, "stderr", screen)
     assert main(["identify", "arm.toml", "train.csv"]) == 0
@@ -127,3 +130,13 @@ def test_notices_are_one_line_each_and_leave_no_trace(arm_folder, capfd, monkeyp
     assert main(arguments("identify")) == 0
     assert capfd.readouterr().err == "snarelab: no C compiler\n"
     assert warnings.showwarning is shown
+
+
+@pytest.mark.filterwarnings("default")
+def test_a_notice_takes_the_line_of_the_progress(monkeypatch):
+    monkeypatch.setattr(sys, "stderr", screen := Terminal())
+    with Progress() as show, warnings.catch_warnings():
+        warnings.showwarning = _notice
+        show("reading")
+        warnings.warn("no C compiler", UserWarning, stacklevel=2)
+    assert screen.getvalue().endswith("reading\r\x1b[2Ksnarelab: no C compiler\n\r\x1b[2K")

@@ -83,6 +83,7 @@ def test_scan_hands_each_state_to_the_next_sample():
         doubled().scan(np.zeros(2), np.zeros((5, 1)))
 
 
+@pytest.mark.usefixtures("compiler")
 def test_a_damaged_library_is_rebuilt(own_cache):
     check_doubled()
     (library,) = own_cache.iterdir()
@@ -97,6 +98,7 @@ def test_a_damaged_library_is_rebuilt(own_cache):
     assert library.stat().st_mtime_ns == before  # found, not built again
 
 
+@pytest.mark.usefixtures("compiler")
 def test_threads_that_build_the_same_library_do_not_clash(own_cache):
     faults: list[Exception] = []
 

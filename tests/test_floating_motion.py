@@ -189,6 +189,7 @@ def test_every_joint_torque_of_the_registry_runs():
             assert 0.0 <= qd <= 1.0, name
 
 
+@pytest.mark.usefixtures("compiler")
 def test_bad_drives_are_named(gains):
     arm = flywheel()
     with pytest.raises(InputError, match=r"stiffness is \[1.0, 2.0\]; give 1 finite numbers >= 0"):

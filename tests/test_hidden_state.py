@@ -268,6 +268,7 @@ def test_threads_share_effects():
         np.testing.assert_array_equal(result.by_parameter, alone.by_parameter)
 
 
+@pytest.mark.usefixtures("compiler")
 def test_prepared_effects_need_no_compiler_later(rebuilt, tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     prepare([DELAY, SPRING, get_effect("viscous_friction")])

@@ -40,6 +40,7 @@ def files(folder):
     return {p.name for p in folder.iterdir()}
 
 
+@pytest.mark.usefixtures("compiler")
 def test_disk_full_while_a_result_is_written(folder):
     before = files(folder)
     process = start(
@@ -178,6 +179,7 @@ def test_quiet_in_a_pipe_and_logged_where_asked(monkeypatch, capfd, verbosity, l
     assert [line.partition(" snarelab: ")[2] for line in told] == lines
 
 
+@pytest.mark.usefixtures("compiler")
 def test_progress_on_a_terminal_is_rewritten_and_gone_at_the_end(folder):
     leader, follower = pty.openpty()
     with start(folder, IDENTIFY, stderr=follower, stdout=subprocess.DEVNULL) as process:

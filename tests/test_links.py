@@ -146,6 +146,7 @@ def test_a_spring_is_told_from_a_delay_and_from_play(tmp_path, gap):
         assert parameters(links["joint2"], "joint_elasticity")["stiffness"] == pytest.approx(4e4, rel=0.1)
 
 
+@pytest.mark.usefixtures("compiler")
 def test_whole_answer_and_saved_model(rigid, tmp_path):
     folder, recordings = rigid
     paths = write(tmp_path, recordings, change=lambda t, q: CubicSpline(t, q)(t - 0.003) + 0.002)
