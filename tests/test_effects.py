@@ -16,6 +16,7 @@ from scipy.optimize import least_squares
 
 import snarelab.models.effects
 from snarelab.errors import InputError
+from snarelab.models.effect import written_unit
 from snarelab.models.effects import FAMILIES, effects, get_effect
 from snarelab.models.hidden_state import THROUGH, Evaluation, evaluate_law
 
@@ -177,6 +178,21 @@ def test_recovers_parameters_from_data_it_did_not_generate(name):
 def test_effect_without_reference_says_what_to_add():
     with pytest.raises(pytest.fail.Exception, match=r"add REFERENCES\['new_effect'\] to tests/effect_references.py"):
         reference_of("new_effect")
+
+
+@pytest.mark.parametrize(
+    ("unit", "joint", "channel", "written"),
+    [
+        ("T*s/S", "revolute", "", "N*m*s/rad"),
+        ("T*s/S", "prismatic", "", "N*s/m"),
+        ("1/T", "revolute", "", "1/(N*m)"),
+        ("1/T", "prismatic", "", "1/N"),
+        ("U", "revolute", "tau.joint1", "N*m"),
+        ("U", "prismatic", "q_link.slide", "m"),
+    ],
+)
+def test_units_are_written_out_for_a_kind_of_joint(unit, joint, channel, written):
+    assert written_unit(unit, joint, channel) == written
 
 
 def test_members_are_the_files_in_order_of_family():
