@@ -75,3 +75,27 @@ def test_an_effect_at_its_limit_explains_the_share_that_is_worth_a_name_where_th
     limit = screened(monkeypatch, 0.2, residual)
     assert gained(limit.value * COLUMN) == pytest.approx(0.5 * 0.2 * np.sum(residual**2), rel=1e-9)
     assert gained(limit.value * COLUMN) > NOISE_REACHES + PRICE
+
+
+@pytest.mark.parametrize(
+    ("name", "given"),
+    [("position_dependent_friction", ["cosine", "sine"]), ("harness_stiffness", ["stiffness"])],
+)
+def test_each_amplitude_has_a_limit_by_itself_but_for_what_is_no_effect_alone(name, given):
+    block = np.arange(N) * 10 // N
+    residual = np.random.default_rng(9).normal(size=N)
+    evidence = Evidence([Channel(np.arange(2), BASELINE, residual, OTHERS[:, 1], block)], 2, 10)
+    two = np.column_stack([COLUMN, 3.0 * OTHERS[:, 1]])
+    judged: Any = Made(
+        placed=Placed(get_effect(name), "joint1"),
+        variant=Made(amplitudes=np.array([0, 1])),
+        channels=(0,),
+        columns={0: two},
+    )
+    assembly: Any = Made(unit=lambda *_: "N*m")
+    limits = screening._limits(assembly, evidence, judged, 7.0, 0.0)
+    assert [limit.parameter for limit in limits] == given
+    for k, limit in enumerate(limits):
+        alone = limit.value * two[:, [k]]
+        left = alone - BASELINE @ np.linalg.lstsq(BASELINE, alone, rcond=None)[0]
+        assert 0.5 * float(np.sum(left**2)) == pytest.approx(7.0, rel=1e-9)
