@@ -7,7 +7,8 @@ from scipy.spatial.transform import Rotation
 
 from snarelab.models.rotation import quaternion_of, quaternion_rate, rotation_of, turn
 
-TURNS = [*Rotation.random(40, np.random.default_rng(3)), *Rotation.from_rotvec(np.pi * np.vstack([np.eye(3), -np.eye(3)]))]
+HALVES = Rotation.from_rotvec(np.pi * np.vstack([np.eye(3), -np.eye(3)]))
+TURNS = [*Rotation.random(40, np.random.default_rng(3)), *HALVES]
 """At random, and half turns about each axis, where w is zero."""
 
 
