@@ -189,6 +189,11 @@ def unknown_effect() -> Diagnosis:
     )
 
 
+def unbroken(text: str) -> str:
+    """As a page has it: a number and its % stay on one line."""
+    return text.replace(" %", "\u202f%")
+
+
 VERDICTS = {"missing_physics": missing_physics, "adequate": adequate, "unknown_effect": unknown_effect}
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 from browser import opened, playing
-from diagnoses import VERDICTS
+from diagnoses import VERDICTS, unbroken
 from playwright.sync_api import Browser
 from proof_answers import several
 from study_pages import QUANTITIES, moving, picture
@@ -109,7 +109,7 @@ def test_paper_hides_and_cuts_nothing(browser: Browser, pages: dict[str, Path], 
 
 def test_without_scripts_the_plots_are_plain(browser: Browser, pages: dict[str, Path]) -> None:
     with opened(browser, pages["missing_physics"], scripts=False) as page:
-        sentence = VERDICTS["missing_physics"]().sentence.replace(" %", "\u202f%")
+        sentence = unbroken(VERDICTS["missing_physics"]().sentence)
         assert " ".join(page.locator("h1,h1+p").all_inner_texts()) == sentence
         assert page.locator(".plot img:visible").count() > 5
         assert page.locator(".cursor,.times,[tabindex]").count() == 0

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from browser import opened, pixels
-from diagnoses import VERDICTS
+from diagnoses import VERDICTS, unbroken
 from pages import pictures, read
 from playwright.sync_api import Browser
 
@@ -57,11 +57,6 @@ def test_needs_nothing_from_elsewhere(reports: dict[str, Path], verdict: str) ->
         assert not re.search(r"url\((?!#)|@import|<script|<image[^>]*https?:", picture)
     style = re.sub(r"<img[^>]*>", "", reports[verdict].read_text(encoding="utf-8"))
     assert not re.search(r"https?:|url\(|@import", style)
-
-
-def unbroken(text: str) -> str:
-    """As a page has it: a number and its % stay on one line."""
-    return text.replace(" %", "\u202f%")
 
 
 def test_findings_are_told_in_words(reports: dict[str, Path]) -> None:

@@ -12,7 +12,7 @@ ALIKE = 0.98
 """Cosine from which on two effects explain the same."""
 
 TIE = 2.0
-"""Difference of two scores that says nothing."""
+"""Difference of two scores that says nothing (Kass and Raftery 1995: not worth more than a bare mention)."""
 
 
 def all_passing(result: Screening, joints: Sequence[str]) -> list[Judged]:
