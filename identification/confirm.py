@@ -10,14 +10,14 @@ from .fitting.experiment import Experiment
 from .fitting.fit import Fit, channel_rms, fit
 from .search.choice import Taken
 from .search.forward import Found, carry, without
-from .search.rest import fitted, moving
+from .search.rest import begun, fitted, moving
 from .search.trial import MOST
 
 Array = NDArray[np.float64]
 
 CONFIRM = 0.05
 """An effect is confirmed if the held-out residual energy of its channels, in motion, rises by this share when it is
-taken out, and that over all samples rises too (but for friction that rises near rest)."""
+taken out, and that over all samples since the first motion rises too (but for friction that rises near rest)."""
 
 SURE = 2.0
 """Standard deviations from zero that one of an effect's amplitudes must have: two names that can swap what they explain
@@ -60,7 +60,7 @@ def confirm(
     tried again in the order of how much they were missed before, and only until one is to go.
     """
     progress("confirming on the held-out recording")
-    final, in_motion = found.fit, [moving(e) for e in locked]
+    final, since, in_motion = found.fit, [begun(e) for e in locked], [moving(e) for e in locked]
     left = {t.judged.placed.key: t for t in found.taken}
     missed: dict[str, _Missed] = {}
     rejected: list[Taken] = []
@@ -69,7 +69,7 @@ def confirm(
         # What was never tried, then what was missed least.
         key = min(stale, key=lambda k: missed[k].rise if k in missed else -np.inf)
         stale.remove(key)
-        missed[key] = _missed(left[key], final, train, locked, in_motion)
+        missed[key] = _missed(left[key], final, train, locked, since, in_motion)
         if any(k not in missed for k in left):
             continue
         weakest = min(left, key=lambda k: missed[k].rise)
@@ -83,7 +83,12 @@ def confirm(
 
 
 def _missed(
-    t: Taken, final: Fit, train: Sequence[Experiment], locked: Sequence[Experiment], in_motion: Sequence[Experiment]
+    t: Taken,
+    final: Fit,
+    train: Sequence[Experiment],
+    locked: Sequence[Experiment],
+    since: Sequence[Experiment],
+    in_motion: Sequence[Experiment],
 ) -> _Missed:
     """Take one effect out of a fit and fit the rest again. Channels are weighted as the fit weights them."""
     c, effect = list(t.judged.channels), t.judged.placed.effect
@@ -97,9 +102,10 @@ def _missed(
     adds = channel_rms(assembly, locked, carry(final, assembly))[0]
     if _energy(adds - with_it, c, final) <= LEAST * _energy(with_it, c, final):
         return _Missed(0.0, trial, rest)
-    # Nor is a name confirmed that leaves the recording as a whole no better; friction that rises near rest is read off
-    # where the joint creeps, and how a sign is rounded at rest is not its fault.
-    worse = _energy(rms, c, final) <= _energy(with_it, c, final) and not effect.exceeds_at_rest
+    # Nor is a name confirmed that leaves the recording as a whole no better, from its first motion on; friction that
+    # rises near rest is read off where the joint creeps, and how a sign is rounded at rest is not its fault.
+    since_with, since_without = (channel_rms(x.assembly, since, x.theta)[0] for x in (final, rest))
+    worse = _energy(since_without, c, final) <= _energy(since_with, c, final) and not effect.exceeds_at_rest
     if not _known(final, t) or worse:
         return _Missed(0.0, trial, rest)
     # A joint at rest holds what it is given: there, only laws for what happens at rest can be missed.

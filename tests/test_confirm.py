@@ -103,6 +103,8 @@ def test_a_name_is_missed_in_motion_or_where_its_law_holds_and_over_all_samples(
     energy = {
         ("final", "all"): 1.0,
         ("rest", "all"): everywhere,
+        ("final", "since"): 1.0,
+        ("rest", "since"): everywhere,
         ("final", "motion"): floor,
         ("rest", "motion"): floor * motion,
         ("without", "all"): 2.0,  # the same fit with the effect struck out
@@ -128,7 +130,7 @@ def test_a_name_is_missed_in_motion_or_where_its_law_holds_and_over_all_samples(
     }.items():
         monkeypatch.setattr(module, name, stand_in)
     taken: Any = SimpleNamespace(judged=judged)
-    samples: Any = ("train", "all", "motion")
+    samples: Any = ("train", "all", "since", "motion")
     assert (module._missed(taken, final, *samples).rise > 1) is kept
 
 
@@ -150,7 +152,7 @@ def missed(monkeypatch, rms, *, flags=None, known=True, sigma=(1.0, 1.0), channe
         "_known": lambda *_: known,
     }.items():
         monkeypatch.setattr(module, name, stand_in)
-    samples: Any = ("train", "all", "motion")
+    samples: Any = ("train", "all", "since", "motion")
     return module._missed(*cast(Any, (SimpleNamespace(judged=judged), SimpleNamespace(
         assembly="final", theta="final", sigma=np.array(sigma)), *samples)))  # fmt: skip
 
@@ -159,6 +161,8 @@ RMS = {
     ("final", "all"): [1.0, 1.0],
     ("rest", "all"): [1.2, 1.5],  # relative to 2 and 4 the first channel loses 0.1, the second 0.125
     ("carried", "all"): [3.0, 3.0],
+    ("final", "since"): [1.0, 1.0],
+    ("rest", "since"): [1.2, 1.5],
     ("final", "motion"): [1.0, 1.0],
     ("rest", "motion"): [1.1, 1.0],
     ("final", "creeping"): [1.0, 1.0],
@@ -200,6 +204,13 @@ def test_what_moves_a_millionth_of_the_energy_or_less_adds_nothing(monkeypatch, 
     found = missed(monkeypatch, RMS | {("carried", "all"): [1.0 + change, 1.0]}, channels=(0,))
     assert found.rise == pytest.approx(0.21 / 0.05 if adds else 0.0)
     assert found.trial == pytest.approx((0.5, 0.6))
+
+
+@pytest.mark.parametrize(("since", "missed_"), [((1.0, 1.0), 0.0), ((1.01, 1.0), 0.105 / 0.05)])
+def test_the_recording_must_be_told_better_from_its_first_motion_on(monkeypatch, since, missed_):
+    """What is held before it is told better without the effect, and says nothing."""
+    rms = RMS | {("rest", "all"): [0.8, 0.8], ("rest", "since"): list(since)}
+    assert missed(monkeypatch, rms).rise == pytest.approx(missed_)
 
 
 def test_an_effect_whose_size_is_not_known_is_not_missed(monkeypatch):

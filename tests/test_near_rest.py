@@ -14,6 +14,7 @@ from snarelab.identification.search.rest import (
     LONGEST_RUN,
     REST,
     Without,
+    begun,
     bridged,
     fitted,
     friction_less,
@@ -207,3 +208,21 @@ def test_what_is_left_stands_in_the_order_of_time_and_a_combination_where_it_beg
     two = Without(kept[:5], ((slice(0, 1), np.ones((1, 1))), (slice(3, 5), np.ones((2, 1)))))
     np.testing.assert_allclose(two(np.arange(1.0, 6.0)), [1, 2, 9])
     np.testing.assert_array_equal(two.first(np.arange(5)), [0, 1, 3])
+
+
+def test_before_its_first_motion_a_joint_counts_for_nothing_and_from_then_on_all_of_it_does():
+    """Of two runs, each begins at rest; the first joint turns back in the second. The other joint never stands."""
+    speed = at(20, *((k, 0.0) for k in (0, 1, 2, 10, 11)), (15, 0.0))
+    e = run(speed, np.ones(20), segments=(slice(0, 10), slice(10, 20)))
+    kept = begun(e).kept
+    assert kept is not None
+    assert np.flatnonzero(~kept[:, 0]).tolist() == [0, 1, 2, 3, 10, 11, 12]  # and one that differentiation mixes in
+    assert kept[:, 1].all()
+    assert begun(e) is begun(e)
+    assert (begun(e).bridged, begun(e).measured.shape) == ((), e.measured.shape)
+
+
+def test_a_joint_that_never_moves_counts_whole():
+    kept = begun(run(np.ones(20), np.zeros(20))).kept
+    assert kept is not None
+    assert kept.all()

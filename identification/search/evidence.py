@@ -71,11 +71,12 @@ class Products:
 @dataclass(frozen=True)
 class Gain:
     """Of one candidate: log-likelihood gained, its amplitudes (k,), and the least share of a column that the
-    baseline cannot mimic: 0 gain where that is too little."""
+    baseline cannot mimic: 0 gain, and ``mimicked``, where that is too little."""
 
     total: float
     amplitudes: Array
     unabsorbed: float
+    mimicked: bool = False
 
 
 class Evidence:
@@ -158,7 +159,7 @@ class Evidence:
         left = np.where(np.diag(own) > NOTHING, np.diag(schur) / np.maximum(np.diag(own), NOTHING), 0.0)[:counted]
         unabsorbed = float(np.min(left)) if len(left) > 1 else float(left[0])
         if unabsorbed < (least or (ABSORBED if len(left) == 1 else ABSORBED_PART)):
-            return Gain(0.0, np.zeros(len(low)), unabsorbed)
+            return Gain(0.0, np.zeros(len(low)), unabsorbed, mimicked=True)
         target = p.right.sum(0) - cross.T @ self._fitted
         amplitudes = _bounded(schur, own, target, low, high)
         return Gain(float(target @ amplitudes - 0.5 * amplitudes @ schur @ amplitudes), amplitudes, unabsorbed)

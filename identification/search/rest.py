@@ -81,6 +81,19 @@ def _bridged(experiment: Experiment, shares: tuple[float, ...], drop: bool) -> E
     return experiment.store[key]
 
 
+def begun(experiment: Experiment) -> Experiment:
+    """The same, and what a joint holds before it first moves counts for nothing: that hangs on how it came to rest."""
+    if "begun" not in experiment.store:
+        kept = np.zeros(experiment.measured.shape, bool)
+        for c in range(kept.shape[1]):
+            going = ~near_rest(experiment, c)
+            for part in experiment.motion.band_segments():
+                kept[part, c] = np.logical_or.accumulate(going[part])
+        kept |= ~kept.any(axis=0)
+        experiment.store["begun"] = experiment.with_bridges((), kept)
+    return experiment.store["begun"]
+
+
 def _bridge(experiment: Experiment, rest: Mask) -> Bridge:
     """Across the samples at rest (n,), inside each run without a gap."""
     empty = np.zeros(0, int)

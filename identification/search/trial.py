@@ -63,7 +63,7 @@ class Trial:
 
 
 def tried(ground: Grounds, options: Sequence[Option], null: Null) -> Trial | None:
-    """Judge an effect at a place; None where nothing speaks for it.
+    """Judge an effect at a place; None where the baseline can mimic it.
 
     Parameters
     ----------
@@ -129,15 +129,19 @@ class _Judge:
         return free_parameters(asked.found.assembly, asked.experiments[0], asked.states[0], variant)
 
     def __call__(self, samples: Samples, options: Sequence[Option], null: Null | None = None) -> Judged | None:
-        """The best point of an effect's grid and set of amplitudes; None where no point gains anything."""
+        """The best point of an effect's grid and set of amplitudes; None where the baseline can mimic every point.
+
+        Where no point gains anything, as where friction would have to be negative, it is the grid's middle.
+        """
         best: tuple[float, float, int, NDArray[np.int_], Array, Case] | None = None
-        cases = samples.cases(options)
+        cases = list(enumerate(samples.cases(options)))
+        cases.sort(key=lambda numbered: abs(numbered[0] - len(cases) // 2))
         for subset in options[0][0].subsets():
             price = self._price(_with(options[0][0], subset))
-            for number, whole in enumerate(cases):
+            for number, whole in cases:
                 case = whole.only(subset)
                 gain = case.gain()
-                if gain.total <= 0:
+                if gain.mimicked:
                     continue
                 if best is None or gain.total - price > best[0]:
                     best = (gain.total - price, price, number, subset, gain.amplitudes[: len(subset)], case)
