@@ -94,7 +94,7 @@ def record(effect: str, seed: int, folder: Path, duration: float = 10.0) -> tupl
         path = folder / f"{effect}{seed}_{role}.csv"
         paths.append(path)
         if not path.exists():
-            write(path, simulate(SnareParameters(), target, truth, duration, n_segments=20, step=None), target, rng)
+            write(path, simulate(SnareParameters(), target, truth, duration), target, rng)
     return model, paths, size
 
 

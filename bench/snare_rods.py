@@ -8,8 +8,10 @@ Rods, joints, ring and collision are those of `mujoco_rods`. How each effect get
 - ``hang_point_clearance``: the line is a force of its own here, with a hard dead zone.
 - ``contact_stiffness`` and ``contact_damping``: MuJoCo's contacts scale with mass and cannot be given a stiffness per
   overlap. For these two, contacts between cables and pin are a penalty force on the rods' capsules: Hertz's law with
-  Kelvin and Voigt's damping as Li et al. write it (eq. 19: K x^1.5 + C times the rate of x, never pulling), and Coulomb
-  friction, explicit, at a tenth of a millisecond. The engine under test has Hunt and Crossley's law instead.
+  damping as Li et al. write it (eq. 19: K x^1.5 + C times the rate of x, never pulling) behind a stiff spring, which
+  makes it Zener's solid, and Coulomb friction that sticks on a spring until it slips (Cundall and Strack 1979), at a
+  tenth of a millisecond. The engine under test has Hunt and Crossley's law instead, and friction that never quite
+  sticks.
 """
 
 from dataclasses import dataclass, replace
@@ -27,6 +29,10 @@ from snarelab.models.snare.settled import settled
 from snarelab.models.snare.target import Target
 
 Array = NDArray[np.float64]
+
+STICK, BEHIND = 5e4, 1e5
+"""[N/m] Of the spring on which a penalty contact sticks (it slips after some 0.01 mm), and of that behind its damper:
+explicit steps of a tenth of a millisecond bear no stiffer ones, and no damper of that strength alone."""
 
 
 @dataclass(frozen=True)
@@ -57,19 +63,22 @@ def simulate(
     target: Target,
     truth: Truth,
     duration: float = 10.0,
-    n_segments: int = 20,
+    n_segments: int | None = None,
     step: float | None = None,
 ) -> Seen:
     """Simulate a capture of a target on a spring that keeps its orientation."""
-    step = step or (1e-4 if truth.penalty else 2e-4)
+    step = step or (1e-4 if truth.penalty else 4e-4)
+    n_segments = n_segments or (
+        20 if truth.penalty else 40
+    )  # rods touch with their corners, the curve through them not
     short = parameters.cable_length * (1 - truth.pretension / parameters.axial_stiffness)
     p = parameters.with_values(friction=truth.friction, bending_damping=truth.cable_damping, cable_length=short)
     model, data = _model(p, target, truth, n_segments, step)
     ring, pin = model.joint("ring").dofadr[0], model.joint("pin.x").dofadr[0]
     body = model.body("pin").id
     weight = target.mass * np.asarray(target.gravity)
-    rods = np.array([[model.body(f"cable{c}").id + k for k in range(n_segments)] for c in range(3)]).ravel()
-    contact = None if truth.penalty is None else _Penalty(p, target, truth.penalty, p.cable_length / n_segments)
+    rods = np.array([[model.body(f"cable{c}").id + k for k in range(n_segments)] for c in range(3)])
+    contact = None if truth.penalty is None else _Penalty(p, target, truth.penalty, n_segments, step)
     n = round(duration / step)
     position, force, angles = np.empty((n, 3)), np.empty((n, 3)), np.empty(n)
     for k in range(n):
@@ -124,60 +133,113 @@ def _line(target: Target, clearance: float, moved: Array) -> Array:
 
 
 class _Penalty:
-    """Contact of rods with the shaft: at each rod's point nearest to the shaft's axis, while it is beside the shaft."""
+    """Contact of cables with the shaft: where a smooth curve through the rods' joints is nearest to the shaft's axis.
 
-    def __init__(self, p: SnareParameters, target: Target, law: tuple[float, float], size: float) -> None:
+    Rods alone would touch with their corners. The curve is Catmull and Rom's; the force acts on the rod beneath it.
+    """
+
+    def __init__(
+        self, p: SnareParameters, target: Target, law: tuple[float, float], n_segments: int, step: float
+    ) -> None:
         w, x, y, z = target.orientation
         axis = np.array([1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)])
         self._foot, self._axis = np.asarray(target.position, float), axis
-        self._numbers = np.array([p.cable_radius + p.pin_radius, law[0], law[1], p.friction, size, p.pin_length])
+        self._numbers = np.array([p.cable_radius + p.pin_radius, law[0], law[1], p.friction, p.pin_length, step])
+        self._held = np.full((3, n_segments, 4), np.nan)
 
     def __call__(self, model: Any, data: Any, rods: Array, pin: int) -> Array:
-        """Put the forces on the rods; returns the force on the pin [N]."""
+        """Put the forces on the rods (3, n_segments); returns the force on the pin [N]."""
         foot = self._foot + data.qpos[model.nq - 3 :]
         velocity = data.qvel[pin : pin + 3].copy()
-        twist = data.cvel[rods]
+        flat = rods.ravel()
+        joints = np.concatenate([data.xpos[rods], [[data.site(f"end{c}").xpos] for c in range(3)]], axis=1)
         forces, moments, total = _push(
-            data.xpos[rods], data.xmat[rods], data.xipos[rods], twist, data.subtree_com[model.body_rootid[rods]],
-            foot, velocity, self._axis, self._numbers,
+            joints, data.xipos[flat], data.cvel[flat], data.subtree_com[model.body_rootid[flat]],
+            foot, velocity, self._axis, self._numbers, self._held,
         )  # fmt: skip
-        data.xfrc_applied[rods, :3], data.xfrc_applied[rods, 3:] = forces, moments
+        data.xfrc_applied[flat, :3], data.xfrc_applied[flat, 3:] = forces, moments
         return total
 
 
 @numba.njit(cache=True)
-def _push(starts, turns, centres, twists, roots, foot, velocity, axis, numbers):
-    reach, stiffness, damping, friction, size, length = numbers
-    n = starts.shape[0]
+def _curve(joints, k, u):
+    """Point of the curve in segment k at u in 0 to 1, and its derivative by u."""
+    last = joints.shape[0] - 1
+    a, b = joints[k], joints[k + 1]
+    ta = 0.5 * (b - joints[k - 1]) if k > 0 else b - a
+    tb = 0.5 * (joints[k + 2] - a) if k + 2 <= last else b - a
+    u2 = u * u
+    u3 = u2 * u
+    point = (2 * u3 - 3 * u2 + 1) * a + (u3 - 2 * u2 + u) * ta + (3 * u2 - 2 * u3) * b + (u3 - u2) * tb
+    slope = (6 * u2 - 6 * u) * (a - b) + (3 * u2 - 4 * u + 1) * ta + (3 * u2 - 2 * u) * tb
+    return point, slope
+
+
+@numba.njit(cache=True)
+def _climb(joints, k, u, foot, axis):
+    """Derivative of the squared distance to the axis along the curve, halved."""
+    point, slope = _curve(joints, k, u)
+    out = point - foot - ((point - foot) @ axis) * axis
+    return out @ slope
+
+
+@numba.njit(cache=True)
+def _push(joints, centres, twists, roots, foot, velocity, axis, numbers, held):
+    """Forces and moments on the rods, force on the pin; ``held``: stretch of each rod's sticking spring [m], force
+    of its damper [N]."""
+    reach, stiffness, damping, friction, length, step = numbers
+    n_segments = joints.shape[1] - 1
+    n = centres.shape[0]
     forces, moments, total = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(3)
-    for i in range(n):
-        along = np.ascontiguousarray(turns[i].reshape(3, 3)[:, 0])
-        # The nearest points of two lines, the rod's inside the rod.
-        between = starts[i] - foot
-        a, b = along @ axis, between @ along
-        c = between @ axis
-        determinant = 1 - a * a
-        s = (a * c - b) / determinant if determinant > 1e-9 else 0.0
-        s = min(max(s, 0.0), size)
-        point = starts[i] + s * along
-        t = (point - foot) @ axis
-        if t > 0.0 or t < -length:
-            continue
-        out = point - foot - t * axis
-        distance = np.sqrt(out @ out)
-        overlap = reach - distance
-        if overlap <= 0.0:
-            continue
-        normal = out / distance
-        speed = twists[i, 3:] + np.cross(twists[i, :3], point - roots[i]) - velocity
-        approach = -(speed @ normal)
-        push = max(stiffness * overlap**1.5 + damping * approach, 0.0)
-        slip = speed + approach * normal
-        rub = slip / np.sqrt(slip @ slip + 2.5e-7)
-        force = push * (normal - friction * rub)
-        forces[i] = force
-        moments[i] = np.cross(point - centres[i], force)
-        total -= force
+    before = held.copy()
+    held[:] = np.nan
+    for c in range(joints.shape[0]):
+        cable = joints[c]
+        for k in range(n_segments):
+            from_foot = 0.5 * (cable[k] + cable[k + 1]) - foot
+            aside = from_foot - (from_foot @ axis) * axis
+            size = cable[k + 1] - cable[k]
+            if np.sqrt(aside @ aside) > reach + np.sqrt(size @ size):
+                continue
+            for piece in range(2):
+                low, high = 0.5 * piece, 0.5 * piece + 0.5
+                if not (_climb(cable, k, low, foot, axis) < 0.0 <= _climb(cable, k, high, foot, axis)):
+                    continue
+                for _ in range(40):
+                    middle = 0.5 * (low + high)
+                    if _climb(cable, k, middle, foot, axis) < 0.0:
+                        low = middle
+                    else:
+                        high = middle
+                point, _ = _curve(cable, k, 0.5 * (low + high))
+                along = (point - foot) @ axis
+                out = point - foot - along * axis
+                distance = np.sqrt(out @ out)
+                overlap = reach - distance
+                if along > 0.0 or along < -length or overlap <= 0.0:
+                    continue
+                i = c * n_segments + k
+                normal = out / distance
+                speed = twists[i, 3:] + np.cross(twists[i, :3], point - roots[i]) - velocity
+                approach = -(speed @ normal)
+                # A contact that has come from the next rod brings its springs along.
+                state = np.zeros(4)
+                for other in (k, k - 1, k + 1):
+                    if 0 <= other < n_segments and not np.isnan(before[c, other, 0]):
+                        state = before[c, other]
+                        break
+                fades = np.exp(-BEHIND * step / damping) if damping > 0.0 else 0.0
+                damped = fades * state[3] + (1.0 - fades) * damping * approach
+                push = max(stiffness * overlap**1.5 + damped, 0.0)
+                stretch = state[:3] - (state[:3] @ normal) * normal + step * (speed + approach * normal)
+                pull = STICK * np.sqrt(stretch @ stretch)
+                if pull > friction * push:
+                    stretch = stretch * (friction * push / pull)
+                held[c, k, :3], held[c, k, 3] = stretch, damped
+                force = push * normal - STICK * stretch
+                forces[i] += force
+                moments[i] += np.cross(point - centres[i], force)
+                total -= force
     return forces, moments, total
 
 

@@ -78,9 +78,9 @@ def test_a_residual_is_measurement_less_simulation_and_nothing_where_nothing_was
 @pytest.mark.parametrize(
     ("block", "least"),
     [
-        ("position", np.hypot(4e-4, 0.02 / np.sqrt(5))),  # a quarter's mean scatters by a root of five less
+        ("position", np.hypot(1.5e-4, 0.02 / np.sqrt(5))),  # a quarter's mean scatters by a root of five less
         ("turn", 4e-3),
-        ("slow.effector", np.hypot(0.05 + 0.1 * 7.0, 0.02 / np.sqrt(5))),  # 50 mN and a tenth of what it carries
+        ("slow.effector", np.hypot(0.05 + 0.02 * 7.0, 0.02 / np.sqrt(5))),  # 50 mN and a fiftieth of what it carries
         ("chatter.effector", 0.15),
     ],
 )

@@ -75,7 +75,7 @@ def test_an_estimate_has_its_spread_and_says_where_it_stands_at_a_bound(placed, 
     """One number of six moves: variance v = 4 (0.1²/6 + f²), spread sqrt(v)/column."""
     found = estimates([OWN], simulated(0.4, [placed], [x], [2.0]))
     (one,) = found[placed.key].values()
-    v = 4 * (0.01 / 6 + 4e-4**2)
+    v = 4 * (0.01 / 6 + 1.5e-4**2)
     assert one.value == pytest.approx(x)
     assert one.std == pytest.approx(np.sqrt(v) / 2, rel=1e-9)
     assert one.at_bound is bound
@@ -150,7 +150,7 @@ def gap(placed, x, moved, residuals=True):
     return Trial(placed, fit_of([placed], [x], 0.0, [changed] if residuals else []), 1.0, 0.1)
 
 
-V = 4 * (0.01 / 6 + 4e-4**2)
+V = 4 * (0.01 / 6 + 1.5e-4**2)
 """[m²] What squares of `LEFT` are divided by."""
 
 

@@ -21,7 +21,7 @@ COURSE = along(*(np.where(np.arange(16) % 2, 1.0, -1.0)))
 """[m] For each unit of friction, 16 quarters back and forth along x: 48 numbers, of which 16 move."""
 OTHER = along(*((0.0, 0.01 * k, 0.0) for k in range(16)))
 """[m] For each newton of pretension, along y, which friction does not move."""
-FLOOR = np.hypot(4e-4, 1e-4 / np.sqrt(5))
+FLOOR = np.hypot(1.5e-4, 1e-4 / np.sqrt(5))
 """[m] Least that a position counts for, with noise of 0.1 mm."""
 
 

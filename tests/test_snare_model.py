@@ -182,3 +182,10 @@ def test_fine_setting_is_near_the_default():
     default = SnareModel(QUICK, target).run(0.8, every=0.05)
     fine = SnareModel(QUICK, target, Accuracy(1e-3, 16, 2e-4)).run(0.8, every=0.05)
     assert np.max(np.abs(default.target_position - fine.target_position)) < 5e-5
+
+
+@pytest.mark.parametrize(("stiffness", "share"), [(7.8e7, 1.0), (8.1e7, 0.5)])
+def test_a_soft_pin_may_give_way_by_the_whole_radius_of_the_cable_and_a_hard_one_by_half(stiffness, share):
+    """Half the radius of 2 mm, and 2.5 kN, a hundredth of EA: 7.95e7 N/m^1.5."""
+    model = SnareModel(SnareParameters(hertz_stiffness=stiffness), Target("spring"))
+    assert model._deepest() == pytest.approx(share * 0.002)

@@ -12,7 +12,7 @@ from snarelab.identification.snare.trials import _energy, _explained, _foreseen,
 BACK_AND_FORTH = along(*(np.where(np.arange(16) % 2, 1.0, -1.0)))
 RISING = along(*((0.0, 0.01 * k, 0.0) for k in range(16)))
 """[m] Quarters of a second of two courses at right angles."""
-FLOOR_SQUARED = 4e-4**2 + 1e-8 / 5
+FLOOR_SQUARED = 1.5e-4**2 + 1e-8 / 5
 """[m²] What a position counts for at least, with noise of 0.1 mm."""
 
 

@@ -84,7 +84,7 @@ def _bridged(experiment: Experiment, shares: tuple[float, ...], drop: bool) -> E
 def begun(experiment: Experiment) -> Experiment:
     """The same, and what a joint holds before it first moves counts for nothing: that hangs on how it came to rest."""
     if "begun" not in experiment.store:
-        kept = np.zeros(experiment.measured.shape, bool)
+        kept = np.zeros_like(experiment.measured, dtype=bool)
         for c in range(kept.shape[1]):
             going = ~near_rest(experiment, c)
             for part in experiment.motion.band_segments():

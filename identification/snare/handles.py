@@ -47,7 +47,7 @@ class Handle:
 HANDLES = {
     "contact_friction": Handle("plain", 0.0, 1.5, 0.03, (0.08, 0.25)),
     "contact_damping": Handle("log", 0.0, 5.0, 0.3, (200.0, 2e3)),
-    "contact_stiffness": Handle("log", 5.0, 10.0, 0.25, (1e7, 1e6)),
+    "contact_stiffness": Handle("log", 5.0, 10.0, 0.25, (1e7, 2e6, 3e5)),
     "cable_damping": Handle("log", -4.5, -0.5, 0.2, (2e-4, 1e-2)),
     "cable_pretension": Handle("plain", 0.0, 5000.0, 60.0, (200.0, 800.0)),
     "umbilical_stiffness": Handle("root", 0.0, 100.0, 1.0, (20.0, 100.0, 500.0)),
