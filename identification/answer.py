@@ -20,7 +20,7 @@ from .search.choice import Taken
 from .search.forward import Found
 from .search.locate import locate
 from .search.trial import MATERIAL
-from .search.whole_law import beside, whole_laws
+from .search.whole_law import beside_whole_laws
 from .wording import evidence_sentence, experiment_sentence, listed, percent, verdict_sentence
 
 Array = NDArray[np.float64]
@@ -65,8 +65,9 @@ def report_on(
     train, locked : sequence of Experiment
     """
     channels = [channel(model.tree, c) for c in range(model.tree.n_joints)]
-    wholes = {t.judged.placed.key: whole_laws(t.judged.placed, final, found.closing, train) for t in confirmed}
-    findings = tuple(_finding(beside(t, wholes[t.judged.placed.key]), final, trials, channels) for t in confirmed)
+    findings = tuple(
+        _finding(beside_whole_laws(t, final, found.closing, train), final, trials, channels) for t in confirmed
+    )
     fits = _fits(model, found.first, final, train, locked)
     nameless = {c: x for c, x in found.closing.nameless.items() if x.share > NAMELESS}
     # What a curve explains well may also come and go.

@@ -57,6 +57,7 @@ def reported(monkeypatch):
         monkeypatch.setattr(
             answer, "_finding", lambda t, *_: Finding(t.judged.placed.effect.name, t.judged.placed.at, 1, 1, {}, "", ())
         )
+        monkeypatch.setattr(answer, "beside_whole_laws", lambda t, *_: t)
         monkeypatch.setattr(answer, "bursts", lambda *_: dict(bursting))
         monkeypatch.setattr(answer, "locate", lambda _, explained: tuple(explained))
         for name in ("_moved", "_traces"):

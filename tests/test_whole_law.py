@@ -8,7 +8,7 @@ import pytest
 
 from snarelab.identification.search import whole_law
 from snarelab.identification.search.choice import RivalOdds, Taken
-from snarelab.identification.search.whole_law import beside, whole_laws
+from snarelab.identification.search.whole_law import beside_whole_laws, whole_laws
 from snarelab.models.effects import get_effect
 from snarelab.models.model import Placed
 
@@ -76,11 +76,16 @@ def test_a_limit_without_columns_says_nothing(monkeypatch):
     assert wholes(monkeypatch, 1.0, limits, named="sensor_bias") == []
 
 
-def test_wins_are_shared_with_the_whole_law():
-    other = RivalOdds(placed("load_dependent_friction"), 0.1, True)
-    once = RivalOdds(placed("makkar_friction"), 0.02, True)
-    taken = Taken(Made(), 0.8, (other, once), 5.0)  # pyright: ignore[reportArgumentType]
-    assert beside(taken, []) is taken
-    both = beside(taken, [placed("makkar_friction")])
+@pytest.mark.parametrize("unseen", [False, True])
+def test_wins_are_shared_with_the_whole_law(monkeypatch, unseen):
+    makkar, other = placed("makkar_friction"), RivalOdds(placed("load_dependent_friction"), 0.1, True)
+    monkeypatch.setattr(whole_law, "whole_laws", lambda *_: [makkar] * unseen)
+    judged: Any = Made(placed=placed("coulomb_friction"))
+    taken = Taken(judged, 0.8, (other, RivalOdds(makkar, 0.02, True)), 5.0)
+    none: Any = Made()
+    both = beside_whole_laws(taken, none, none, [])
+    if not unseen:
+        assert both is taken
+        return
     assert (both.probability, both.gained) == (0.4, 5.0)
-    assert both.rivals == (RivalOdds(placed("makkar_friction"), 0.4, False), other)
+    assert both.rivals == (RivalOdds(makkar, 0.4, False), other)

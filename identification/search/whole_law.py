@@ -18,6 +18,16 @@ from .forward import carry, without
 from .screening import Screening
 
 
+def beside_whole_laws(taken: Taken, final: Fit, closing: Screening, train: Sequence[Experiment]) -> Taken:
+    """What was taken, its wins shared with the whole laws that it cannot be told from; arguments as `whole_laws`."""
+    wholes = whole_laws(taken.judged.placed, final, closing, train)
+    if not wholes:
+        return taken
+    share = taken.probability / (1 + len(wholes))
+    others = tuple(r for r in taken.rivals if r.placed not in wholes)
+    return replace(taken, probability=share, rivals=(*(RivalOdds(w, share, False) for w in wholes), *others))
+
+
 def whole_laws(named: Placed, final: Fit, closing: Screening, train: Sequence[Experiment]) -> list[Placed]:
     """Friction laws at a named effect's joint that hold it and more, which could as well be there whole.
 
@@ -42,15 +52,6 @@ def whole_laws(named: Placed, final: Fit, closing: Screening, train: Sequence[Ex
             if min(limits) > height:
                 found.append(Placed(whole, named.at))
     return found
-
-
-def beside(taken: Taken, wholes: Sequence[Placed]) -> Taken:
-    """What was taken, its wins shared with the whole laws that it cannot be told from."""
-    if not wholes:
-        return taken
-    share = taken.probability / (1 + len(wholes))
-    others = tuple(r for r in taken.rivals if r.placed not in wholes)
-    return replace(taken, probability=share, rivals=(*(RivalOdds(w, share, False) for w in wholes), *others))
 
 
 def _height(named: Placed, final: Fit, train: Sequence[Experiment]) -> float:
