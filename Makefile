@@ -21,7 +21,7 @@ studies: $(filter-out study-tolerance,$(STUDIES:%=study-%)) ## every study but t
 test: .venv/installed ## set up, then the tests
 	$(BIN)/python -m pytest -n 2 --dist worksteal
 
-test-slow: .venv/installed ## the tests of whole studies and captures, which `make test` leaves out: two minutes; CI runs them
+test-slow: .venv/installed ## the tests of whole studies and captures, which `make test` leaves out: four minutes; CI runs them
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m slow
 
 check: .venv/installed ## formatting, lint and types

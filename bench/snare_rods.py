@@ -7,11 +7,11 @@ Rods, joints, ring and collision are those of `mujoco_rods`. How each effect get
 - ``umbilical_stiffness``: springs on the target's three slides.
 - ``hang_point_clearance``: the line is a force of its own here, with a hard dead zone.
 - ``contact_stiffness`` and ``contact_damping``: MuJoCo's contacts scale with mass and cannot be given a stiffness per
-  overlap. For these two, contacts between cables and pin are a penalty force on the rods' capsules: Hertz's law with
-  damping as Li et al. write it (eq. 19: K x^1.5 + C times the rate of x, never pulling) behind a stiff spring, which
-  makes it Zener's solid, and Coulomb friction that sticks on a spring until it slips (Cundall and Strack 1979), at a
-  tenth of a millisecond. The engine under test has Hunt and Crossley's law instead, and friction that never quite
-  sticks.
+  overlap. For these two, contacts between cables and pin are a penalty force where a smooth curve through the rods'
+  joints touches the pin: Hertz's law with damping as Li et al. write it (eq. 19: K x^1.5 + C times the rate of x, never
+  pulling) behind a stiff spring, which makes it Zener's solid, and Coulomb friction that sticks on a spring until it
+  slips (Cundall and Strack 1979). The engine under test has Hunt and Crossley's law instead, and friction that never
+  quite sticks.
 """
 
 from dataclasses import dataclass, replace
@@ -68,9 +68,7 @@ def simulate(
 ) -> Seen:
     """Simulate a capture of a target on a spring that keeps its orientation."""
     step = step or (1e-4 if truth.penalty else 4e-4)
-    n_segments = n_segments or (
-        20 if truth.penalty else 40
-    )  # rods touch with their corners, the curve through them not
+    n_segments = n_segments or (20 if truth.penalty else 40)  # the curve through rods has no corners to touch with
     short = parameters.cable_length * (1 - truth.pretension / parameters.axial_stiffness)
     p = parameters.with_values(friction=truth.friction, bending_damping=truth.cable_damping, cable_length=short)
     model, data = _model(p, target, truth, n_segments, step)

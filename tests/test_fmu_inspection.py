@@ -9,6 +9,7 @@ from snarelab.cosim.orbit_capture import Passive, capture_of, co_simulate
 from snarelab.studies.orbit.setting import setting
 
 
+@pytest.mark.slow
 def test_both_fmus_in_ecos_move_as_the_study_does(tmp_path):
     """Held inputs and one exchange a step, yet the pin is where the study's own master has it.
 

@@ -159,6 +159,7 @@ def test_an_interrupted_tolerance_study_keeps_its_cases_and_goes_on(folder):
     assert len(pd.read_parquet(folder / "results" / "cases.parquet")) == 24
 
 
+@pytest.mark.slow
 def test_kills_at_random_moments():
     done = kill_all(["identify", "cosim"], 4, seed=5)  # of tolerance: tests/test_tolerance_run.py; all: bench/kills.py
     assert all(found["runs"] == 2 for found in done.values())

@@ -24,6 +24,7 @@ def test_rods_rest_as_the_elastica_and_target_hangs_still() -> None:
     assert np.linalg.norm(run.start - points, axis=2).max() < 2e-4
 
 
+@pytest.mark.slow
 def test_first_contact_is_that_of_our_cables() -> None:
     parameters, target = SnareParameters(), Target("spring")
     ours = SnareModel(parameters, target).run(2.7).first_contact

@@ -111,7 +111,7 @@ def test_blocks_add_up_and_each_has_its_own_scale():
     """Two numbers of 3 mm and four of 2 in the logarithm: L = -1/8 (2 ln(9e-6 + f²) + 4 ln(4 + 0.15²))."""
     own = [capture(track(along(0.0), effector=np.zeros((5, 3))), noise=0.0)]
     left = [{"position": np.full((1, 2), 3e-3), "chatter.effector": np.full((2, 2), 2.0)}]
-    expected = -(2 * np.log(9e-6 + 16e-8) + 4 * np.log(4.0225)) / 8
+    expected = -(2 * np.log(9e-6 + 2.25e-8) + 4 * np.log(4.0225)) / 8
     assert likelihood(own, left) == pytest.approx(expected, rel=1e-12)
     assert price(left) == pytest.approx(0.5 * np.log(6 / 4), rel=1e-12)
 

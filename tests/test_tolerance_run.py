@@ -101,6 +101,7 @@ def recorded(folder: Path) -> int:
     return len(pd.concat(files)[["stage", "case"]].drop_duplicates()) if files else 0
 
 
+@pytest.mark.slow
 def test_five_kills_leave_the_same_table(command, tmp_path):
     moments, folder = random.Random(7), tmp_path / "killed" / "cases"
     finish(command("alone", "--jobs", "1"))
@@ -125,6 +126,7 @@ def test_five_kills_leave_the_same_table(command, tmp_path):
     pd.testing.assert_frame_equal(alone, killed, check_exact=True)
 
 
+@pytest.mark.slow
 def test_a_lost_worker_costs_its_case_only(command, tmp_path):
     finish(command("well", "--jobs", "2", sampling="sobol"))
     finish(command("ill", "--jobs", "2", sampling="sobol", DIE_ONCE=str(tmp_path / "died"), DIE_ALWAYS="1"))
@@ -165,6 +167,7 @@ def test_a_case_that_diverges_is_an_outcome(command, tmp_path):
     assert set(table["reason"].to_numpy()[~diverged]) == {""}
 
 
+@pytest.mark.slow
 def test_scheduler_and_workers_of_their_own(command, tmp_path):
     path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
     address_file = tmp_path / "scheduler.json"
