@@ -63,7 +63,7 @@ def sensitivity_bars(indices: pd.DataFrame) -> bytes:
     """Total and first-order Sobol indices with their intervals, largest first."""
     ordered = indices.sort_values("total", ascending=False)
     with drawing():
-        figure = Figure(figsize=(8.0, 0.5 * len(ordered) + 0.9), layout="constrained")
+        figure = Figure(figsize=(8.0, 0.5 * len(ordered) + 1.2), layout="constrained")
         axes, rows = figure.add_subplot(), np.arange(len(ordered))
         for name, shift, colour in (("total", -0.18, AFTER), ("first", 0.18, GREY)):
             value = ordered[name].to_numpy(float)
@@ -74,14 +74,14 @@ def sensitivity_bars(indices: pd.DataFrame) -> bytes:
         axes.set_yticks(rows, list(ordered.index))
         axes.invert_yaxis()
         axes.set(xlabel="share of the variance of success (Sobol index)")
-        axes.legend(loc="lower right")
+        figure.legend(loc="outside upper right", ncols=2)  # above the bars: each may fill the width
         return svg(figure)
 
 
 def width_curve(counts: np.ndarray, widths: np.ndarray, wanted: float) -> bytes:
     """Undecided share of the range against the number of cases."""
     with drawing():
-        figure = Figure(figsize=(6.0, 2.6), layout="constrained")
+        figure = Figure(figsize=(8.0, 2.6), layout="constrained")
         axes = figure.add_subplot()
         axes.plot(counts, 100 * widths, "o-", color=AFTER, markersize=3)
         axes.axhline(100 * wanted, color=BEFORE, linewidth=0.8)
