@@ -47,6 +47,7 @@ def taken(effect, explained=0.5, probability=0.5, rivals=(), channels=(0,)) -> A
 @pytest.fixture
 def reported(monkeypatch):
     """The report on a search whose parts are given; ``relative`` is what is left of each channel's torque."""
+    monkeypatch.setattr(answer, "beside_whole_laws", lambda t, *_: t)
 
     def report(*, confirmed=(), others=(), doubtful=(), nameless=(), bursting=(), relative: Any = 0.1, judged=(),
                train=None, effects=()):  # fmt: skip
@@ -57,7 +58,6 @@ def reported(monkeypatch):
         monkeypatch.setattr(
             answer, "_finding", lambda t, *_: Finding(t.judged.placed.effect.name, t.judged.placed.at, 1, 1, {}, "", ())
         )
-        monkeypatch.setattr(answer, "beside_whole_laws", lambda t, *_: t)
         monkeypatch.setattr(answer, "bursts", lambda *_: dict(bursting))
         monkeypatch.setattr(answer, "locate", lambda _, explained: tuple(explained))
         for name in ("_moved", "_traces"):
@@ -72,6 +72,11 @@ def reported(monkeypatch):
         return answer.report_on(MODEL, found, confirmed, doubtful, final, {}, (Step("s", 1, 1),), train, [])
 
     return report
+
+
+def test_a_finding_is_told_with_the_whole_laws_beside_it(reported, monkeypatch):
+    monkeypatch.setattr(answer, "beside_whole_laws", lambda t, final, closing, train: taken(BACKLASH))
+    assert [e.name for e in reported(confirmed=[taken(COULOMB)]).effects] == ["backlash"]
 
 
 def curve(channel, over, share, size):
