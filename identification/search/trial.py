@@ -134,8 +134,8 @@ class _Judge:
         Where no point gains anything, as where friction would have to be negative, it is the grid's middle.
         """
         best: tuple[float, float, int, NDArray[np.int_], Array, Case] | None = None
-        cases = list(enumerate(samples.cases(options)))
-        cases.sort(key=lambda numbered: abs(numbered[0] - len(cases) // 2))
+        middle = len(options) // 2
+        cases = sorted(enumerate(samples.cases(options)), key=lambda numbered: abs(numbered[0] - middle))
         for subset in options[0][0].subsets():
             price = self._price(_with(options[0][0], subset))
             for number, whole in cases:
