@@ -68,6 +68,7 @@ class Assembly:
         self.euler[0] = self.target.orientation
         self.ends = np.zeros((6, 3))
         self.end_speeds = np.zeros((6, 3))
+        self._placed = np.nan
         self.frame = self.effector.frame()
         tangents = self.nodes[:, [0, -1], 1] @ self.effector.rotation
         self._rest = tangents / np.linalg.norm(tangents, axis=-1, keepdims=True)
@@ -97,7 +98,8 @@ class Assembly:
         rows = np.concatenate([6 * end + np.arange(3) for end in range(6)])
 
         def residual(_system: Any, time: float, _item: int, q: Any, _rates: Any, _level: bool) -> list[float]:
-            return (np.asarray(q)[rows] - self.ends_at(time)).tolist()  # this marker's q includes the reference
+            self.place(time)
+            return (np.asarray(q)[rows] - self.ends.ravel()).tolist()  # this marker's q includes the reference
 
         def derivative(*_: Any) -> Any:
             return jacobian
@@ -119,33 +121,37 @@ class Assembly:
         p = self.parameters
         return ring_motion(time, p.ring_rate, p.ring_travel, p.ring_ramp)
 
-    def ends_at(self, time: float) -> np.ndarray:
-        """Where the rings hold the cable ends at a time [s], shape (18,); leaves the speeds in `end_speeds`."""
-        p = self.parameters
-        angle, rate = self.ring_at(time)
-        frame_at(self.effector_path, time, self.frame)
-        ring_ends(self.frame, p.ring_radius, p.ring_distance, p.ring_direction, angle, rate, self.ends, self.end_speeds)
-        self._ring_rate = rate
-        return self.ends.ravel()
-
-    def ring_spin(self) -> tuple[float, float, float]:
-        """Angular velocity of the rotating ring in the world [rad/s], where `ends_at` was last."""
-        x, y, z = (self.frame[2] + self.parameters.ring_direction * self._ring_rate * self.frame[3:, 0]).tolist()
-        return x, y, z
-
     def place(self, time: float) -> None:
-        """Bring what is moved from outside, and the fittings of the ends, to a time [s]."""
+        """Bring to a time [s] what moves by itself: end effector, rings, cable ends and their fittings, a moved target.
+
+        Nothing is done where it stands there already: an implicit step asks several times. `lift` makes it ask again.
+        """
+        if time == self._placed:
+            return
+        p = self.parameters
+        angle, self._ring_rate = self.ring_at(time)
         if not self.n_pin:
             frame_at(self.target_path, time, self.pin)
         frame_at(self.effector_path, time, self.frame)
-        self.turn_fittings(time)
+        radius, distance, direction = p.ring_radius, p.ring_distance, p.ring_direction
+        ring_ends(self.frame, radius, distance, direction, angle, self._ring_rate, self.ends, self.end_speeds)
+        self._turn_fittings(angle)
+        self._placed = time
 
-    def turn_fittings(self, time: float) -> None:
-        """Bring the fittings of the ends to the end effector's frame and to a time [s]; see `ends`."""
+    def lift(self) -> None:
+        """Forget where things were placed, as a path or a frame is another."""
+        self._placed = np.nan
+
+    def ring_spin(self) -> tuple[float, float, float]:
+        """Angular velocity of the rotating ring in the world [rad/s], where it was placed last."""
+        x, y, z = (self.frame[2] + self.parameters.ring_direction * self._ring_rate * self.frame[3:, 0]).tolist()
+        return x, y, z
+
+    def _turn_fittings(self, angle: float) -> None:
+        """Bring the fittings of the ends to the end effector's frame and the ring's angle [rad]; see `ends`."""
         p, fittings = self.parameters, self.moving[4]
         fittings[RING_SPIN] = self.frame[2]
         if p.end_stiffness > 0:
-            angle, _ = self.ring_at(time)
             turn = Rotation.from_euler("x", p.ring_direction * angle).as_matrix()
             fittings[0:6:2] = self._rest[:, 0] @ self.frame[3:].T
             fittings[1:6:2] = self._rest[:, 1] @ turn.T @ self.frame[3:].T
@@ -258,7 +264,7 @@ class Assembly:
         self.moving = (
             self.pin,
             self.euler,
-            np.zeros((MOST_CONTACTS, 4)),
+            np.zeros((MOST_CONTACTS, 5)),
             np.zeros((MOST_CROSSINGS, 5)),
             np.zeros((8, 3)),
         )

@@ -2,22 +2,28 @@
 
 On the cubic r(s) of a cable, the distance φ to a cylinder of the pin is least where h(s) = n · r'(s) changes from
 negative to positive; each such point with φ below the cable's radius carries one contact. (Points at fixed stations
-along the cable would act as bumps.) The force F acts on the cable at r(s), as N_a(s) F on coordinate a of the element,
+along the cable would act as bumps.) Between its nodes a cubic is not where the cable is; `bow` says by how much, and
+point and gap are corrected for that. The force F acts on the cable at r(s), as N_a(s) F on coordinate a of the element,
 and −F on the pin at the same point, so that momentum, angular momentum and power balance exactly.
 
 A state is two (n_rows, 3) arrays, positions and velocities; each node has two rows, r and r'. The pin is a (6, 3)
 array: position of its foot, velocity, angular velocity, and the three rows of its rotation matrix.
 """
 
+import numpy as np
+
+from .bow import bow_shape, give, give_change, lateral_pull
 from .cubic import combine, first_weights, second_weights, weights
-from .law import force, give
+from .law import force, hertz_overlap
 from .pin import distance, surface
-from .vector import add_scaled, compiled, cross, dot, rotate, rotate_back, row, subtract
+from .vector import add, add_scaled, compiled, cross, dot, rotate, rotate_back, row, scale, subtract
 
 PIECES = 4
 """Into which an element is cut to find a change of sign of h."""
 MOST_CONTACTS = 24
-"""Rows of the list of contacts: cable's element, cylinder, ξ, gap."""
+"""Rows of the list of contacts: cable's element, cylinder, ξ, gap, e."""
+NEAR = 1e-4
+"""Gap of the cubic below which its bow is looked at [m]; bows are some micrometres."""
 
 
 @compiled
@@ -53,9 +59,33 @@ def closest_fraction(cylinder, pin, element, low, high, size):
 
 
 @compiled
-def find_contacts(positions, n_elements, size, cylinders, pin, radius, contacts):
+def bowed(law, element, size, cylinder, pin, fraction, gap, scratch):
+    """Where the beam touches that the cubic stands for (see `bow`): ξ, gap, and e.
+
+    Its slope differs from the cubic's by ½ e' f + b', so that the closest point lies elsewhere by that over −h_s.
+    """
+    rotation = pin[3:6]
+    _, curvature = slope_of_distance(cylinder, pin, element, fraction, size)
+    y = rotate_back(rotation, subtract(combine(weights(fraction, size), element), row(pin, 0)))
+    _, normal, _, _, _, _ = surface(cylinder, y)
+    bend = dot(rotate(rotation, normal), combine(second_weights(0.5, size), element))
+    pull, stiffness = lateral_pull(law, element, size, scratch)
+    shape, shape_change = bow_shape(law, fraction, size)
+    gap += pull * bend * shape
+    soft = give(law, fraction, size) - stiffness * (bend * shape) ** 2
+    if gap < 0.0:
+        push = law[0] * hertz_overlap(law, gap, soft) ** 1.5
+        slope = 0.5 * give_change(law, fraction, size) * push
+        slope += (pull - push * stiffness * bend * shape) * bend * shape_change
+        fraction = min(max(fraction - slope / (curvature * size), 0.0), 1.0)
+    return fraction, gap, soft
+
+
+@compiled
+def find_contacts(positions, n_elements, size, cylinders, pin, law, radius, contacts):
     """List the contacts of all cables with the pin; returns how many."""
     count = 0
+    scratch = np.empty((4, 3))
     rotation = pin[3:6]
     reach = 0.55 * size + radius  # no point of an element is farther than half its length from the nearer node
     for cable in range(positions.shape[0] // (2 * (n_elements + 1))):
@@ -76,28 +106,48 @@ def find_contacts(positions, n_elements, size, cylinders, pin, radius, contacts)
                         fraction = closest_fraction(cylinder, pin, element, piece / PIECES, high, size)
                         point = combine(weights(fraction, size), element)
                         gap = distance(cylinder, rotate_back(rotation, subtract(point, row(pin, 0)))) - radius
-                        if gap < 0.0 and count < contacts.shape[0]:
-                            contacts[count, 0] = first_row
-                            contacts[count, 1] = part
-                            contacts[count, 2] = fraction
-                            contacts[count, 3] = gap
-                            count += 1
+                        if gap < NEAR and count < contacts.shape[0]:
+                            fraction, gap, soft = bowed(law, element, size, cylinder, pin, fraction, gap, scratch)
+                            if gap < 0.0:
+                                contacts[count, 0] = first_row
+                                contacts[count, 1] = part
+                                contacts[count, 2] = fraction
+                                contacts[count, 3] = gap
+                                contacts[count, 4] = soft
+                                count += 1
                     before = after
     return count
 
 
 @compiled
-def contact_force(positions, velocities, size, cylinders, pin, law, contact):
-    """Force on the cable at a listed contact, its point, normal, and velocity against the pin."""
-    first_row, part, fraction, gap = int(contact[0]), int(contact[1]), contact[2], contact[3]
-    n = weights(fraction, size)
-    point = combine(n, positions[first_row : first_row + 4])
+def contact_force(positions, velocities, size, cylinders, pin, law, contact, within):
+    """Force on the cable at a listed contact, its point, normal, velocity against the pin, and couple on the pin.
+
+    Fills `within` (4, 3): what a unit of normal force is on the element's coordinates beside that at its point, ∂b/∂q.
+    """
+    first_row, part, fraction, gap, soft = int(contact[0]), int(contact[1]), contact[2], contact[3], contact[4]
+    n, n2 = weights(fraction, size), second_weights(0.5, size)
+    element = positions[first_row : first_row + 4]
+    point = combine(n, element)
     arm = subtract(point, row(pin, 0))
-    _, normal, _, _, _, _ = surface(cylinders[part], rotate_back(pin[3:6], arm))
-    normal = rotate(pin[3:6], normal)
+    _, normal, bend, across, roundness, around = surface(cylinders[part], rotate_back(pin[3:6], arm))
+    normal, across, around = rotate(pin[3:6], normal), rotate(pin[3:6], across), rotate(pin[3:6], around)
     pin_velocity = add_scaled(row(pin, 1), 1.0, cross(row(pin, 2), arm))
     velocity = subtract(combine(n, velocities[first_row : first_row + 4]), pin_velocity)
-    return force(law, gap, give(law, fraction, size), normal, velocity), point, normal, velocity
+    push = force(law, gap, soft, normal, velocity)
+    size_of = dot(push, normal)
+    curved = combine(n2, element)
+    share = dot(normal, curved)
+    pull, stiffness = lateral_pull(law, element, size, within)
+    shape, _ = bow_shape(law, fraction, size)
+    pull -= size_of * stiffness * share * shape
+    for a in range(4):
+        for k in range(3):
+            within[a, k] = shape * (share * within[a, k] + pull * normal[k] * n2[a])
+    turn = size_of * shape * pull  # the normal turns as the point moves
+    push = add_scaled(push, turn * bend * dot(across, curved), across)
+    push = add_scaled(push, turn * roundness * dot(around, curved), around)
+    return push, point, normal, velocity, scale(size_of * shape * pull, cross(normal, curved))
 
 
 @compiled
@@ -105,15 +155,18 @@ def add_pin_contact(positions, velocities, n_elements, size, cylinders, pin, law
     """Add the generalised forces to `forces` (n_rows, 3); returns force and moment on the pin about its foot."""
     total = (0.0, 0.0, 0.0)
     moment = (0.0, 0.0, 0.0)
-    count = find_contacts(positions, n_elements, size, cylinders, pin, radius, contacts)
+    within = np.empty((4, 3))
+    count = find_contacts(positions, n_elements, size, cylinders, pin, law, radius, contacts)
     for index in range(count):
-        push, point, _, _ = contact_force(positions, velocities, size, cylinders, pin, law, contacts[index])
-        first_row, n = int(contacts[index, 0]), weights(contacts[index, 2], size)
+        push, point, normal, _, couple = contact_force(
+            positions, velocities, size, cylinders, pin, law, contacts[index], within
+        )
+        first_row, n, size_of = int(contacts[index, 0]), weights(contacts[index, 2], size), dot(push, normal)
         for a in range(4):
             for axis in range(3):
-                forces[first_row + a, axis] += n[a] * push[axis]
+                forces[first_row + a, axis] += n[a] * push[axis] + size_of * within[a, axis]
         total = subtract(total, push)
-        moment = subtract(moment, cross(subtract(point, row(pin, 0)), push))
+        moment = add(subtract(moment, cross(subtract(point, row(pin, 0)), push)), couple)
     return total, moment
 
 

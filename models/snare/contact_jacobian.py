@@ -1,13 +1,17 @@
-"""Jacobian of the contact with the pin, exact: the closest point moves with the coordinates.
+"""Jacobian of the contact with the pin: the closest point moves with the coordinates.
 
 Differentiating h(s, q) = 0 gives ∂s/∂q = −h_q/h_s. A column is the first-order change of all forces with one coordinate
 (factor `position_factor`) and with its rate (`velocity_factor`), written as triplets (row, column, value) of
-−∂f/∂q, which is Exudyn's left-hand side.
+−∂f/∂q, which is Exudyn's left-hand side. It is exact but for second derivatives of the bow (`bow`), some hundredths of
+its largest entry: Newton's method converges as fast without them.
 """
 
+import numpy as np
+
+from .bow import give_change
 from .contact import contact_force
 from .cubic import combine, first_weights, second_weights, weights
-from .law import force_change, give, give_change
+from .law import force_change
 from .pin import surface
 from .vector import add, add_scaled, compiled, cross, dot, rotate, rotate_back, row, scale, subtract, unit
 
@@ -47,13 +51,16 @@ def add_pin_jacobian(
     parameters), follow the cables'. `factors` are those of positions and velocities.
     """
     count = 0
+    within = np.empty((4, 3))
     pin_column = 3 * positions.shape[0]
     spin = row(pin, 2)
     for index in range(n_contacts):
         first_row, part, s = int(contacts[index, 0]), int(contacts[index, 1]), contacts[index, 2]
         gap = contacts[index, 3]
         element = positions[first_row : first_row + 4]
-        push, point, normal, w = contact_force(positions, velocities, size, cylinders, pin, law, contacts[index])
+        push, point, normal, w, _ = contact_force(
+            positions, velocities, size, cylinders, pin, law, contacts[index], within
+        )
         arm = subtract(point, row(pin, 0))
         n, n1 = weights(s, size), first_weights(s, size)
         tangent = combine(n1, element)
@@ -62,7 +69,7 @@ def add_pin_jacobian(
         across, around = rotate(pin[3:6], across), rotate(pin[3:6], around)
         curvature = bend * dot(across, tangent) ** 2 + roundness * dot(around, tangent) ** 2 + dot(normal, bow)
         along = add(scale(bend * dot(across, tangent), across), scale(roundness * dot(around, tangent), around))  # H r'
-        soft, soft_along = give(law, s, size), give_change(law, s, size)
+        soft, soft_along = contacts[index, 4], give_change(law, s, size)
         rate_along = subtract(combine(n1, velocities[first_row : first_row + 4]), cross(spin, tangent))
         for j in range(12 + n_pin):
             node_vector, axis = j // 3, j % 3
@@ -91,13 +98,17 @@ def add_pin_jacobian(
             n_change = add_scaled(n_change, s_change, along)
             w_change = add_scaled(w_change, s_change, rate_along)
             soft_change = soft_along * s_change
-            still = force_change(law, gap, soft, normal, w, dot(normal, shift), soft_change, n_change, w_change)
+            gap_change = dot(normal, shift)
+            if j < 12:
+                gap_change += within[node_vector, axis]
+            still = force_change(law, gap, soft, normal, w, gap_change, soft_change, n_change, w_change)
             moving = force_change(law, gap, soft, normal, w, 0.0, 0.0, _ZERO, w_rate)
             change = add(scale(factors[0], still), scale(factors[1], moving))
             for a in range(4):
                 value = add_scaled(scale(n[a], change), factors[0] * n1[a] * s_change, push)
                 for k in range(3):
-                    count = _write(triplets, count, 3 * (first_row + a) + k, column, -value[k])
+                    full = value[k] + within[a, k] * dot(change, normal)
+                    count = _write(triplets, count, 3 * (first_row + a) + k, column, -full)
             if n_pin > 0:
                 for k in range(3):
                     count = _write(triplets, count, pin_column + k, column, change[k])

@@ -5,8 +5,9 @@ elements near enough; the law of the force is that of the pin. Cables cross befo
 within half a degree of parallel are left out. The cables of an empty snare meet past 80° of the ring.
 """
 
+from .bow import give, give_change
 from .cubic import combine, first_weights, second_weights, weights
-from .law import force, force_change, give, give_change
+from .law import force, force_change
 from .vector import add, add_scaled, compiled, dot, length, scale, subtract, unit
 
 MOST_CROSSINGS = 12

@@ -45,6 +45,12 @@ def second_weights(fraction, size):
 
 
 @compiled
+def third_weights(size):
+    """d³N/ds³, the same everywhere."""
+    return (12 / size**3, 6 / size**2, -12 / size**3, 6 / size**2)
+
+
+@compiled
 def combine(n, element):
     """Σ N_a q_a of a (4, 3) element."""
     return (

@@ -6,10 +6,11 @@ bending, Exudyn's reduced rule 2), so that a balance shows the time integrator's
 
 import numpy as np
 
+from .bow import bow_energy
 from .contact import contact_force
 from .crossing import crossing_force, crossing_give
 from .cubic import MASS_POINTS, combine, first_weights, second_weights, weights
-from .law import give, powers
+from .law import powers
 from .vector import add, compiled, cross, dot, length, scale, subtract
 
 STRAIN, KINETIC, OVERLAP, BENDING_LOSS, AXIAL_LOSS, CONTACT_LOSS, FRICTION_LOSS = range(7)
@@ -31,11 +32,13 @@ def cable_energies(
     `section`: ρA, EA, EI, the stiffness-proportional damping of tension and of bending [s], and the prestrain.
     """
     result = np.zeros(7)
+    within = np.empty((4, 3))
     for first_row in range(0, positions.shape[0] - 2, 2):
         if (first_row // 2 + 1) % (n_elements + 1) == 0:
             continue
         element = positions[first_row : first_row + 4]
         rates = velocities[first_row : first_row + 4]
+        result[STRAIN] += bow_energy(law, element, size)
         for i in range(3):
             n1 = first_weights(TENSION_POINTS[i, 0], size)
             share = TENSION_POINTS[i, 1] * size * section[1]
@@ -59,9 +62,10 @@ def cable_energies(
             speed = combine(weights(MASS_POINTS[i, 0], size), rates)
             result[KINETIC] += 0.5 * MASS_POINTS[i, 1] * size * section[0] * dot(speed, speed)
     for index in range(n_contacts):
-        _, _, normal, speed = contact_force(positions, velocities, size, cylinders, pin, law, contacts[index])
-        soft = give(law, contacts[index, 2], size)
-        stored, damped, rubbed = powers(law, contacts[index, 3], soft, normal, speed)
+        _, _, normal, speed, _ = contact_force(
+            positions, velocities, size, cylinders, pin, law, contacts[index], within
+        )
+        stored, damped, rubbed = powers(law, contacts[index, 3], contacts[index, 4], normal, speed)
         result[OVERLAP] += stored
         result[CONTACT_LOSS] += damped
         result[FRICTION_LOSS] += rubbed

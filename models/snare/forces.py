@@ -8,6 +8,8 @@ crossings, fittings of the ends: see `ends`).
 
 import numpy as np
 
+from .bow import TRIPLETS_PER_ELEMENT as BOW_TRIPLETS
+from .bow import add_bow, add_bow_jacobian
 from .contact import MOST_CONTACTS, add_pin_contact, contact_force, find_contacts
 from .contact_jacobian import add_pin_jacobian, turn_column
 from .crossing import MOST_CROSSINGS, add_crossing_jacobian, add_crossings, find_crossings
@@ -26,7 +28,7 @@ from .line import line_pull, line_slope
 from .vector import add, compiled, cross, dot, rotate, row, subtract
 
 MOST_TRIPLETS = MOST_CONTACTS * 19 * 19 + MOST_CROSSINGS * 24 * 24 + 54 + 27 + 9
-"""Beside those of damping."""
+"""Beside those of damping and bow."""
 
 
 @compiled
@@ -77,6 +79,7 @@ def system_forces(q, rates, fixed, moving):
     if stiffness > 0.0:
         add_end_springs(positions, n_elements, stiffness, fittings, forces)
     add_bearing_friction(positions, velocities, n_elements, friction, fittings, forces)
+    add_bow(positions, n_elements, size, law, forces)
     add_damping(positions, velocities, n_elements, size, law[DAMPING], forces)
     if line[0] > 0.0:
         arm = rotate(pin[3:6], (line[9], line[10], line[11]))
@@ -97,9 +100,9 @@ def system_jacobian(q, rates, fixed, moving, factor, rate_factor):
     pin, euler, contacts, crossings, fittings = moving
     positions, velocities = read_state(q, rates, fixed, moving)
     n_all = positions.shape[0] // 2 // (n_elements + 1) * n_elements
-    triplets = np.empty((MOST_TRIPLETS + n_all * TRIPLETS_PER_ELEMENT, 3))
+    triplets = np.empty((MOST_TRIPLETS + n_all * (TRIPLETS_PER_ELEMENT + BOW_TRIPLETS), 3))
     factors = (factor, rate_factor)
-    count = find_contacts(positions, n_elements, size, cylinders, pin, radius, contacts)
+    count = find_contacts(positions, n_elements, size, cylinders, pin, law, radius, contacts)
     count = add_pin_jacobian(
         positions, velocities, size, cylinders, pin, law, contacts, count, euler, n_pin, factors, triplets
     )
@@ -107,6 +110,8 @@ def system_jacobian(q, rates, fixed, moving, factor, rate_factor):
     count = add_crossing_jacobian(positions, velocities, size, law, crossings, n_crossings, factors, triplets, count)
     if stiffness > 0.0:
         count = add_end_jacobian(positions, n_elements, stiffness, fittings, factor, triplets, count)
+    if factor != 0.0:
+        count = add_bow_jacobian(positions, n_elements, size, law, factor, triplets, count)
     if rate_factor != 0.0:
         count = add_bearing_jacobian(positions, n_elements, friction, rate_factor, triplets, count)
         count = add_damping_jacobian(positions, n_elements, size, law[DAMPING], rate_factor, triplets, count)
@@ -153,13 +158,15 @@ def measure(q, rates, fixed, moving, section, pull, ends, end_speeds, effector, 
     _, n_elements, size, _, cylinders, law, radius, stiffness, friction, _ = fixed
     pin, _, contacts, crossings, fittings = moving
     positions, velocities = read_state(q, rates, fixed, moving)
-    count = find_contacts(positions, n_elements, size, cylinders, pin, radius, contacts)
+    count = find_contacts(positions, n_elements, size, cylinders, pin, law, radius, contacts)
     n_crossings = find_crossings(positions, n_elements, size, radius, crossings)
-    touching = np.zeros((count, 6))
+    touching, within = np.zeros((count, 6)), np.empty((4, 3))
     wrench = np.zeros(12)
     for index in range(count):
-        push, point, _, _ = contact_force(positions, velocities, size, cylinders, pin, law, contacts[index])
-        turn = cross(subtract(point, row(pin, 0)), push)
+        push, point, _, _, couple = contact_force(
+            positions, velocities, size, cylinders, pin, law, contacts[index], within
+        )
+        turn = subtract(cross(subtract(point, row(pin, 0)), push), couple)
         for k in range(3):
             touching[index, k] = point[k]
             touching[index, 3 + k] = push[k]

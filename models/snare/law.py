@@ -10,7 +10,9 @@ acts as a stiff damper: a cable at rest creeps by v_s at most.
 
 A cubic cannot follow the kink in curvature that a load between its nodes makes. The deflection that it lacks is that of
 a beam of one element's length l clamped at both ends, e f with e = l³ξ³(1 − ξ)³/(3EI); the nodes themselves are right.
-So e works in series with Hertz: δ = x + e K x^1.5.
+So e works in series with Hertz: δ = x + e K x^1.5 (`bow` has what a curved element takes from e). The cable's damping
+τ EI κ̇ acts in that deflection as well, e ḟ τ; as long as ḟ is slow to τ, that is a force τ e k² δ̇ beside the others,
+with k the stiffness of Hertz and e in series. Without it impacts keep too much speed.
 """
 
 from math import sqrt
@@ -25,7 +27,9 @@ DAMPING = 5
 
 
 def law_constants(parameters: SnareParameters) -> np.ndarray:
-    """K [N/m^1.5], c [s/m], μ, v_s [m/s], 1/(3EI) [1/(N·m²)], and τ EI of `damping` [N·m²·s]: shape (6,)."""
+    """K [N/m^1.5], c [s/m], μ, v_s [m/s], 1/(3EI) [1/(N·m²)], and τ EI of `damping` [N·m²·s], EA [N], prestrain:
+    shape (8,).
+    """
     p = parameters
     stiffness = p.bending_stiffness
     return np.array(
@@ -36,20 +40,10 @@ def law_constants(parameters: SnareParameters) -> np.ndarray:
             p.slip_velocity,
             1 / (3 * stiffness),
             p.bending_damping * stiffness,
+            p.axial_stiffness,
+            p.prestrain,
         ]
     )
-
-
-@compiled
-def give(law, fraction, size):
-    """e at ξ [m/N]."""
-    return law[4] * (size * fraction * (1.0 - fraction)) ** 3
-
-
-@compiled
-def give_change(law, fraction, size):
-    """de/ds at ξ [1/N]."""
-    return 3 * law[4] * (size * fraction * (1.0 - fraction)) ** 2 * (1.0 - 2 * fraction)
 
 
 @compiled
@@ -66,11 +60,20 @@ def hertz_overlap(law, gap, soft):
 
 
 @compiled
+def lag(law, x, soft):
+    """τ e k² [N·s/m]."""
+    slope = 1.5 * law[0] * sqrt(x)
+    series = slope / (1.0 + soft * slope)
+    return 3 * law[4] * law[5] * soft * series * series
+
+
+@compiled
 def force(law, gap, soft, n, w):
     """F on the cable [N] at a gap < 0 [m], with the element's own e."""
     x = hertz_overlap(law, gap, soft)
-    normal_force = law[0] * sqrt(x) * x * max(1.0 - law[1] * dot(n, w), 0.0)
-    slip = add_scaled(w, -dot(n, w), n)
+    approach = -dot(n, w)
+    normal_force = max(law[0] * sqrt(x) * x * (1.0 + law[1] * approach) + lag(law, x, soft) * approach, 0.0)
+    slip = add_scaled(w, approach, n)
     size = sqrt(dot(slip, slip) + law[3] * law[3])
     return scale(normal_force, add_scaled(n, -law[2] / size, slip))
 
@@ -81,7 +84,7 @@ def powers(law, gap, soft, n, w):
     x = hertz_overlap(law, gap, soft)
     stiff = law[0] * sqrt(x) * x
     approach = -dot(n, w)
-    normal_force = stiff * max(1.0 + law[1] * approach, 0.0)
+    normal_force = max(stiff * (1.0 + law[1] * approach) + lag(law, x, soft) * approach, 0.0)
     slip = add_scaled(w, approach, n)
     size = sqrt(dot(slip, slip) + law[3] * law[3])
     stored = 0.4 * stiff * x + 0.5 * soft * stiff * stiff
@@ -94,14 +97,14 @@ def force_change(law, gap, soft, n, w, gap_change, soft_change, n_change, w_chan
     x = hertz_overlap(law, gap, soft)
     stiff = law[0] * sqrt(x) * x
     approach = -dot(n, w)
-    share = 1.0 + law[1] * approach
-    if share <= 0.0:
+    share, slow = 1.0 + law[1] * approach, lag(law, x, soft)
+    normal_force = stiff * share + slow * approach
+    if normal_force <= 0.0:
         return (0.0, 0.0, 0.0)
-    normal_force = stiff * share
     slope = 1.5 * law[0] * sqrt(x)
     x_change = -(gap_change + stiff * soft_change) / (1.0 + soft * slope)
     approach_change = -dot(n_change, w) - dot(n, w_change)
-    normal_change = slope * share * x_change + stiff * law[1] * approach_change
+    normal_change = slope * share * x_change + (stiff * law[1] + slow) * approach_change
     slip = add_scaled(w, approach, n)
     size = sqrt(dot(slip, slip) + law[3] * law[3])
     direction = scale(1.0 / size, slip)

@@ -40,6 +40,10 @@ class Recorder:
         self._rates = np.zeros(12)  # time derivatives of the totals before the time
         self._totals = np.zeros(13)
         self._contacts = np.zeros((0, 6))
+        self.touching: tuple[int, ...] = ()
+        """Cables that touch the pin, after the last step."""
+        self.changed = False
+        """Set once they have become others."""
         self.first_contact: float | None = None
         self.clear()
 
@@ -53,8 +57,9 @@ class Recorder:
         step = time - self._totals[_TIME]
         if step <= 0:
             return
-        before = self._rates
+        before, touching = self._rates, self.touching
         self._read(time)
+        self.changed |= self.touching != touching
         self._totals[:_TIME] += 0.5 * step * (before + self._rates)
         self._totals[_TIME] = time
         if len(self._contacts) and self.first_contact is None:
@@ -63,7 +68,6 @@ class Recorder:
     def _read(self, time: float) -> None:
         a = self._assembly
         a.place(time)
-        a.ends_at(time)
         pull = self._data.GetAECoordinates()[self._ends].reshape(6, 3)  # of the cables on the rings
         wrench, self._energies, contacts, work = measure(
             self._data.GetODE2Coordinates(), self._data.GetODE2Coordinates_t(), a.fixed, a.moving, self._section,
@@ -71,6 +75,8 @@ class Recorder:
         )  # fmt: skip
         self.pin_wrench, self.effector_wrench = wrench[:6], wrench[6:]
         self._contacts = contacts
+        rows = a.moving[2][: len(contacts), 0]
+        self.touching = tuple(int(row) // (2 * a.n_elements + 2) for row in rows)
         self._rates = np.array(
             [
                 *self.effector_wrench[:3],
@@ -86,7 +92,7 @@ class Recorder:
         a = self._assembly
         nodes = (self._data.GetODE2Coordinates()[: a.n_cable_coordinates] + a.nodes.ravel()).reshape(a.nodes.shape)
         ends = nodes[:, [0, -1], 0].reshape(6, 3)
-        a.ends_at(time)
+        a.place(time)
         return float(np.max(np.abs(ends - a.ends)))
 
     @property
@@ -112,17 +118,26 @@ class Recorder:
         """Deepest overlap of a cable with the pin [m]; 0 where none touches."""
         return float(max(-self._assembly.moving[2][: len(self._contacts), 3], default=0.0))
 
-    def save(self) -> tuple[np.ndarray, tuple[np.ndarray, ...], float | None]:
+    def save(self) -> tuple[np.ndarray, tuple[Any, ...], float | None]:
         """Sums, what was read last, and the first contact."""
         pin = self._assembly.pin.copy()
-        latest = (self._rates, self.pin_wrench, self.effector_wrench, self._energies, self._contacts, pin)
+        latest = (
+            self._rates,
+            self.pin_wrench,
+            self.effector_wrench,
+            self._energies,
+            self._contacts,
+            pin,
+            self.touching,
+        )
         return self._totals.copy(), latest, self.first_contact
 
-    def restore(self, totals: np.ndarray, latest: tuple[np.ndarray, ...], first_contact: float | None) -> None:
+    def restore(self, totals: np.ndarray, latest: tuple[Any, ...], first_contact: float | None) -> None:
         """Take back what `save` gave."""
         self._totals[:] = totals
-        self._rates, self.pin_wrench, self.effector_wrench, self._energies, self._contacts, pin = latest
+        self._rates, self.pin_wrench, self.effector_wrench, self._energies, self._contacts, pin, self.touching = latest
         self._assembly.pin[:] = pin
+        self._assembly.lift()
         self.first_contact = first_contact
 
     def clear(self) -> None:
@@ -156,8 +171,10 @@ class Recorder:
         if not a.n_pin:
             return 0.0
         rotation, velocity, spin = a.pin[3:], a.pin[1], a.pin[2]
-        arm = rotation @ np.asarray(target.centre_of_mass) if target.rotates else np.zeros(3)
-        speed = velocity + np.cross(spin, arm)
+        arm, speed = np.zeros(3), velocity
+        if target.rotates:
+            arm = rotation @ np.asarray(target.centre_of_mass)
+            speed = velocity + np.cross(spin, arm)
         energy = 0.5 * target.mass * speed @ speed
         if target.rotates:
             energy += 0.5 * spin @ rotation @ np.asarray(target.inertia) @ rotation.T @ spin

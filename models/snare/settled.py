@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipj, ellipk
 
 from ...errors import InputError
-from .cubic import first_weights, second_weights
+from .cubic import first_weights, second_weights, third_weights
 from .energy import BENDING_POINTS, TENSION_POINTS
 from .geometry import N_CABLES, helices, ring_points
 from .parameters import SnareParameters
@@ -91,10 +91,17 @@ def _rest(parameters: SnareParameters, n_elements: int, guess: np.ndarray) -> np
     energy = ca.SX(0.0)
     for number in range(n_elements):
         element = ca.reshape(nodes[4 * number : 4 * number + 8], 2, 4)
+        ea, ei = parameters.axial_stiffness, parameters.bending_stiffness
+        square, change = (ca.sumsqr(element @ ca.vertcat(*n)) for n in (second_weights(0.5, size), third_weights(size)))
+        mean = 0
         for x, weight in TENSION_POINTS.tolist():
             tangent = element @ ca.vertcat(*first_weights(x, size))
             strain = ca.norm_2(tangent) - 1 + parameters.prestrain
+            mean += weight * strain
             energy += 0.5 * weight * size * parameters.axial_stiffness * strain**2
+        soft, missing = ea * size**4 * square / (720 * ei), size**4 * (1.5 * change - 2 * square**2) / 1440
+        energy += 0.5 * ea * size * ((mean - missing) ** 2 / (1 + soft) - mean**2)
+        energy -= ei * size**5 * (12 * square * change - 10 * square**3) / 1440
         for x, weight in BENDING_POINTS.tolist():
             tangent = element @ ca.vertcat(*first_weights(x, size))
             bow = element @ ca.vertcat(*second_weights(x, size))

@@ -51,7 +51,7 @@ class SnareSolver:
         s.adaptiveStep = True
         s.minimumStepSize = 1e-7
         s.verboseMode = 0
-        s.newton.relativeTolerance = 1e-7
+        s.newton.relativeTolerance = 1e-6
         s.newton.absoluteTolerance = 1e-6
         self._settings.solution.file.write = False
         self._settings.linearSolver.solverType = exudyn.LinearSolverType.EigenSparse
