@@ -187,7 +187,7 @@ def co_simulate(
     frames: list[tuple[float, Array]] | None = None,
     tensions: list[float] | None = None,
 ) -> Run:
-    """One capture; ``step`` is the macro step and ``own_step`` the longest inside the snare [s].
+    """One capture; ``step`` is the macro step and ``own_step`` that inside the snare while cables touch [s].
 
     ``frames`` takes time and the cables' nodes (3, n_nodes, 3), fifteen times a second; ``tensions`` the largest force
     of a cable on its ring [N], at each communication point.

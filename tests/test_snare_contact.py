@@ -8,7 +8,7 @@ from scipy.optimize import minimize_scalar
 from scipy.spatial.transform import Rotation
 
 from snarelab.models.snare.bow import give
-from snarelab.models.snare.contact import find_contacts
+from snarelab.models.snare.contact import CONTACT_SIZE, MOST_CONTACTS, find_contacts
 from snarelab.models.snare.crossing import find_crossings
 from snarelab.models.snare.cubic import combine, first_weights, weights
 from snarelab.models.snare.ends import REACTION
@@ -67,7 +67,7 @@ def touching_state(n_pin, overlap=1.0e-4, turn=(0.0, 0.3, 0.2), seed=0):
     fittings /= np.linalg.norm(fittings, axis=1, keepdims=True)
     no_line = np.zeros(LINE_SIZE)
     fixed = (reference, N, SIZE, n_pin, pin_cylinders(P), law_constants(P), P.cable_radius, 0.1, 0.0, no_line)
-    moving = (pin, euler, np.zeros((24, 5)), np.zeros((12, 5)), fittings)
+    moving = (pin, euler, np.zeros((MOST_CONTACTS, CONTACT_SIZE)), np.zeros((12, 5)), fittings)
     return np.zeros_like(reference), rng.normal(size=reference.shape) * 0.05, fixed, moving
 
 

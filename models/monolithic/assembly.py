@@ -15,10 +15,11 @@ from ...errors import InputError
 from ..floating.arm import FloatingArm
 from ..inertia import Array, to_central
 from ..snare.assembly import Assembly
+from ..snare.contact import CONTACT_SIZE, MOST_CONTACTS
 from ..snare.drive import Pose, ring_ends, ring_motion
 from ..snare.ends import REACTION
 from ..snare.engine import exudyn, items
-from ..snare.forces import MOST_CONTACTS, MOST_CROSSINGS, system_forces, system_jacobian
+from ..snare.forces import MOST_CROSSINGS, system_forces, system_jacobian
 from ..snare.line import LINE_SIZE
 from ..snare.parameters import SnareParameters
 from ..snare.target import Target
@@ -170,14 +171,10 @@ class MonolithicAssembly(Assembly):
         n = self.n_cable_coordinates
         return np.concatenate([vector[:n], vector[n + self.n_tree :]])
 
-    def ends_at(self, time: float) -> Array:
-        """Where the rings hold the cable ends in the present state, shape (18,); leaves speeds and frame."""
-        self.frame[:] = self.frames(*self.tree_state())[0][0]
-        return self._ring_ends(self.frame, time)
-
     def place(self, time: float) -> None:
-        """Bring a pin that is fixed to the base, and the fittings of the ends, to the present state."""
+        """Bring tip, cable ends, fittings, and a pin that is fixed to the base, to the present state."""
         self._follow(*self.tree_state(), time)
+        self._ring_ends(self.frame, time)
 
     def _follow(self, coordinates: Array, rates: Array, time: float) -> tuple[Array, Array]:
         """Bring pin and fittings to a state of the tree; returns the Jacobians of tip and pin, each (6, 6 + J)."""
@@ -185,7 +182,7 @@ class MonolithicAssembly(Assembly):
         self.frame[:] = tip
         if not self.n_pin:
             self.pin[:] = pin
-        self.turn_fittings(time)
+        self._turn_fittings(self.ring_at(time)[0])
         return of_tip, of_pin
 
     def _add_contact(self) -> None:
@@ -222,7 +219,8 @@ class MonolithicAssembly(Assembly):
             p.end_stiffness, p.end_friction, np.zeros(LINE_SIZE),
         )  # fmt: skip
         self.moving = (
-            self.pin, self.euler, np.zeros((MOST_CONTACTS, 4)), np.zeros((MOST_CROSSINGS, 5)), np.zeros((8, 3)),
+            self.pin, self.euler,
+            np.zeros((MOST_CONTACTS, CONTACT_SIZE)), np.zeros((MOST_CROSSINGS, 5)), np.zeros((8, 3)),
         )  # fmt: skip
         nodes = [*self.cable_nodes, *([self.target_node] if self.n_pin else []), self.tree_node]
         self.contact_object = self.system.AddObject(

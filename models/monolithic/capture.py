@@ -136,7 +136,6 @@ class MonolithicCapture:
     def _read(self, time: float) -> None:
         a, data = self.assembly, self._data
         a.place(time)
-        a.ends_at(time)
         pull = data.GetAECoordinates()[self._ends].reshape(6, 3)
         self._wrench, _, contacts, _ = measure(
             a.others(data.GetODE2Coordinates()), a.others(data.GetODE2Coordinates_t()), a.fixed, a.moving,

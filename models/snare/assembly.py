@@ -13,10 +13,11 @@ from typing import Any, cast
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from .contact import CONTACT_SIZE, MOST_CONTACTS
 from .drive import PATH_SIZE, Pose, frame_at, ring_ends, ring_motion
 from .ends import RING_SPIN
 from .engine import exudyn, items
-from .forces import MOST_CONTACTS, MOST_CROSSINGS, system_forces, system_jacobian
+from .forces import MOST_CROSSINGS, system_forces, system_jacobian
 from .geometry import N_CABLES
 from .law import law_constants
 from .line import CLEARANCE, DAMPING, DOWN, FREE_LENGTH, LINE_SIZE, LOCAL, STIFFNESS, TAUT, TOP
@@ -264,7 +265,7 @@ class Assembly:
         self.moving = (
             self.pin,
             self.euler,
-            np.zeros((MOST_CONTACTS, 5)),
+            np.zeros((MOST_CONTACTS, CONTACT_SIZE)),
             np.zeros((MOST_CROSSINGS, 5)),
             np.zeros((8, 3)),
         )

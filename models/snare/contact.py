@@ -20,8 +20,8 @@ from .vector import add, add_scaled, compiled, cross, dot, rotate, rotate_back, 
 
 PIECES = 4
 """Into which an element is cut to find a change of sign of h."""
-MOST_CONTACTS = 24
-"""Rows of the list of contacts: cable's element, cylinder, ξ, gap, e."""
+MOST_CONTACTS, CONTACT_SIZE = 24, 5
+"""Rows and columns of the list of contacts: cable's element, cylinder, ξ, gap, e."""
 NEAR = 1e-4
 """Gap of the cubic below which its bow is looked at [m]; bows are some micrometres."""
 

@@ -2,8 +2,8 @@
 
 Differentiating h(s, q) = 0 gives ∂s/∂q = −h_q/h_s. A column is the first-order change of all forces with one coordinate
 (factor `position_factor`) and with its rate (`velocity_factor`), written as triplets (row, column, value) of
-−∂f/∂q, which is Exudyn's left-hand side. It is exact but for second derivatives of the bow (`bow`), some hundredths of
-its largest entry: Newton's method converges as fast without them.
+−∂f/∂q, which is Exudyn's left-hand side. It is exact but for second derivatives of the bow (`bow`), under a hundredth
+of its largest entry under any push that occurs.
 """
 
 import numpy as np
