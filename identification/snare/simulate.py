@@ -65,4 +65,4 @@ def simulate_capture(model: Model, motion: str | Path | None = None) -> xr.Datas
     columns["angle.ring"] = history.ring_angle
     variables = {name: ("time", np.ascontiguousarray(x)) for name, x in columns.items()}
     attributes = {"path": str(motion or model.path), "notes": []}
-    return xr.Dataset(variables, coords={"time": history.times + zero}, attrs=attributes)
+    return xr.Dataset(variables, coords={"time": zero + SAMPLE * np.arange(len(history.times))}, attrs=attributes)
