@@ -1,8 +1,8 @@
 """Nothing outlives the process that wanted it: workers end and temporary folders go with it, however it ends.
 
 A process that is killed cleans up nothing, and one that hangs or has forked does not notice that nobody waits for it.
-`guard` therefore splits a process in two: the first half, the warden, runs no foreign code. It waits for the worker, the
-second half, to end, or for whoever started them to be gone; then it ends the worker with everything that it has
+`guard` therefore splits a process in two. The first half, the warden, runs no foreign code: it waits for the worker,
+the second half, to end, or for whoever started them to be gone. Then it ends the worker with everything that this has
 started, removes its scratch folder, and ends as the worker did. `sweep` is the same for folders alone.
 
 On Linux descendants that left their parents come to the warden (``PR_SET_CHILD_SUBREAPER``, see prctl(2)), so that a
