@@ -266,7 +266,7 @@ def test_units_follow_the_base_unit(name, base_unit, target, factor):
     assert conversion(pint_unit(name, base_unit), target) == pytest.approx((factor, 0.0), rel=1e-9, abs=1e-12)
 
 
-def test_arrays_are_scalars_with_indices_and_text_inputs_are_refused():
+def test_arrays_are_scalars_with_indices_and_text_inputs_are_left_alone():
     def variable(name, kind, causality, dimensions=(), reference=0, start=None):
         return SimpleNamespace(
             name=name, valueReference=reference, type=kind, causality=causality, start=start, unit=None,
@@ -285,6 +285,8 @@ def test_arrays_are_scalars_with_indices_and_text_inputs_are_refused():
     assert [v.name for v in found.variables] == ["flow[1,1]", "flow[1,2]", "flow[2,1]", "flow[2,2]", "sum"]
     assert [v.start for v in found.variables[:4]] == [1, 2, 3, 4]
     assert found.variables[4].depends == ("flow[1,1]", "flow[1,2]", "flow[2,1]", "flow[2,2]")
+    assert not found.unread
     description.modelVariables.append(variable("mode", "String", "input", (), 3))
-    with pytest.raises(InputError, match="'mode' holds String"):
-        read_interface(description, "x.fmu")
+    found = read_interface(description, "x.fmu")
+    assert found.unread == {"mode": "String"}
+    assert "mode" not in {v.name for v in found.variables}
