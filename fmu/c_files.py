@@ -46,6 +46,9 @@ def model_header(variables: tuple[Variable, ...], shapes: dict[str, int], conten
     digest = hashlib.sha256("\0".join([repr(variables), repr(shapes), content]).encode()).hexdigest()
     token = f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"
     names = ", ".join(f'"{name}"' for name in ("time", *(v.name for c in groups.values() for v in c)))
+    given = groups["parameter"]
+    least = [v.minimum if v.refuses else -math.inf for v in given]
+    most = [v.maximum if v.refuses else math.inf for v in given]
     lines = [
         "/* Written at export. */",
         "#include <math.h>",
@@ -54,8 +57,8 @@ def model_header(variables: tuple[Variable, ...], shapes: dict[str, int], conten
         *(f"#define N_{causality.upper()}S {len(members)}" for causality, members in groups.items()),
         f"static const double START_INPUT[] = {{{_numbers([v.start for v in groups['input']])}}};",
         f"static const double START_PARAMETER[] = {{{_numbers([v.start for v in groups['parameter']])}}};",
-        f"static const double LEAST_PARAMETER[] = {{{_numbers([v.minimum for v in groups['parameter']])}}};",
-        f"static const double MOST_PARAMETER[] = {{{_numbers([v.maximum for v in groups['parameter']])}}};",
+        f"static const double LEAST_PARAMETER[] = {{{_numbers(least)}}};",
+        f"static const double MOST_PARAMETER[] = {{{_numbers(most)}}};",
         "static const char FIXED_PARAMETER[] = {"
         + ", ".join(str(int(v.fixed)) for v in groups["parameter"])
         + (", 0};" if groups["parameter"] else "0};"),

@@ -95,7 +95,9 @@ def test_loop_in_c_gives_the_same_bits(files, scheme, hold):
             runs.append(master.run(0.2505))
             assert (master._loop is False) != compiled
     assert runs[0].recording.equals(runs[1].recording)
-    assert (runs[0].steps, runs[0].evaluations) == (runs[1].steps, runs[1].evaluations) == (251, 251)
+    assert (runs[0].steps, runs[0].evaluations) == (runs[1].steps, runs[1].evaluations)
+    assert runs[0].steps == 251
+    assert runs[0].evaluations - 251 in (range(1, 5) if hold == "quadratic" else [0])  # its start is iterated
 
 
 def test_loop_in_c_is_left_to_what_it_can_do(files):
