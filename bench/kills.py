@@ -176,7 +176,7 @@ class Trial:
             reported = [int(n) for n in re.findall(r"(\d+) of at most", log)]
             self.recorded = max([self.recorded, *reported])
         deadline = time.monotonic() + ORPHANS
-        while left := _alive(mark):
+        while left := alive(mark):
             if time.monotonic() > deadline:
                 raise Lost(f"{self.command}: processes {left} live on {ORPHANS:g} s after their parent was killed")
             time.sleep(0.05)
@@ -196,7 +196,7 @@ class Trial:
                 raise Lost(f"tolerance: {self.recorded} cases were reported recorded, {count} are there")
 
 
-def _alive(mark: str) -> list[int]:
+def alive(mark: str) -> list[int]:
     """Processes that a run started, by what stands in their environment."""
     found = []
     for place in Path("/proc").glob("[0-9]*"):

@@ -34,7 +34,7 @@ def run(given: argparse.Namespace) -> None:
     """
     from dataclasses import replace
 
-    from ..recordings import demand_suffix
+    from ..recordings.write import demand_suffix
     from .journal import Journal
     from .setup import Hosting, load_setup
 

@@ -15,7 +15,7 @@ from types import TracebackType
 from typing import BinaryIO, Self
 
 from ..errors import InputError
-from ..recordings import demand_suffix, write_recording
+from ..recordings.write import demand_suffix, write_recording
 from .record import Record
 
 OFTEN = 1.0

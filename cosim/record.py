@@ -8,8 +8,7 @@ import numpy as np
 import xarray as xr
 
 from ..errors import InputError
-from ..recordings import default_unit
-from ..recordings.signals import is_signal
+from ..recordings.signals import default_unit, is_signal
 from .system import System
 from .units import conversion
 
