@@ -54,7 +54,9 @@ def loads(data: bytes) -> Any:
     reader = _Reader(data, len(_MARK))
     try:
         state = _read(reader, 0)
-    except (struct.error, UnicodeDecodeError, TypeError, OverflowError, MemoryError) as error:
+    except StateError:
+        raise
+    except (struct.error, ValueError, TypeError, OverflowError, MemoryError) as error:
         raise StateError(f"a damaged state ({error})") from None
     if reader.at != len(data):
         raise StateError("a damaged state: there is more than one value")
