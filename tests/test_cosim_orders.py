@@ -28,9 +28,11 @@ def test_observed_order(files, hold, expected, scheme):
 
 @pytest.mark.parametrize("hold", ["linear", "quadratic"])
 def test_step_controls_error_follows_its_tolerance(files, hold):
-    tolerances = (1e-2, 1e-3)
+    """What is held has a shape in a step, of order H², that control does not see where its steps go by H³."""
+    tolerances, version = (1e-2, 1e-3), files[0]
+    expected = 2 / 3 if (version, hold) == (3, "quadratic") else 1.0
     errors = [error(files[1], 1e-3, hold, control=StepControl(tolerance)) for tolerance in tolerances]
-    assert slopes(tolerances, errors)[0] == pytest.approx(1.0, abs=0.15)
+    assert slopes(tolerances, errors)[0] == pytest.approx(expected, abs=0.15)
 
 
 class Stuck(LeftOscillator):
@@ -42,15 +44,14 @@ class Switching(LeftOscillator):
 
     def outputs(self):
         shown = super().outputs()
-        return shown + (1e3 if self._x[2] < 0 else -1e3)
+        return shown + (-1e3 if self._x[2] < 0 else 1e3)
 
 
 def test_the_start_is_left_as_it_is_where_it_cannot_be_iterated():
     with Master(System({"left": Stuck(), "right": RightOscillator()}, LINKS), 1e-2, hold="quadratic") as master:
         assert master.run(0.1).evaluations == 10
-    with Master(
-        System({"left": LeftOscillator(), "right": RightOscillator()}, LINKS), 1e-2, hold="quadratic"
-    ) as master:
+    parts = {"left": LeftOscillator(), "right": RightOscillator()}
+    with Master(System(parts, LINKS), 1e-2, hold="quadratic") as master:
         assert 10 < master.run(0.1).evaluations < 15
     parts = {"left": Switching(), "right": RightOscillator()}
     with Master(System(parts, LINKS), 1e-2, hold="quadratic") as master:
