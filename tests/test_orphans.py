@@ -142,6 +142,7 @@ def hostile(tmp_path_factory):
 @pytest.fixture
 def mark(monkeypatch, request):
     """What stands in the environment of processes that a test starts."""
+    scratch_folder("test-")  # whose sweeper is this process's, not the test's
     monkeypatch.setenv("SNARELAB_KILLS", f"{request.node.name}-{os.getpid()}")
     return os.environ["SNARELAB_KILLS"]
 
