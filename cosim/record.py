@@ -100,14 +100,17 @@ class Record:
 
     def rows(self, first: int = 0) -> np.ndarray:
         """Rows from one on, (n_rows, n_headers), in the headers' units."""
-        rows = self._rows[first : self.count].copy()
-        for i, (_, factor, offset) in enumerate(self._columns, 1):
-            rows[:, i] = factor * rows[:, i] + offset
-        return rows
+        return np.column_stack(self._in_units(first))
+
+    def _in_units(self, first: int) -> list[np.ndarray]:
+        """Columns from a row on, in the headers' order and units."""
+        rows = self._rows[first : self.count]
+        shown = [factor * rows[:, i] + offset for i, (_, factor, offset) in enumerate(self._columns, 1)]
+        return [rows[:, 0].copy(), *shown, *(rows[:, i].copy() for i in range(1 + len(shown), rows.shape[1]))]
 
     def dataset(self) -> xr.Dataset:
         """Everything so far, in columns called as in `headers`."""
-        time, *columns = np.ascontiguousarray(self.rows().T)
+        time, *columns = self._in_units(0)
         named = {name: ("time", column) for name, column in zip(self.headers[1:], columns, strict=True)}
         return xr.Dataset(named, coords={"time": time})
 
