@@ -6,7 +6,7 @@ STUDIES := emps kuka bam free-floating ground-capture zero-g-rig orbit-inspectio
 
 BENCHES := torque friction_fit diagnosis floating cosim fmu snare ecos_inspection tolerance
 
-.PHONY: help demo test test-slow check studies bench accuracy fuzz kills mutants proof fmus docs clean $(STUDIES:%=study-%)
+.PHONY: help demo test test-slow check studies bench accuracy fuzz kills hostile mutants proof fmus docs clean $(STUDIES:%=study-%)
 
 help:            ## what can be made
 	@sed -n -e 's/^\$$(STUDIES.*## /  make study-NAME\t/p' -e 's/^\([a-z-]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
@@ -40,8 +40,12 @@ fuzz: .venv/installed ## broken files at every reader, SECONDS for each
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt '.[fuzz]'
 	$(BIN)/python tests/fuzz --seconds $(SECONDS)
 
-kills: .venv/installed ## two hundred runs killed at random: nothing lost that was reported done
+kills: .venv/installed ## two hundred runs, and as many importers of FMUs, killed at random: nothing lost that was reported, nothing left
 	$(BIN)/python bench/kills.py
+	$(BIN)/python bench/importer_kills.py
+
+hostile: .venv/installed ## forty FMUs that crash, hang, fork and lie: each ends in one line
+	$(BIN)/python bench/hostile_fmus.py
 
 MUTANTS ?= 60
 mutants: .venv/installed ## change identification and cosim at random places, and count how often a test notices; branch coverage

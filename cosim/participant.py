@@ -8,6 +8,7 @@ given once, by name, at initialisation.
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, Literal
 
 import numpy as np
@@ -56,7 +57,8 @@ class Participant(ABC):
     ``state = save()`` and ``restore(state)`` give exactly the same future, bit for bit, also in another instance of the
     same participant; `can_restore` says whether they exist. A step that fails raises `StepError` and leaves the
     participant so that `restore` still works. `input_order` is how many derivatives of the inputs a step follows,
-    `can_vary_step` whether steps may differ in size.
+    `can_vary_step` whether steps may differ in size, `start_limit` how long `initialize` may take at least [s] however
+    little a step is given, and `unread` which inputs hold no number, with their type: they keep their start values.
     """
 
     name: str
@@ -64,6 +66,8 @@ class Participant(ABC):
     can_restore: bool = False
     input_order: int = 0
     can_vary_step: bool = True
+    start_limit: float = 60.0
+    unread: Mapping[str, str] = MappingProxyType({})
 
     @abstractmethod
     def initialize(self, time: float = 0.0, parameters: Mapping[str, float] | None = None) -> None:

@@ -7,9 +7,9 @@ from xml.etree import ElementTree
 
 from ..errors import InputError
 from ..files import written_whole
+from .experiment import Setup
 from .participant import Participant
 from .process import OwnProcess
-from .setup import Setup
 from .ssp import ENTRY, RUN, SSC, SSD
 from .ssp_parameters import SSV
 
