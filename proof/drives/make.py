@@ -31,3 +31,14 @@ def make(folder: Path, seed: int, count: int, group: str = "", tell: Callable[[s
         took = time.perf_counter() - start
         tell(f"{done}/{len(wanted)} {path}: {plans[k].group}, {plans[k].disturbance}, {what}; {took:.1f} s")
     return folders
+
+
+def written(folder: Path, group: str = "") -> list[Path]:
+    """Folders of the cases that are there, or of those of one group; raises ValueError where there is none."""
+    marks = sorted(folder.glob("*/truth.json"))
+    found = [path.parent for path in marks if group in ("", json.loads(path.read_text())["group"])]
+    if not found:
+        raise ValueError(
+            f"{folder} holds no {group + ' ' if group else ''}cases; make some: python -m proof.drives make"
+        )
+    return found
