@@ -1,7 +1,7 @@
 """The second proof: cases of drives simulated on Pinocchio's models, which share nothing with the first ones.
 
-``python -m proof.drives make DIR --seed N --cases K``, then ``score DIR --out FILE.jsonl`` and ``table FILE.jsonl``, from
-the repository's root. What was done is not done again. Seeds 1 to 99 are for work on the tool.
+``python -m proof.drives make DIR --seed N --cases K``, then ``score DIR --out FILE.jsonl`` and ``table FILE.jsonl``,
+from the repository's root. What was done is not done again. Seeds 1 to 99 are for work on the tool.
 """
 
 import argparse
