@@ -36,7 +36,8 @@ class Bodies(NamedTuple):
         joints = range(1, model.njoints)
         data = model.createData()
         pin.computeJointJacobians(model, data, np.zeros(model.nq))
-        axes = [data.oMi[k].rotation.T @ data.J[3:, k - 1] for k in joints]
+        jacobian = np.reshape(data.J, (6, -1))  # of one joint, pinocchio gives a vector
+        axes = [data.oMi[k].rotation.T @ jacobian[3:, k - 1] for k in joints]
         return Bodies(
             np.array([model.jointPlacements[k].rotation for k in joints]),
             np.array([model.jointPlacements[k].translation for k in joints]),

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +14,10 @@ from .laws import Friction
 from .loop import TICK
 from .motions import KINDS, STILL, disturbance, motion, scale
 from .nameless import NAMELESS
+from .places import joint
 from .plant import Planned, Plant, recorded, rms
 from .robots import Rng, believed, random_robot
-from .springs import NAMES, makers
+from .springs import NAMES, SPRINGS, makers
 
 CLEAN, SINGLE, PAIR, LAWLESS = "clean", "single", "pair", "nameless"
 GROUPS = (CLEAN, SINGLE, PAIR, LAWLESS)
@@ -61,6 +62,8 @@ def planned(seed: int, count: int) -> list[Plan]:
                 concealed = (next(lawless),)
             elif group == PAIR:
                 names = pairs.choice(NAMES, 2, replace=False).tolist()
+                while set(names) <= set(SPRINGS):  # each would be sized by both
+                    names = pairs.choice(NAMES, 2, replace=False).tolist()
                 concealed = tuple((name, float(pairs.choice((1.0, 2.0, 4.0)))) for name in names)
             plans.append(Plan(group, next(kinds[group]), concealed))
     return plans[:count]
@@ -115,12 +118,15 @@ def _drawn(plan: Plan, seed: int, number: int, rng: Rng) -> Case:
     joints = rng.permutation(len(total))
     plant, concealed = bare, []
     for k, (name, size) in enumerate(plan.concealed):
-        along = replace(m, plant=plant)
+        # The bodies as they are with what is concealed already.
+        along = Planned.of(plant, motions["train"]) if concealed else m
         spot = int(joints[k])
         if plan.group == LAWLESS:
             made = NAMELESS[name](along, spot, float(size * level[spot]), rng)
         else:
             made = makers(motions["train"])[name](along, spot, size * level, rng)
+        if any(joint(made.at) == joint(other.at) for _, _, other in concealed):
+            raise TooMuch("two effects at one joint")
         plant = made.plant
         concealed.append((name, size, made))
     return _recorded(plan, seed, number, plant, motions, level, concealed, rng)

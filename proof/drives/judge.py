@@ -5,10 +5,11 @@ members is concealed in the case, at that joint (joint2, link2 and tau.joint2 ar
 every case's background (a URDF that is off, bristles that the model lacks) is neither right nor wrong.
 """
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
+
+from .places import joint
 
 Line = Mapping[str, Any]
 Place = tuple[str, str]
@@ -147,8 +148,3 @@ def _known(line: Line) -> list[float]:
     }
     moved = [m for m in line.get("moved", []) if m["name"] in values and m["std"]]
     return [(m["after"] - values[m["name"]]) / m["std"] for m in moved]
-
-
-def joint(place: str) -> int:
-    """Number of the joint that a place belongs to."""
-    return int(re.findall(r"\d+", place)[-1])

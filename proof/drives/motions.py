@@ -2,7 +2,7 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, sosfilt
+from scipy.signal import butter, lfilter, sosfilt
 
 from .loop import TICK
 from .robots import Rng
@@ -101,12 +101,9 @@ def disturbance(rng: Rng, kind: str, scale: float, count: int, n: int) -> NDArra
         made = sosfilt(butter(4, scale, fs=1.0 / TICK, output="sos"), shocks, axis=0)
         return made / np.sqrt(2.0 * scale * TICK)
     keep = float(np.exp(-TICK / scale)) if np.isfinite(scale) else 1.0
-    fresh = np.sqrt(1.0 - keep**2) if keep < 1.0 else 1.0
-    start = rng.standard_normal(n) if keep < 1.0 else np.zeros(n)
-    made = np.empty((count, n))
-    made[0] = start
-    for k in range(1, count):
-        made[k] = keep * made[k - 1] + fresh * shocks[k]
+    # In its steady state from the first tick on; a random walk starts at zero.
+    fresh, start = (np.sqrt(1.0 - keep**2), rng.standard_normal((1, n))) if keep < 1.0 else (1.0, np.zeros((1, n)))
+    made, _ = lfilter([fresh], [1.0, -keep], shocks, axis=0, zi=keep * start)
     if kind == WANDERING:
         made -= made.mean(axis=0)
         made /= np.sqrt(np.mean(made**2, axis=0))

@@ -44,15 +44,22 @@ def _found(
     built: Callable[[float], Plant], low: float, high: float, motion: tuple[NDArray, NDArray, NDArray], wanted: NDArray
 ) -> tuple[float, int, float]:
     """Number between ``low`` and ``high`` (the effect grows with it) whose effect has the wanted size, by bisection."""
-    least, most = np.log(low), np.log(high)
-    for _ in range(TRIES):
-        x = float(np.exp(0.5 * (least + most)))
+
+    def size(x: float) -> tuple[float, int, float]:
         m, change = excess(built(x), motion)
         shares = rms(m.left(change)) / wanted
         channel = int(np.argmax(shares))
-        if abs(shares[channel] - 1.0) < CLOSE:
-            return x, channel, float(rms(change[:, channel]))
-        least, most = (least, np.log(x)) if shares[channel] > 1.0 else (np.log(x), most)
+        return float(shares[channel]), channel, float(rms(change[:, channel]))
+
+    if size(low)[0] > 1.0 or size(high)[0] < 1.0:
+        raise TooMuch("no spring that hardware has is of this size")
+    least, most = np.log(low), np.log(high)
+    for _ in range(TRIES):
+        x = float(np.exp(0.5 * (least + most)))
+        share, channel, raw = size(x)
+        if abs(share - 1.0) < CLOSE:
+            return x, channel, raw
+        least, most = (least, np.log(x)) if share > 1.0 else (np.log(x), most)
     raise TooMuch("no spring that hardware has is of this size")
 
 
@@ -105,4 +112,5 @@ def makers(motion: tuple[NDArray, NDArray, NDArray]) -> dict[str, Maker]:
     return {**LAWS, "joint_elasticity": elasticity(motion), "backlash": backlash(motion)}
 
 
-NAMES = (*LAWS, "joint_elasticity", "backlash")
+SPRINGS = ("joint_elasticity", "backlash")
+NAMES = (*LAWS, *SPRINGS)
