@@ -133,6 +133,10 @@ def _differences(old: Line, new: Line) -> list[str]:
     ends = [said["held_out"][1] for said in (old, new)]
     if None not in ends and _apart(ends[0], ends[1], MOVED["held out"]):
         found.append(f"held-out error {100 * ends[0]:.2f} -> {100 * ends[1]:.2f} %")
+    for channel, error in new.get("held_out_mdeg", {}).items():
+        last = old.get("held_out_mdeg", {}).get(channel, error)
+        if _apart(last, error, MOVED["held out"]):
+            found.append(f"held-out {channel} {last:.4g} -> {error:.4g} mdeg")
     return found
 
 

@@ -1,4 +1,4 @@
-"""Cases of the second proof: shares and odds of the plan, the same for a seed, sizes as wanted, models as they should be."""
+"""Cases of the second proof: shares of the plan, the same for a seed, sizes as wanted, models as they should be."""
 
 import json
 from collections import Counter
@@ -16,7 +16,7 @@ from proof.drives.loop import TICK
 from proof.drives.make import make, written
 from proof.drives.motions import KINDS, STILL, WHITE
 from proof.drives.nameless import NAMELESS, beside_names
-from proof.drives.plant import Plant, Planned, rms
+from proof.drives.plant import Planned, Plant, rms
 from proof.drives.springs import BAND, NAMES, SPRINGS, makers
 from snarelab.models.effects import effects
 from snarelab.models.model_file import load_model
@@ -142,7 +142,7 @@ def test_nameless_laws_are_sized_by_what_names_leave():
     rng, sized = np.random.default_rng(6), 0
     for name, maker in NAMELESS.items():
         for number in range(20):
-            plant, _, m = bare(number)
+            _, _, m = bare(number)
             wanted = 0.05 * float(rms(m.torque[:, 1]))
             try:
                 made = maker(m, 1, wanted, rng)

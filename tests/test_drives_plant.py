@@ -1,4 +1,4 @@
-"""The second proof's plant against closed forms, conservation and Pinocchio's own algorithms; its disturbances' statistics."""
+"""The second proof's plant against closed forms, conservation and Pinocchio's algorithms; its disturbances."""
 
 # pyright: reportAttributeAccessIssue=false
 import numpy as np
@@ -37,8 +37,11 @@ def drives(n, rotor=0.0, kp=0.0, kd=0.0, sprung=(0.0, 0.0, 0.0), limit=1e9, lag=
     if sprung[0]:
         motor[-1] = n
     full = np.ones(n)
-    springs = [x * full for x in sprung]
-    return Drives(motor, rotor * full, *springs, lag * full, limit * full, kp * full, kd * full, 1e-9 * full, full)
+    stiffness, damping, gap = (x * full for x in sprung)
+    count = 1e-9 * full
+    return Drives(
+        motor, rotor * full, stiffness, damping, gap, lag * full, limit * full, kp * full, kd * full, count, full
+    )
 
 
 def no_laws():
