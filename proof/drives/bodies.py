@@ -10,8 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numba import njit
 from numpy.typing import NDArray
+
+from .compiled import compiled
 
 
 class Bodies(NamedTuple):
@@ -49,7 +50,7 @@ class Bodies(NamedTuple):
         )
 
 
-@njit(cache=True)
+@compiled
 def _turned(axis, angle):
     """Rotation (3, 3) about a unit axis (Rodrigues)."""
     x, y, z = axis[0], axis[1], axis[2]
@@ -62,21 +63,21 @@ def _turned(axis, angle):
     return found
 
 
-@njit(cache=True, inline="always")
+@compiled
 def _cross(out, a, b):
     out[0] = a[1] * b[2] - a[2] * b[1]
     out[1] = a[2] * b[0] - a[0] * b[2]
     out[2] = a[0] * b[1] - a[1] * b[0]
 
 
-@njit(cache=True)
+@compiled
 def _product(out, a, b):
     for i in range(3):
         for j in range(3):
             out[i, j] = a[i, 0] * b[0, j] + a[i, 1] * b[1, j] + a[i, 2] * b[2, j]
 
 
-@njit(cache=True)
+@compiled
 def pose(bodies, q, turns, origins, axes, coms, inertias):
     """Fill, in world axes: rotations, origins, axes, centres of mass (from the world's origin), inertias."""
     n = q.size
@@ -104,7 +105,7 @@ def pose(bodies, q, turns, origins, axes, coms, inertias):
                 inertias[k, i, j] = own[i, 0] * turn[j, 0] + own[i, 1] * turn[j, 1] + own[i, 2] * turn[j, 2]
 
 
-@njit(cache=True)
+@compiled
 def mass_matrix(bodies, origins, axes, coms, inertias, out):
     """Joint-space mass matrix [kg·m²] into ``out`` (its first n rows and columns), from what `pose` filled."""
     n = bodies.mass.size
@@ -139,7 +140,7 @@ def mass_matrix(bodies, origins, axes, coms, inertias, out):
             out[k, j] = found
 
 
-@njit(cache=True)
+@compiled
 def inverse(bodies, origins, axes, coms, inertias, qd, qdd, out):
     """Joint torques [N·m] for speeds and accelerations, into ``out``, from what `pose` filled."""
     n = qd.size
@@ -189,7 +190,7 @@ def inverse(bodies, origins, axes, coms, inertias, qd, qdd, out):
             out[k] += axes[k, i] * (moment[i] - part[i])
 
 
-@njit(cache=True)
+@compiled
 def torques(bodies, q, qd, qdd):
     """Joint torques (n_samples, n) [N·m] along a motion, arrays (n_samples, n) [rad, rad/s, rad/s²]."""
     count, n = q.shape
@@ -202,7 +203,7 @@ def torques(bodies, q, qd, qdd):
     return found
 
 
-@njit(cache=True)
+@compiled
 def inertias_along(bodies, q):
     """Mass matrices (n_samples, n, n) [kg·m²] along positions (n_samples, n)."""
     count, n = q.shape

@@ -13,7 +13,7 @@ from .concealed import Made, TooMuch
 from .laws import Friction
 from .loop import TICK
 from .motions import KINDS, STILL, disturbance, motion, scale
-from .nameless import NAMELESS
+from .nameless import NAMELESS, lawless
 from .places import joint
 from .plant import Planned, Plant, recorded, rms
 from .robots import Rng, believed, random_robot
@@ -31,7 +31,7 @@ BITS = (13, 21)
 MOST_ASTRAY = 0.3
 """An arm that strays further from its motion [rad] has lost its servo: another case is drawn."""
 
-ATTEMPTS = 200
+ATTEMPTS = 1000
 BACKGROUND = ("inertia_error", "com_offset", "payload_mass")
 """Names that are true of a case besides: links whose numbers are 1 to 3 % off. Bristles, where the model has none."""
 
@@ -122,7 +122,7 @@ def _drawn(plan: Plan, seed: int, number: int, rng: Rng) -> Case:
         along = Planned.of(plant, motions["train"]) if concealed else m
         spot = int(joints[k])
         if plan.group == LAWLESS:
-            made = NAMELESS[name](along, spot, float(size * level[spot]), rng)
+            made = lawless(motions["train"])[name](along, spot, float(size * level[spot]), rng)
         else:
             made = makers(motions["train"])[name](along, spot, size * level, rng)
         if any(joint(made.at) == joint(other.at) for _, _, other in concealed):

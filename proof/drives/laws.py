@@ -7,8 +7,9 @@ direction of friction is the state of bristles or of slipping elements, and curv
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from .compiled import compiled
 
 DAHL, SLIP, LAGGING = 0, 1, 2
 """Kinds of presliding: Dahl (1968); four elements in parallel that slip one after another (Iwan 1966); Dahl's with a
@@ -66,7 +67,7 @@ class Laws(NamedTuple):
     table: NDArray
 
 
-@njit(cache=True)
+@compiled
 def slid(kind, state, move, speed, travel, lag, after):
     """Direction of friction, -1 to 1, amid a ``move`` [rad]; the elements' states go from state to after."""
     if kind == SLIP:
@@ -82,7 +83,7 @@ def slid(kind, state, move, speed, travel, lag, after):
     return 0.5 * (state[0] + after[0])
 
 
-@njit(cache=True)
+@compiled
 def looked_up(table, turns):
     """A periodic table at a number of ``turns``, between its entries by a line."""
     x = (turns - np.floor(turns)) * TABLE
@@ -91,7 +92,7 @@ def looked_up(table, turns):
     return table[k % TABLE] * (1.0 - part) + table[(k + 1) % TABLE] * part
 
 
-@njit(cache=True)
+@compiled
 def torque(number, p, table, time, q, qd, direction, load, motor, q2, qd2, state):
     """Resisting torque of a law of size 1 but for `CUT_OFF`, where nothing is linear in a size [N·m].
 
@@ -134,16 +135,14 @@ def torque(number, p, table, time, q, qd, direction, load, motor, q2, qd2, state
     if number == SEAL:  # p: low, high, edge. A lip that grips on the way out of one stretch
         inside = 0.25 * (1.0 + np.tanh((q - p[0]) / p[2])) * (1.0 + np.tanh((p[1] - q) / p[2]))
         return inside * max(direction, 0.0)
-    if number == IRON:  # p: reference torque. A motor that gives less per ampere the more it has
-        return motor * (motor / p[0]) ** 2
-    if number == CUT_OFF:  # p: limit. What is logged is asked for, what is given is limited
+    if number in (IRON, CUT_OFF):  # p: knee. Above it a motor gives less for each ampere; or no more than a limit
         return np.sign(motor) * max(abs(motor) - p[0], 0.0)
     # CHATTER. p: frequency [Hz], speed, width. A resonance that one range of speeds wakes
     x = (abs(qd) - p[1]) / p[2]
     return np.exp(-x * x) * np.sin(2.0 * np.pi * p[0] * time)
 
 
-@njit(cache=True)
+@compiled
 def went(number, p, state, period, move, qd, direction):
     """State of a law one ``period`` [s] and one ``move`` [rad] later."""
     if number == WARMING:  # p: time constant [s], speed that warms fully
@@ -154,7 +153,7 @@ def went(number, p, state, period, move, qd, direction):
     return state
 
 
-@njit(cache=True)
+@compiled
 def directions(kind, travel, lag, period, q, qd):
     """Direction of friction (n_samples,) along a joint's planned motion."""
     state, after, found = np.zeros(4), np.zeros(4), np.zeros(q.size)
@@ -165,7 +164,7 @@ def directions(kind, travel, lag, period, q, qd):
     return found
 
 
-@njit(cache=True)
+@compiled
 def along(number, p, table, period, q, qd, direction, load, motor, q2, qd2):
     """`torque` (n_samples,) along a planned motion."""
     found, state = np.zeros(q.size), 0.0

@@ -7,10 +7,10 @@ where it sticks. A joint with a spring has two coordinates, its motor's and its 
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from .bodies import inverse, mass_matrix, pose
+from .compiled import compiled
 from .laws import slid, torque, went
 
 TICK = 1e-3
@@ -44,7 +44,7 @@ class Drives(NamedTuple):
     filter: NDArray
 
 
-@njit(cache=True)
+@compiled
 def factored(a, size):
     """Cholesky factor of a symmetric matrix in place, in its lower part."""
     for j in range(size):
@@ -55,7 +55,7 @@ def factored(a, size):
             a[i, j] = np.sqrt(found) if i == j else found / a[j, j]
 
 
-@njit(cache=True)
+@compiled
 def solved(a, b, size):
     """Solve with a factor of `factored`, in place."""
     for i in range(size):
@@ -68,7 +68,7 @@ def solved(a, b, size):
         b[i] /= a[i, i]
 
 
-@njit(cache=True)
+@compiled
 def spring(drives, k, twist, rate):
     """Torque that a drive's spring hands to its link [N·m]: nothing but a tenth of its damping inside the play."""
     half = 0.5 * drives.gap[k]
@@ -77,7 +77,7 @@ def spring(drives, k, twist, rate):
     return drives.stiffness[k] * beyond + grip * drives.damping[k] * rate
 
 
-@njit(cache=True)
+@compiled
 def run(bodies, drives, friction, laws, motion, feedforward, pushes, start, free):
     """Simulate; what is true at every tick: motor's q, qd, qdd, torque, what resists it, load, and the link's q.
 
