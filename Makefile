@@ -6,7 +6,7 @@ STUDIES := emps kuka bam free-floating ground-capture zero-g-rig orbit-inspectio
 
 BENCHES := torque friction_fit diagnosis floating cosim fmu snare ecos_inspection tolerance
 
-.PHONY: help demo test test-slow check studies bench accuracy fuzz kills hostile mutants proof fmus docs clean $(STUDIES:%=study-%)
+.PHONY: help demo test test-slow check studies bench accuracy fuzz kills hostile mutants proof ledger fmus docs clean $(STUDIES:%=study-%)
 
 help:            ## what can be made
 	@sed -n -e 's/^\$$(STUDIES.*## /  make study-NAME\t/p' -e 's/^\([a-z-]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
@@ -54,6 +54,9 @@ mutants: .venv/installed ## change identification and cosim at random places, an
 
 proof: .venv/installed ## conceal effects in another engine's recordings, let the tool name them, and score it: half an hour
 	$(BIN)/python -m proof
+
+ledger: .venv/installed ## what the tool says of every recording that must not get worse, into bench/ledger.json: half an hour, resumed; OLD=FILE tells what moved
+	$(BIN)/python bench/ledger.py $(if $(OLD),--compare $(OLD))
 
 fmus: .venv/installed ## the shipped FMUs and a page on each, into build/fmus
 	$(BIN)/python -m snarelab.fmu.shipped
