@@ -71,6 +71,7 @@ class EndEffectorParticipant(Participant):
     """
 
     can_restore = True
+    input_order = 2
 
     def __init__(
         self,
@@ -117,6 +118,7 @@ class EndEffectorParticipant(Participant):
         self._constants = self.motion.values(p, self._values)
         self._state, self._time, self._size = self._start.copy(), time, 1e-4
         self._inputs, self._applied = np.zeros(len(_IMPULSES) + len(_COMMANDS)), np.zeros(12)
+        self._rates = np.zeros((2, 12))
         self._latch_time, self._braked, self._latched = OPEN, 0.0, np.zeros(3 * BALLS)
         self._targets, self._before = np.zeros(self._n_arm + 1), np.zeros(len(_COMMANDS))
         self._held = self._vector(np.zeros(12))
@@ -124,6 +126,11 @@ class EndEffectorParticipant(Participant):
     def set_inputs(self, values: np.ndarray) -> None:
         """Take impulses and commands."""
         self._inputs = np.array(values, float)
+        self._rates = np.zeros((2, 12))
+
+    def set_input_derivatives(self, first: np.ndarray, second: np.ndarray) -> None:
+        """Say what the impulses will be at the step's end; commands are held."""
+        self._rates = np.array([first[:12], second[:12]], float)
 
     def _vector(self, wrenches: np.ndarray) -> np.ndarray:
         c = dict(zip(_COMMANDS, self._inputs[12:], strict=True))
@@ -136,13 +143,13 @@ class EndEffectorParticipant(Participant):
 
     def step(self, time: float, size: float) -> None:
         """Advance; what is new of the impulses is applied evenly. A fault leaves the state as it was."""
-        if not np.isfinite(self._inputs).all():
-            broken = self.names("input")[int(np.flatnonzero(~np.isfinite(self._inputs))[0])]
-            raise StepError(
-                f"{self.name}: at {time:.9g} s the input {broken} is not finite; look at where it comes from"
-            )
+        broken = ~np.isfinite(self._inputs)
+        broken[:12] |= ~np.isfinite(self._rates).all(axis=0)
+        if broken.any():
+            what = self.names("input")[int(np.flatnonzero(broken)[0])]
+            raise StepError(f"{self.name}: at {time:.9g} s the input {what} is not finite; look at where it comes from")
         self._take_commands(time)
-        impulses = self._inputs[:12]
+        impulses = self._inputs[:12] + self._rates[0] * size + 0.5 * self._rates[1] * size**2
         held = self._vector((impulses - self._applied) / size)
         try:
             end = self.motion.advance(time, self._state, time + size, min(self._size, size), held)
@@ -158,7 +165,9 @@ class EndEffectorParticipant(Participant):
         was = self._before > 0.5
         q = self._state[self.motion.where["q"]]
         if brake and not was[2]:
-            self._braked = float(q[-1])
+            # The brake is wound up with the motor's load before the current is cut.
+            load = float(self.motion.observe(time, self._state, self._held)["motor_force"][0])
+            self._braked = float(q[-1]) + load / self._parameters["brake_stiffness"]
         if latch and not was[3]:
             self._latch_time = time
             self._latched = self.motion.observe(time, self._state, self._held)["balls"]
@@ -238,14 +247,14 @@ class EndEffectorParticipant(Participant):
     def save(self) -> Any:
         """State, inputs, and what brake, latches and servo hold."""
         kept = self._latch_time, self._braked, self._latched.copy(), self._targets.copy(), self._before.copy()
-        inputs = self._inputs.copy(), self._applied.copy(), self._held.copy()
+        inputs = self._inputs.copy(), self._applied.copy(), self._held.copy(), self._rates.copy()
         return self._state.copy(), self._time, self._size, inputs, kept, dict(self._parameters)
 
     def restore(self, state: Any) -> None:
         """Back to a saved state, bit for bit."""
         x, self._time, self._size, inputs, kept, self._parameters = state
         self._state = x.copy()
-        self._inputs, self._applied, self._held = (a.copy() for a in inputs)
+        self._inputs, self._applied, self._held, self._rates = (a.copy() for a in inputs)
         self._latch_time, self._braked = kept[:2]
         self._latched, self._targets, self._before = (a.copy() for a in kept[2:])
 
