@@ -34,7 +34,7 @@ _FRAME = [
     for kind, axes in (("pos", "xyz"), ("quat", "wxyz"), ("vel", "xyz"), ("omega", "xyz"))
     for axis in axes
 ]
-SIZES = {"CLOSE": 2e-3, "SETTLE": 2e-3, "SNUG": 2e-3, "SLIDE": 5e-3, "PULL": 2.5e-3, "SEAT": 2e-3}
+SIZES = {"CLOSE": 2.5e-3, "SLIDE": 5e-3, "OPEN": 5e-3, "EXTEND": 5e-3, "CLEAR": 5e-3}
 """Macro steps by the program's state [s]; `USUAL` where it is in none of these."""
 USUAL = 2.5e-3
 AFTER = 1.0
