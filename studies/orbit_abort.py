@@ -6,12 +6,12 @@ import time
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from ..cosim.docked import CABLE_STRENGTH, docked_of, mean_wrist, momentum_drift
 from ..cosim.orbit_capture import SNARE, arrival
 from ..cosim.whole_capture import co_simulate_whole
 from ..exit_status import status_of
 from ..models.docking.parameters import DockingParameters
 from ..models.inertia import Array
-from .orbit.docked import CABLE_STRENGTH, docked_of, mean_wrist, momentum_drift
 from .orbit.docked_figures import pictures
 from .orbit.scene import add_phases, orbit_scene
 from .orbit.setting import column
