@@ -18,8 +18,8 @@ from .orbit.setting import column
 from .outcome import Quantity, table, write_result
 from .page import Section, write_page
 
-FOOT, TURN = (0.12, 0.085, 0.03), (0.0, 0.0, np.deg2rad(-9.0))
-"""The pin's foot in the end effector's frame [m] and its turns [rad], chosen: its tip passes beside the cables."""
+FOOT, TURN = (0.30, 0.05, 0.03), (0.0, 0.035, 0.035)
+"""The pin's foot in the end effector's frame [m] and its turns [rad], chosen: its knob alone reaches the cables."""
 
 
 def main() -> int:
