@@ -3,7 +3,6 @@
 import sys
 import time
 
-import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..cosim.docked import CABLE_STRENGTH, docked_of, mean_wrist, momentum_drift
