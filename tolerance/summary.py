@@ -39,11 +39,11 @@ def proxy_beside(study: Study, table: pd.DataFrame) -> dict[str, Any]:
     Keys: ``cases`` with a result, ``disagree`` of them, ``latched_against`` (it latched, and the proxy said no) and
     ``failed_against``, and ``ends``, the states in which the failures ended with their numbers.
     """
-    known = table[table["reason"] == ""]
+    known = pd.DataFrame(table[table["reason"] == ""])
     near = known["radial_error"].to_numpy(float) < study.success.radial_error
     fine = near & known["enclosed"].to_numpy(bool) & (known["peak_tension"].to_numpy(float) < study.success.strength)
     latched = known["margin"].to_numpy(float) > 0
-    ends = known.loc[~latched, "state"].value_counts()
+    ends = pd.Series(known["state"].to_numpy()[~latched], dtype=object).value_counts()
     return {
         "cases": len(known),
         "disagree": int(np.sum(latched != fine)),
