@@ -23,7 +23,7 @@ from .energy import BondEnergy
 from .feedthrough import FeedThrough
 from .hold import combine, end_weights, hold_named
 from .iteration import Iteration, NotConverged, QuasiNewton
-from .participant import StepError
+from .participant import Participant, StepError
 from .record import Event, Record, Run
 from .step_control import StepControl
 from .sweep import Sweep
@@ -96,7 +96,11 @@ class Master:
         self._feed = FeedThrough(system, solve_loops)
         self._sweep = Sweep(system, self._hold, self._feed, sequential=scheme == "gauss_seidel")
         layout = system.layout
-        self._coupled = np.unique(layout.source[layout.factor != 0])
+        sudden = [layout.variables[name].discrete for name in layout.outputs]
+        self._coupled = np.array([k for k in np.unique(layout.source[layout.factor != 0]) if not sudden[k]], np.intp)
+        self._eventful = [
+            (name, p) for name, p in system.participants.items() if type(p).next_event is not Participant.next_event
+        ]
         self._origin, self._count = float(start), 0
         self.time = float(start)
         self.log: list[Event] = []
@@ -117,12 +121,22 @@ class Master:
         self._advance(self.size)
         return self.time
 
+    def set_step(self, size: float) -> None:
+        """Take macro steps of another size [s] from now on."""
+        if size != self.size:
+            self.size, self._origin, self._count = float(size), self.time, 0
+
     def run(self, until: float, progress: Callable[[float], None] | None = None) -> Run:
         """Step to a time [s], whose last step is cut to end there.
 
         ``progress`` is called with the time after each step. Raises StepError where a participant fails; `result` then
         gives what there is up to the last good step.
         """
+        self.go_to(until, progress)
+        return self.result()
+
+    def go_to(self, until: float, progress: Callable[[float], None] | None = None) -> None:
+        """As `run`, for many short runs whose recording is wanted once, from `result`."""
         if not self.time <= until < math.inf:
             raise InputError(f"cannot run to {until} s: the time is {self.time:.9g} s already; give a later one")
         steps = (until - self.time) / self.size
@@ -135,11 +149,12 @@ class Master:
                 if progress:
                     progress(self.time)
                 continue
+            for _, participant in self._eventful:
+                left = min(left, participant.next_event(self.time) - self.time)
             cut = left < self.size * (1 - _SAME)
             self._advance(left if cut else self.size, keep_size=cut)
             if progress:
                 progress(self.time)
-        return self.result()
 
     def result(self) -> Run:
         """What there is so far."""
@@ -317,6 +332,8 @@ class Master:
         if self._repeats:
             np.maximum(self._largest, np.abs(outputs), out=self._largest)
         self.steps += 1
+        for name, participant in self._eventful:
+            self.log += [Event(self.time, size, f"{name}: {text}") for text in participant.events()]
         self.record.add(self.time, outputs, self._bonds.residual)
 
     def _first_outputs(self) -> np.ndarray:

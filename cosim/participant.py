@@ -5,6 +5,7 @@ vector each, in the order of `Participant.variables`, so that the master's loop 
 given once, by name, at initialisation.
 """
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -38,6 +39,9 @@ class Variable:
     depends : tuple of str or None
         For an output: the inputs that change it at once, without a step (direct feed-through). Empty: none.
         None: unknown; the master then moves each input at the start and looks.
+    discrete : bool
+        For an output: it holds its value between sudden changes, as a command does. Whatever reads it is given the
+        value at the start of each step, never a line or parabola through changes.
     """
 
     name: str
@@ -48,6 +52,7 @@ class Variable:
     minimum: float = -np.inf
     maximum: float = np.inf
     depends: tuple[str, ...] | None = ()
+    discrete: bool = False
 
 
 class Participant(ABC):
@@ -107,6 +112,14 @@ class Participant(ABC):
     def restore(self, state: Any) -> None:
         """Return to a saved state, exactly."""
         raise NotImplementedError(f"{self.name}: cannot restore a state")  # optional: asked only if `can_restore`
+
+    def next_event(self, time: float) -> float:
+        """When it next does something sudden after a time [s]; no macro step goes past it. Infinity: never."""
+        return math.inf
+
+    def events(self) -> tuple[str, ...]:
+        """What it did during the last step that belongs in the log, a line each; asked once after each good step."""
+        return ()
 
     def compiled_calls(self) -> Any:
         """What `snarelab.cosim.compiled_loop` needs to drive it from C; None where only Python can."""
