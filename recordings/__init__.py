@@ -4,7 +4,7 @@ from .find import find_recording
 from .read import read_recording
 from .signals import JointKind, Signal, default_unit
 from .timebase import Sampling, sampling
-from .write import demand_suffix, write_recording
+from .write import demand_suffix, write_frame, write_recording
 
 __all__ = [
     "JointKind",
@@ -15,5 +15,6 @@ __all__ = [
     "find_recording",
     "read_recording",
     "sampling",
+    "write_frame",
     "write_recording",
 ]

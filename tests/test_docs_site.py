@@ -97,10 +97,16 @@ def test_broken_links_fail_the_build(tmp_path):
     assert ran.stderr.count("[myst.xref_missing]") == len(broken), ran.stderr
 
 
+EXTRAS = "snare", "fmu", "cluster", "formats"
+
+
 def requirements(group):
+    """Packages that are asked for to run, extras among them, or to develop."""
     given = tomllib.loads(read(ROOT / "pyproject.toml"))["project"]
-    listed = given["dependencies"] if group == "run" else given["optional-dependencies"]["dev"]
-    return {re.split(r"[<>=\[; ]", line)[0] for line in listed}
+    more = given["optional-dependencies"]
+    listed = [*given["dependencies"], *(line for extra in EXTRAS for line in more[extra])]
+    names = {re.split(r"[<>=\[; ]", line)[0] for line in (listed if group == "run" else more["dev"])}
+    return names - {"snarelab"}
 
 
 def test_every_dependency_has_its_reason():
