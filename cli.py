@@ -1,4 +1,4 @@
-"""The command line: ``snarelab identify | diagnose | simulate | export | cosim | tolerance``.
+"""The command line: ``snarelab identify | diagnose | simulate | export | cosim | tolerance | completion``.
 
 Exit status 0: it ran, whatever the verdict. 2: unusable input, one line on standard error, nothing written.
 130: interrupted (Ctrl-C, or SIGTERM). 1: a fault of the program.
@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from . import __version__
-from .arguments import positive
+from .arguments import Once, positive
 from .cosim.command import add_parser as add_cosim
 from .errors import InputError, nearest, one_line
 from .exit_status import status_of
@@ -32,7 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; see the module's text for the exit status."""
     parser = _parser()
     given = parser.parse_args(arguments)
-    start_logging(given.verbose)
+    start_logging(given.verbose, quiet=getattr(given, "quiet", False))
     try:
         with warnings.catch_warnings():
             warnings.showwarning = _notice
@@ -81,7 +81,12 @@ def _parser() -> argparse.ArgumentParser:
     p = commands.add_parser("identify", help="fit every parameter of a model to recordings")
     p.add_argument("model", metavar="MODEL.toml")
     p.add_argument("recordings", nargs="+", metavar="RECORDING")
-    p.add_argument("--holdout", metavar="RECORDING", help="recording on which the fit is only evaluated")
+    p.add_argument(
+        "--holdout",
+        action="append",
+        metavar="RECORDING",
+        help="held-out recording, only evaluated; may be repeated",
+    )
     p.add_argument("--json", metavar="OUT.json", help="where to write the result; - for standard output")
     p.add_argument("--save-model", metavar="NEW.toml", help="where to write the model with its values")
     p.add_argument("--jobs", type=positive, metavar="N", help=JOBS)
@@ -90,7 +95,7 @@ def _parser() -> argparse.ArgumentParser:
     p = commands.add_parser("diagnose", help="find, name and add the physics that a model leaves out")
     p.add_argument("model", metavar="MODEL.toml")
     p.add_argument("recordings", nargs="+", metavar="RECORDING")
-    p.add_argument("--holdout", required=True, metavar="RECORDING", help="locked away for the proof")
+    p.add_argument("--holdout", required=True, action=Once, metavar="RECORDING", help="held out, for the proof only")
     p.add_argument("--json", metavar="OUT.json", help="where to write the result; - for standard output")
     p.add_argument("--report", metavar="OUT.html", help="where to write the report, one self-contained page")
     p.add_argument("--save-model", metavar="NEW.toml", help="where to write the model with what was found")
@@ -115,31 +120,45 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument(
             "-v", "--verbose", action="count", default=0, help="log what is under way to standard error; -vv: all of it"
         )
+        command.add_argument(
+            "-q", "--quiet", action="store_true", help="no progress; identify and diagnose: no summary"
+        )
+    p = commands.add_parser("completion", help="print what makes a shell complete these commands")
+    p.add_argument("shell", choices=("bash", "zsh", "tcsh"))
+    p.set_defaults(run=lambda given: _complete(parser, given.shell), verbose=0)
     return parser
+
+
+def _complete(parser: argparse.ArgumentParser, shell: str) -> None:
+    import shtab
+
+    print(shtab.complete(parser, shell))
 
 
 def _identify(given: argparse.Namespace) -> None:
     from .identification.identify import identify  # engines load only for a command that needs them
+    from .identification.summary import parameter_table
     from .models.model_file import load_model
     from .models.model_write import save_model
 
-    _writable(given.json, [given.save_model], [*given.recordings, given.holdout])
+    held = given.holdout or []
+    _writable(given.json, [given.save_model], [*given.recordings, *held])
     model = load_model(given.model)
     with Progress() as progress:
-        held = [given.holdout] if given.holdout else ()
         found = identify(model, given.recordings, held, progress=progress, jobs=given.jobs)
     result = found.to_json()
     if given.save_model:
         save_model(found.model, given.save_model, f"{model.name}: values from snarelab identify {__version__}")
     if given.json:
         _write_json(result, given.json)
-    if given.json != "-":
-        print(_parameter_table(result))
+    if given.json != "-" and not given.quiet:
+        print(parameter_table(result))
 
 
 def _diagnose(given: argparse.Namespace) -> None:
     from .identification.diagnose import diagnose
     from .identification.search.next_experiment import next_experiment
+    from .identification.summary import printed
     from .models.model_file import load_model
     from .models.model_write import save_model
     from .recordings import demand_suffix, write_recording
@@ -169,10 +188,8 @@ def _diagnose(given: argparse.Namespace) -> None:
         save_model(answer.model, given.save_model, f"{found.sentence}\nsnarelab diagnose {__version__}")
     if given.json:
         _write_json(found.to_json(), given.json)
-    if given.json != "-":
-        print(found.sentence)
-        for step in found.steps:
-            print(f"  {step.label:<60} fitted {100 * step.train:6.2f} %   held out {100 * step.holdout:6.2f} %")
+    if given.json != "-" and not given.quiet:
+        print(printed(found))
         if given.next_experiment:
             print(planned.sentence if planned else "Next experiment: no rival is left to part; none was written.")
         if given.report:
@@ -217,24 +234,6 @@ def _write_json(result: dict[str, Any], path: str) -> None:
         return
     with written_whole(Path(path)) as part:
         part.write_text(text, encoding="utf-8")
-
-
-def _parameter_table(result: dict[str, Any]) -> str:
-    lines = [f"{'effect':<26}{'at':<16}{'parameter':<24}{'value':>12}{'std':>11}  unit"]
-    for p in result["parameters"]:
-        flag = "  (at its bound)" if p["at_bound"] else ""
-        std = "unknown" if p["std"] is None else f"{p['std']:.2g}"
-        lines.append(f"{p['effect']:<26}{p['at']:<16}{p['name']:<24}{p['value']:>12.5g}{std:>11}  {p['unit']}{flag}")
-    for channel, fit in result["fit"].items():
-        for role in ("train", "holdout"):
-            if role in fit:
-                f = fit[role]
-                lines.append(
-                    f"{channel} {role}: RMS residual {f['rms']:.4g} {fit['unit']}, "
-                    f"{100 * f['relative']:.2f} % of the measured"
-                )
-    lines.append(f"condition number {result['condition']:.3g}")
-    return "\n".join(lines)
 
 
 def _notice(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:

@@ -14,6 +14,7 @@ from .diagnosis import ChannelFit, Diagnosis, Finding, Step
 from .report.findings import STATUS, missing
 from .report.page import write_report
 from .report.words import number, percent, unit_words, with_std, words
+from .summary import parameter_table, printed
 
 # Colours come from the notebook, so that a result reads on its light page and on its dark one.
 _STYLE = """<style>
@@ -85,11 +86,7 @@ class DiagnosisResult:
 
     def __str__(self) -> str:
         """What the command prints."""
-        lines = [
-            f"  {step.label:<60} fitted {100 * step.train:6.2f} %   held out {100 * step.holdout:6.2f} %"
-            for step in self.steps
-        ]
-        return "\n".join([self.sentence, *lines])
+        return printed(self.diagnosis)
 
     __repr__ = __str__
 
@@ -99,7 +96,7 @@ class DiagnosisResult:
         return _shown(
             f'<span class="status">{STATUS[self.diagnosis.verdict]}</span>\n'
             + paragraph(self.sentence)
-            + table("Relative misfit over all channels", ["Model", "Fitted", "Held out"], rows, (1, 2), wide=False)
+            + table("Relative misfit over all channels", ["Model", "Training", "Held-out"], rows, (1, 2), wide=False)
             + folded(heading, cards)
             + folded("Notes", "".join(map(paragraph, self.diagnosis.notes)))
         )
@@ -156,24 +153,17 @@ class IdentificationResult:
 
     def __str__(self) -> str:
         """What the command prints."""
-        lines = [f"{'effect':<26}{'at':<16}{'parameter':<24}{'value':>12}{'std':>11}  unit"]
-        for p in self.parameters:
-            flag = "  (at its bound)" if p.at_bound else ""
-            std = "unknown" if p.std is None else f"{p.std:.2g}"
-            lines.append(f"{p.effect:<26}{p.at:<16}{p.name:<24}{p.value:>12.5g}{std:>11}  {p.unit}{flag}")
-        lines += [
-            f"{channel} {role}: RMS residual {rms:.4g} {unit}, {100 * relative:.2f} % of the measured"
-            for channel, role, rms, relative, unit in self._misfits()
-        ]
-        return "\n".join([*lines, f"condition number {self.condition:.3g}"])
+        return parameter_table(
+            {"parameters": [vars(p) for p in self.parameters], "fit": self.fit, "condition": self.condition}
+        )
 
     __repr__ = __str__
 
     def _misfits(self) -> list[tuple[str, str, float, float, str]]:
         return [
-            (channel, role, entry[role]["rms"], entry[role]["relative"], entry["unit"])
+            (channel, said, entry[role]["rms"], entry[role]["relative"], entry["unit"])
             for channel, entry in self.fit.items()
-            for role in ("train", "holdout")
+            for role, said in (("train", "training"), ("holdout", "held-out"))
             if role in entry
         ]
 

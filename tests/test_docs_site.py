@@ -120,7 +120,8 @@ def test_every_dependency_has_its_reason():
 
 
 def test_every_dependency_to_run_is_imported():
-    code = "\n".join(read(path) for folder in PACKAGE for path in (ROOT / folder).rglob("*.py"))
+    files = [*ROOT.glob("*.py"), *(path for folder in PACKAGE for path in (ROOT / folder).rglob("*.py"))]
+    code = "\n".join(map(read, files))
     imported = set(re.findall(r"^\s*(?:import|from) (\w+)", code, re.MULTILINE))
     imported |= {"distributed"} if "from dask.distributed import" in code else set()
     unused = {name for name in requirements("run") if IMPORTED_AS.get(name, name.replace("-", "_")) not in imported}

@@ -13,6 +13,7 @@ from pages import Page
 from snarelab import __version__
 from snarelab.identification import results
 from snarelab.identification.diagnosis import Step
+from snarelab.identification.report.words import chance
 from snarelab.identification.results import DiagnosisResult, IdentificationResult, ParameterEstimate
 
 MODEL: Any = SimpleNamespace(name="arm<6>")
@@ -33,10 +34,14 @@ def test_a_diagnosis_prints_its_sentence_and_a_line_a_step():
     one = DiagnosisResult(SAID, MODEL)
     first, *lines = str(one).split("\n")
     assert first == "It is so & so."
-    assert lines == [
-        "  as <given>" + " " * 51 + "fitted  12.35 %   held out  50.00 %",
-        "  + one" + " " * 56 + "fitted   1.25 %   held out 100.00 %",
+    assert lines[:2] == [
+        "  as <given>" + " " * 51 + "training  12.35 %   held-out  50.00 %",
+        "  + one" + " " * 56 + "training   1.25 %   held-out 100.00 %",
     ]
+    assert lines[2:4] == ["", f"  {'what was found':<44} probability   value"]
+    assert len(lines[4:]) >= len(SAID.effects)
+    for effect in SAID.effects:
+        assert any(f"at {effect.at}" in line and chance(effect.probability) in line for line in lines[4:])
     assert repr(one) == str(one)
 
 
@@ -59,8 +64,8 @@ def test_a_diagnosis_shows_verdict_steps_cards_and_notes():
     ]
     table = markup[: markup.index("</table>")]
     assert re.findall(r"<thead>.*</thead>", table) == [
-        '<thead><tr><th scope="col">Model</th><th scope="col" class="n">Fitted</th>'
-        '<th scope="col" class="n">Held out</th></tr></thead>'
+        '<thead><tr><th scope="col">Model</th><th scope="col" class="n">Training</th>'
+        '<th scope="col" class="n">Held-out</th></tr></thead>'
     ]
     assert '<div class="scroll"><table><caption>Relative misfit over all channels' in markup  # no wider than it must be
     assert re.findall(r"<summary>(.*?)</summary>", markup) == ["What is missing", "Notes"]
@@ -99,13 +104,13 @@ def test_an_identification_prints_parameters_misfits_and_condition():
     lines = str(IDENTIFIED).split("\n")
     assert lines == [
         "effect                    at              parameter                      value        std  unit",
-        "coulomb_friction          joint1          level                         1.2346      0.012  N*m",
-        "coulomb_friction          j<2>            some_shape                    1.2346    unknown  N*m/rad**2"
+        "coulomb_friction          joint1          level                         1.2346      0.012  N·m",
+        "coulomb_friction          j<2>            some_shape                    1.2346    unknown  N·m/rad²"
         "  (at its bound)",
-        "coulomb_friction          joint1          level                         -12346        0.5  N*m",
-        "tau.joint1 train: RMS residual 2 N*m, 1.23 % of the measured",
-        "tau.joint1 holdout: RMS residual 0.1235 N*m, 50.00 % of the measured",
-        "tau.<2> train: RMS residual 1000 N, 100.00 % of the measured",
+        "coulomb_friction          joint1          level                         -12346        0.5  N·m",
+        "tau.joint1 training: RMS residual 2 N·m, 1.23 % of the measured",
+        "tau.joint1 held-out: RMS residual 0.1235 N·m, 50.00 % of the measured",
+        "tau.<2> training: RMS residual 1000 N, 100.00 % of the measured",
         "condition number 123",
     ]
     assert repr(IDENTIFIED) == str(IDENTIFIED)
@@ -123,9 +128,9 @@ def test_an_identification_shows_its_parameters_with_a_remark_where_they_are_not
         ["Coulomb friction", "joint1", "level", "−12345.7", "± 0.5", "N·m", "not carried by the recordings"],
     ]
     assert misfits == [
-        ["tau.joint1", "train", "2.00 N·m", "1.23\u202f%"],
-        ["tau.joint1", "holdout", "0.123 N·m", "50.0\u202f%"],
-        ["tau.<2>", "train", "1000 N", "100.0\u202f%"],
+        ["tau.joint1", "training", "2.00 N·m", "1.23\u202f%"],
+        ["tau.joint1", "held-out", "0.123 N·m", "50.0\u202f%"],
+        ["tau.<2>", "training", "1000 N", "100.0\u202f%"],
     ]
     assert re.findall(r'<th scope="col" class="n">(.*?)</th>', markup) == [
         "Value", "Std", "RMS residual", "Of the measured",
