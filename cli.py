@@ -8,12 +8,13 @@ import argparse
 import errno
 import json
 import os
+import shlex
 import sys
 import warnings
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from . import __version__
 from .arguments import Once, positive
@@ -25,6 +26,10 @@ from .fmu.command import add_parser as add_export
 from .progress import Progress, start_logging
 from .tolerance.command import add_parser as add_tolerance
 
+if TYPE_CHECKING:
+    from .models.model import Model
+    from .report.provenance import Provenance
+
 JOBS = "processes in which captures are simulated (default: one a core, at most 4); other systems refuse it"
 
 
@@ -32,6 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; see the module's text for the exit status."""
     parser = _parser()
     given = parser.parse_args(arguments)
+    given.words = list(sys.argv[1:] if arguments is None else arguments)
     start_logging(given.verbose, quiet=getattr(given, "quiet", False))
     try:
         with warnings.catch_warnings():
@@ -183,7 +189,7 @@ def _diagnose(given: argparse.Namespace) -> None:
     if given.report:
         from .identification.report.page import write_report  # it draws, which takes half a second to load
 
-        write_report(found, given.report)
+        write_report(found, given.report, _origin(given, model))
     if given.save_model:
         save_model(answer.model, given.save_model, f"{found.sentence}\nsnarelab diagnose {__version__}")
     if given.json:
@@ -194,6 +200,14 @@ def _diagnose(given: argparse.Namespace) -> None:
             print(planned.sentence if planned else "Next experiment: no rival is left to part; none was written.")
         if given.report:
             print(f"Report: {given.report}")
+
+
+def _origin(given: argparse.Namespace, model: "Model") -> "Provenance":
+    from .report.provenance import provenance
+
+    recordings = [("Training", recording) for recording in given.recordings]
+    files = [("Model", given.model), ("Robot", model.urdf), *recordings, ("Held-out", given.holdout)]
+    return provenance(f"snarelab {shlex.join(given.words)}", files)
 
 
 def _simulate(given: argparse.Namespace) -> None:

@@ -1,17 +1,23 @@
 """What the Python calls give back: frozen results that show themselves as text and, in a notebook, as tables."""
 
+import base64
 from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
+
 from .. import __version__
+from ..errors import InputError
 from ..models.model import Model
 from ..models.model_write import save_model
 from ..report.html import folded, paragraph, table
 from .diagnosis import ChannelFit, Diagnosis, Finding, Step
+from .report.figures import before_and_after
 from .report.findings import STATUS, missing
+from .report.fit import changes, most_changed
 from .report.page import write_report
 from .report.words import number, percent, unit_words, with_std, words
 from .summary import parameter_table, printed
@@ -28,6 +34,21 @@ _STYLE = """<style>
 .snarelab-result h3{font-size:1.05em;margin:.9rem 0 .2rem}
 .snarelab-result summary{cursor:pointer}
 </style>"""
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A picture that a notebook shows: ``svg`` holds its bytes."""
+
+    svg: bytes
+
+    def _repr_svg_(self) -> str:
+        return self.svg.decode("utf-8")
+
+    def _repr_html_(self) -> str:
+        data = base64.b64encode(self.svg).decode("ascii")
+        source = f'src="data:image/svg+xml;base64,{data}"'
+        return f'<img alt="measured, model before and after" style="max-width:100%" {source}>'
 
 
 @dataclass(frozen=True, repr=False)
@@ -72,6 +93,28 @@ class DiagnosisResult:
         """Misfit of every channel before and after, in the channel's unit, and its noise floor."""
         return self.diagnosis.fit
 
+    def to_frame(self) -> pd.DataFrame:
+        """What was found as a table: a row a parameter, with value, deviation, unit and the effect's probability."""
+        rows = [
+            (f.name, f.at, f.probability, name, e.value, e.std, e.unit, e.at_bound)
+            for f in self.effects
+            for name, e in f.parameters.items()
+        ]
+        heads = ["effect", "at", "probability", "parameter", "value", "std", "unit", "at_bound"]
+        return pd.DataFrame(rows, columns=heads)
+
+    def plot(self, channel: str | None = None) -> Drawing:
+        """Measurement and model before and after on a channel, held-out; by default on the one that changed most.
+
+        Shows itself in a notebook; its ``svg`` are the bytes of the picture. Raises InputError for another channel.
+        """
+        traces = {trace.channel: trace for trace in most_changed(self.diagnosis)}
+        name = next(iter(traces), "") if channel is None else channel
+        if name not in traces:
+            raise InputError(f"channel {name!r} was not recorded; there are {', '.join(traces) or 'none'}")
+        trace = traces[name]
+        return Drawing(before_and_after(trace, changes([trace])))
+
     def to_json(self) -> dict[str, Any]:
         """What ``snarelab diagnose --json`` writes: plain dicts, lists, numbers and text."""
         return self.diagnosis.to_json()
@@ -96,6 +139,7 @@ class DiagnosisResult:
         return _shown(
             f'<span class="status">{STATUS[self.diagnosis.verdict]}</span>\n'
             + paragraph(self.sentence)
+            + (self.plot()._repr_html_() if self.diagnosis.traces else "")
             + table("Relative misfit over all channels", ["Model", "Training", "Held-out"], rows, (1, 2), wide=False)
             + folded(heading, cards)
             + folded("Notes", "".join(map(paragraph, self.diagnosis.notes)))
@@ -142,6 +186,10 @@ class IdentificationResult:
     condition: float
     model: Model
     published: Mapping[str, Any]
+
+    def to_frame(self) -> pd.DataFrame:
+        """The parameters as a table, a row each."""
+        return pd.DataFrame([vars(p) for p in self.parameters])
 
     def to_json(self) -> dict[str, Any]:
         """What ``snarelab identify --json`` writes: plain dicts, lists, numbers and text."""

@@ -68,14 +68,14 @@ def test_a_diagnosis_shows_verdict_steps_cards_and_notes():
         '<th scope="col" class="n">Held-out</th></tr></thead>'
     ]
     assert '<div class="scroll"><table><caption>Relative misfit over all channels' in markup  # no wider than it must be
-    assert re.findall(r"<summary>(.*?)</summary>", markup) == ["What is missing", "Notes"]
+    assert re.findall(r"<summary>(.*?)</summary>", markup) == ["What is missing", "Why x at x", "Notes"]
     assert markup.index('<article class="card">') < markup.index("<summary>Notes")
     assert "<summary>Notes</summary>\n<p>first</p>\n<p>sec&lt;nd</p>\n</details>" in markup
 
 
 def test_without_notes_there_is_nothing_to_fold():
     quiet = DiagnosisResult(replace(SAID, notes=()), MODEL)._repr_html_()
-    assert re.findall(r"<summary>(.*?)</summary>", quiet) == ["What is missing"]
+    assert re.findall(r"<summary>(.*?)</summary>", quiet) == ["What is missing", "Why x at x"]
 
 
 KNOWN = ParameterEstimate("coulomb_friction", "joint1", "level", 1.23456789, 0.0123, "N*m", False, True)
