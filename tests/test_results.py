@@ -11,6 +11,7 @@ from diagnoses import spelt
 from pages import Page
 
 from snarelab import __version__
+from snarelab.errors import InputError
 from snarelab.identification import results
 from snarelab.identification.diagnosis import Step
 from snarelab.identification.report.words import chance
@@ -167,3 +168,18 @@ def test_a_result_cannot_be_changed(result, name):
         setattr(result, name, None)
     with pytest.raises(FrozenInstanceError):
         setattr(KNOWN, "value", 0.0)  # noqa: B010  what a type checker would refuse
+
+
+def test_results_are_tables_and_pictures_too():
+    found = DiagnosisResult(SAID, MODEL)
+    table = found.to_frame()
+    assert list(table.columns)[:4] == ["effect", "at", "probability", "parameter"]
+    assert len(table) == sum(len(effect.parameters) for effect in SAID.effects)
+    channel = SAID.traces[0].channel
+    assert found.plot().svg == found.plot(channel).svg
+    assert b"<svg" in found.plot().svg
+    with pytest.raises(InputError, match=f"channel 'tau.none' was not recorded; there are {channel}"):
+        found.plot("tau.none")
+    parameters = IDENTIFIED.to_frame()
+    assert parameters["at"].tolist() == ["joint1", "j<2>", "joint1"]
+    assert parameters["value"][0] == 1.23456789
