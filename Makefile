@@ -9,11 +9,14 @@ BENCHES := torque friction_fit diagnosis floating cosim fmu snare ecos_inspectio
 .PHONY: help demo test test-slow check studies bench accuracy fuzz kills hostile mutants proof ledger fmus docs clean $(STUDIES:%=study-%)
 
 help:            ## what can be made
-	@sed -n -e 's/^\$$(STUDIES.*## /  make study-NAME\t/p' -e 's/^\([a-z-]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
+	@sed -n -e 's/^\$$(filter-out.*## /  make study-NAME\t/p' -e 's/^\([a-z-]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
 
-demo: study-emps ## set up, then the main job: name the physics that a viscous model of EMPS leaves out
+demo: study-emps ## set up the core alone, then the main job: name the physics that a viscous model of EMPS leaves out
 
-$(STUDIES:%=study-%): study-%: .venv/installed ## run one study: report and numbers in build/studies/NAME
+study-emps: .venv/core
+	$(BIN)/python -m snarelab.studies.emps
+
+$(filter-out study-emps,$(STUDIES:%=study-%)): study-%: .venv/installed ## run one study: report and numbers in build/studies/NAME
 	$(BIN)/python -m snarelab.studies.$(subst -,_,$*)
 
 studies: $(filter-out study-tolerance,$(STUDIES:%=study-%)) ## every study but the tolerances, one after the other: a quarter of an hour; CI runs them
@@ -67,14 +70,26 @@ docs: .venv/installed ## the pages with their generated parts, into build/docs; 
 clean:           ## remove what was built; the environment too
 	rm -rf .venv build *.egg-info
 
-.venv/tools: constraints.txt pyproject.toml
+# What physics on an arm needs comes first and is enough for the demo; extras and tools come when a target asks for them.
+WANTED := import tomllib; p = tomllib.load(open("pyproject.toml", "rb"))["project"]; e = p["optional-dependencies"]
+INSTALL := -m pip install --quiet --no-compile --disable-pip-version-check
+
+.venv/needed: constraints.txt pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "snarelab needs Python 3.11 or newer: make PYTHON=...")'
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -c 'import tomllib; p = tomllib.load(open("pyproject.toml", "rb"))["project"]; print(*p["dependencies"], *p["optional-dependencies"]["dev"], sep="\n")' > .venv/wanted.txt
-	$(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check -c constraints.txt -r .venv/wanted.txt
+	$(BIN)/python -c '$(WANTED); print(*p["dependencies"], sep="\n")' > .venv/needed.txt
+	$(BIN)/python $(INSTALL) -c constraints.txt -r .venv/needed.txt
 	touch $@
 
-.venv/installed: .venv/tools $(SOURCES)
+.venv/core: .venv/needed $(SOURCES)
 	rm -rf build/lib build/bdist.*
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --force-reinstall .
+	$(BIN)/python $(INSTALL) --no-deps --force-reinstall .
+	touch $@
+
+.venv/tools: .venv/needed
+	$(BIN)/python -c '$(WANTED); print(*(r for x in e["all"][0][9:-1].split(",") + ["dev"] for r in e[x] if not r.startswith("snarelab[")), sep="\n")' > .venv/wanted.txt
+	$(BIN)/python $(INSTALL) -c constraints.txt -r .venv/wanted.txt
+	touch $@
+
+.venv/installed: .venv/tools .venv/core
 	touch $@

@@ -12,6 +12,7 @@ from typing import Any
 from xml.parsers import expat
 
 from ..errors import InputError
+from ..extras import needed_for
 from ..files import ZIP_FAULTS
 from .build import binary_folder, library_suffix
 from .elf import ElfFault, exported_symbols
@@ -197,8 +198,8 @@ def _unpack(archive: zipfile.ZipFile, folder: Path) -> None:
 
 
 def _read(path: Path, folder: Path) -> Any:
-    import fmpy
-
+    with needed_for(f"{path}: an FMU"):
+        import fmpy
     try:
         return fmpy.read_model_description(str(folder), validate=False)
     except Exception as error:  # FMPy raises bare exceptions

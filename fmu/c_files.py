@@ -7,7 +7,7 @@ from typing import Any
 
 import casadi as ca
 
-from ..errors import InputError
+from ..extras import needed_for
 from .equations import Equations, Variable
 
 _OURS = ("instance.h", "instance.c", "calls.c")
@@ -87,10 +87,6 @@ def _generated(equations: Equations) -> str:
 def _copied(version: int, ours: tuple[str, ...]) -> dict[str, str]:
     folder = files("snarelab.fmu") / "c"
     texts = {name: (folder / name).read_text(encoding="utf-8") for name in (*ours, f"fmi{version}.c")}
-    try:
+    with needed_for("an export, for FMI's headers,"):
         headers = files("fmpy") / "c-code"
-    except ModuleNotFoundError:
-        raise InputError(
-            "an export takes FMI's headers from the package FMPy, which is missing: pip install fmpy"
-        ) from None
     return texts | {name: (headers / name).read_text(encoding="utf-8") for name in _HEADERS[version]}

@@ -10,14 +10,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeAlias
 
+import numpy as np
 import pandas as pd
-import pyarrow as pa
 import xarray as xr
 
 from ..errors import InputError
 from ..models.model import Model
 from ..models.model_file import load_model
-from ..recordings import write_recording
+from ..recordings import write_frame
 from . import diagnose as diagnosing
 from . import identify as identifying
 from . import simulate as simulating
@@ -206,20 +206,19 @@ def _as_files(recordings: Sequence[RecordingLike]) -> Iterator[list[str | Path]]
             if isinstance(recording, str | Path):
                 written[id(recording)] = recording
                 continue
-            path = Path(folder) / f"recording {k}.parquet"
+            if isinstance(recording, xr.Dataset):
+                table = recording.to_dataframe().reset_index()
+            elif isinstance(recording, pd.DataFrame):
+                table = recording.reset_index() if recording.index.name else recording
+            else:
+                raise InputError(
+                    f"recording {k}: is a {type(recording).__name__}; give a path, an xarray.Dataset or a "
+                    "pandas.DataFrame"
+                )
+            path = Path(folder) / f"recording {k}.csv"
             try:
-                if isinstance(recording, pd.DataFrame):
-                    recording.to_parquet(path)
-                elif isinstance(recording, xr.Dataset):
-                    write_recording(recording, path)
-                else:
-                    raise InputError(
-                        f"recording {k}: is a {type(recording).__name__}; give a path, an xarray.Dataset or a "
-                        "pandas.DataFrame"
-                    )
-            except InputError:
-                raise
-            except (ValueError, TypeError, pa.ArrowException) as error:
+                write_frame(_numbers(table), path)
+            except (ValueError, TypeError) as error:
                 said = " ".join(str(error).split())
                 raise InputError(f"recording {k}: is no table of numbers: {said}; give a column a signal") from None
             written[id(recording)] = path
@@ -227,4 +226,19 @@ def _as_files(recordings: Sequence[RecordingLike]) -> Iterator[list[str | Path]]
             yield [written[id(recording)] for recording in recordings]
         except InputError as error:
             # The caller knows no file; a recording's number is its place among all that were given.
-            raise InputError(re.sub(rf"{re.escape(folder)}/(recording \d+)\.parquet", r"\1", str(error))) from None
+            raise InputError(re.sub(rf"{re.escape(folder)}/(recording \d+)\.csv", r"\1", str(error))) from None
+
+
+def _numbers(table: pd.DataFrame) -> pd.DataFrame:
+    """Every column as numbers, stamps as seconds since their epoch; ValueError or TypeError where one is neither."""
+    columns: dict[str, np.ndarray] = {}
+    for position, name in enumerate(table.columns):
+        if not isinstance(name, str):
+            raise TypeError(f"column {name!r} has no name")
+        values = table.iloc[:, position]
+        if pd.api.types.is_datetime64_any_dtype(values):
+            since = values.dt.tz_convert(None) if values.dt.tz is not None else values
+            columns.setdefault(name, (since - pd.Timestamp(0)).dt.total_seconds().to_numpy())
+        else:
+            columns.setdefault(name, values.to_numpy(dtype=float, na_value=np.nan))
+    return pd.DataFrame(columns)

@@ -9,6 +9,7 @@ from ..files import written_whole
 from .effects import get_effect
 from .floating.tree import FloatingTree
 from .model import Model, Placed, places
+from .model_comments import with_comments
 from .rig.file import sling_table
 from .rig.rig import Rig
 from .snare.setup import SnareTree
@@ -17,8 +18,8 @@ from .snare.setup import SnareTree
 def save_model(model: Model, path: str | Path, note: str) -> None:
     """Write a model file that `load_model` reads back, all or nothing.
 
-    ``effects`` lists an effect by its name alone where it acts at every place, as ``{ name, at, hold }`` where it
-    does not.
+    Comments of the file that the model was read from stay. ``effects`` lists an effect by its name alone
+    where it acts at every place, as ``{ name, at, hold }`` where it does not.
     """
     path = Path(path)
     by_name: dict[str, list[Placed]] = {}
@@ -63,7 +64,7 @@ def save_model(model: Model, path: str | Path, note: str) -> None:
     if model.values:
         lines += ["", "[parameters]", *(f"{_toml(k)} = {float(v)!r}" for k, v in model.values.items())]
     with written_whole(path, "choose a folder that exists") as part:
-        part.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        part.write_text(with_comments(model.path, "\n".join(lines) + "\n"), encoding="utf-8")
 
 
 def _toml(value: Any) -> str:

@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from .read import read_recording
     from .signals import JointKind, Signal, default_unit
     from .timebase import Sampling, sampling
-    from .write import demand_suffix, write_recording
+    from .write import demand_suffix, write_frame, write_recording
 
 __all__ = [
     "JointKind",
@@ -19,6 +19,7 @@ __all__ = [
     "find_recording",
     "read_recording",
     "sampling",
+    "write_frame",
     "write_recording",
 ]
 
@@ -31,6 +32,7 @@ _PLACES = {
     "find_recording": ".find",
     "read_recording": ".read",
     "sampling": ".timebase",
+    "write_frame": ".write",
     "write_recording": ".write",
 }
 

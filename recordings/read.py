@@ -10,7 +10,7 @@ import xarray as xr
 
 from ..errors import InputError, nearest
 from ..files import bounded_memory
-from . import csv_table, hdf5, matlab, parquet, ros_bag
+from . import csv_table, hdf5, matlab
 from .columns import Columns, check_count, split_header
 from .signals import FORMS, JointKind, Signal, default_unit, is_signal, joint_of
 from .timebase import UNIFORM, sampling
@@ -19,10 +19,17 @@ from .units import convert, fits, parse_unit
 if TYPE_CHECKING:
     import pint
 
+
+def _parquet(path: Path) -> Columns:
+    from . import parquet  # an extra brings what it is read with
+
+    return parquet.read(path)
+
+
 _READERS: Mapping[str, Callable[[Path], Columns]] = {
     ".csv": csv_table.read,
     ".tsv": csv_table.read,
-    ".parquet": parquet.read,
+    ".parquet": _parquet,
     ".mat": matlab.read,
     ".h5": hdf5.read,
     ".hdf5": hdf5.read,
@@ -123,6 +130,8 @@ def _load(path: Path, signals: Mapping[str, Signal]) -> Columns:
     if not (path.is_dir() or path.is_file()):
         raise InputError(f"{path}: is no plain file; give a file, or the folder of a ROS 2 bag")
     if path.is_dir() or suffix in _BAGS:
+        from . import ros_bag  # an extra brings what it is read with
+
         with bounded_memory(path):
             return ros_bag.read(path, {name: signal.column for name, signal in signals.items()})
     if suffix not in _READERS:

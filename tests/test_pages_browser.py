@@ -96,7 +96,7 @@ def test_paper_hides_and_cuts_nothing(browser: Browser, pages: dict[str, Path], 
         assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
         assert not page.locator(".cursor:visible,.times:visible,nav:visible,iframe:visible").count()
         hidden = page.evaluate("""() => [...document.querySelectorAll("body *")]
-            .filter(x => !x.closest("nav,script,style,noscript,.on-screen,.cursor,.times,.bar"))
+            .filter(x => !x.closest("nav,script,style,noscript,.on-screen,.zoom-button,.cursor,.times,.bar"))
             .filter(x => !x.getBoundingClientRect().height || !x.checkVisibility({contentVisibilityAuto: true}))
             .map(x => x.outerHTML.slice(0, 80))""")
         assert [element for element in hidden if not element.startswith(("<col", "<br"))] == []
