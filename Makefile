@@ -65,6 +65,7 @@ clean:           ## remove what was built; the environment too
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -c 'import tomllib; p = tomllib.load(open("pyproject.toml", "rb"))["project"]; print(*p["dependencies"], *p["optional-dependencies"]["dev"], sep="\n")' > .venv/wanted.txt
 	$(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check -c constraints.txt -r .venv/wanted.txt
+	$(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check --no-deps -c constraints.txt example-robot-data
 	touch $@
 
 .venv/installed: .venv/tools $(SOURCES)

@@ -23,6 +23,7 @@ from .fitting.assembly import Assembly
 from .fitting.base_parameters import base_parameters
 from .fitting.experiment import Experiment, demand_apart, load_experiments, scales, with_silence
 from .fitting.fit import Fit, channel_rms, fit
+from .fitting.recorded import read_all, with_recorded_joints
 from .identify import demand_one_process, inertial_values, physical
 from .links.answer import with_links
 from .links.diagnose import diagnose_links
@@ -84,10 +85,12 @@ def diagnose(
     demand_one_process(model, jobs)
     progress("reading and conditioning the recordings")
     prepare(effects().values())
+    *read, held = read_all(model, [*recordings, holdout])
+    model = with_recorded_joints(model, [*read, held])
     body = RigidBody(model.tree)
-    train = with_silence(load_experiments(model, recordings, body))
+    train = with_silence(load_experiments(model, recordings, body, datasets=read))
     band = min(e.motion.band for e in train)
-    locked = with_silence(load_experiments(model, [holdout], body, band))
+    locked = with_silence(load_experiments(model, [holdout], body, band, datasets=[held]))
     base = base_parameters(body) if model.inertia == "free" else None
     best = confirm(search(model, base, scales(train), train, progress=progress, seed=seed), train, locked, progress)
     last, rejected = best, {t.judged.placed.key: t for t in best.rejected}

@@ -19,6 +19,7 @@ from .fitting.consistent_inertia import ConsistentInertia, consistent_inertia
 from .fitting.experiment import Experiment, demand_apart, load_experiments, scales, with_silence
 from .fitting.fit import Fit, channel_rms, fit
 from .fitting.friction_curve import friction_curves, identifiable
+from .fitting.recorded import read_all, with_recorded_joints
 
 if TYPE_CHECKING:
     from .snare.identify import IdentifiedCaptures
@@ -74,7 +75,12 @@ class Identified:
             "band": {"value": self.train[0].motion.band, "unit": "Hz"},
             "starts": {"tried": found.starts, "agreed": found.agreed},
             "notes": [
-                f"{Path(e.motion.path).name}: {note}" for e in (*self.train, *self.holdout) for note in e.motion.notes
+                *self.model.tree.notes,
+                *(
+                    f"{Path(e.motion.path).name}: {note}"
+                    for e in (*self.train, *self.holdout)
+                    for note in e.motion.notes
+                ),
             ],
         }
         curves = friction_curves(found, self.train)
@@ -141,10 +147,13 @@ def identify(
         return identify_captures(model, recordings, holdout, progress=progress, jobs=jobs)
     demand_one_process(model, jobs)
     progress("reading and conditioning the recordings")
+    read = read_all(model, [*recordings, *holdout])
+    model = with_recorded_joints(model, read)
+    fitted, held = read[: len(recordings)], read[len(recordings) :]
     body = RigidBody(model.tree)
-    train = with_silence(load_experiments(model, recordings, body))
+    train = with_silence(load_experiments(model, recordings, body, datasets=fitted))
     band = min(e.motion.band for e in train)
-    locked = with_silence(load_experiments(model, holdout, body, band)) if holdout else []
+    locked = with_silence(load_experiments(model, holdout, body, band, datasets=held)) if holdout else []
     base = base_parameters(body) if model.inertia == "free" else None
     assembly = Assembly(model.tree, model.effects, base, scales(train), model.values)
     found = fit(assembly, train, progress=progress, seed=seed)

@@ -14,6 +14,7 @@ from ..recordings.read import SUFFIXES
 from ..recordings.signals import FORMS, Signal, is_signal, joint_of
 from .effects import get_effect
 from .floating.tree import UNNAMED, n_carriers, read_floating
+from .holding import Holding, read_holding
 from .model import Model, Placed, places
 from .rig.file import read_slings
 from .rig.rig import Rig, built_in_rig
@@ -34,6 +35,9 @@ _KEYS = (
     "base",
     "gravity",
     "inertia",
+    "joints",
+    "locked",
+    "inertia_fix",
     "effects",
     "slings",
     "capture",
@@ -86,7 +90,8 @@ def load_model(path: str | Path) -> Model:
     if urdf is not None and _missing(urdf):
         hint = _neighbour(urdf, ".urdf") or "check the path, which starts where the model file is"
         raise InputError(f"{path}: urdf = {raw['urdf']!r}: no such file; {hint}")
-    tree = _tree(path, raw, system, urdf, gravity)
+    holding = read_holding(path, raw, system)
+    tree = _tree(path, raw, system, urdf, gravity, holding)
     return Model(
         path,
         _text(path, raw, "name", path.stem),
@@ -95,9 +100,10 @@ def load_model(path: str | Path) -> Model:
         tree,
         inertia,
         _placed(path, raw.get("effects", []), tree),
-        _signals(path, raw.get("signals", {}), tree),
+        _signals(path, raw.get("signals", {}), tree, holding),
         None if bandwidth is None else float(bandwidth),
         _values(path, raw.get("parameters", {})),
+        holding,
     )
 
 
@@ -118,7 +124,9 @@ def _neighbour(path: Path, suffix: str) -> str:
     return f"nearest is {near!r}" if near else ""
 
 
-def _tree(path: Path, raw: Mapping[str, Any], system: str, urdf: Path | None, gravity: Sequence[float]) -> Tree:
+def _tree(
+    path: Path, raw: Mapping[str, Any], system: str, urdf: Path | None, gravity: Sequence[float], holding: Holding
+) -> Tree:
     """The arm of a model file, on its slings where the system is a rig."""
     if "slings" in raw and (system != "zero_g_rig" or urdf is None):
         raise InputError(f"{path}: [slings] belong to system = 'zero_g_rig' with a URDF of your own; take them out")
@@ -134,7 +142,7 @@ def _tree(path: Path, raw: Mapping[str, Any], system: str, urdf: Path | None, gr
     if "base" in raw:
         raise InputError(f"{path}: key 'base' belongs to system = 'free_floating_arm'; take it out")
     if urdf is not None:
-        tree = load_urdf(urdf, tuple(gravity))
+        tree = load_urdf(urdf, tuple(gravity), held=holding.locked, moving=holding.joints, fix=holding.fix)
         if system != "zero_g_rig":
             return tree
     elif system != "zero_g_rig":
@@ -197,7 +205,7 @@ def _placed(path: Path, entries: Any, tree: Tree) -> tuple[Placed, ...]:
     return tuple(found)
 
 
-def _signals(path: Path, table: Any, tree: Tree) -> dict[str, Signal]:
+def _signals(path: Path, table: Any, tree: Tree, holding: Holding) -> dict[str, Signal]:
     if not isinstance(table, dict):
         raise InputError(f"{path}: [signals] must be a table of name = {{ column = ... }}")
     signals, joints = {}, [j.name for j in tree.joints]
@@ -205,6 +213,8 @@ def _signals(path: Path, table: Any, tree: Tree) -> dict[str, Signal]:
         if not is_signal(name):
             raise InputError(f"{path}: {name!r} in [signals] is not a signal's name; allowed are {FORMS}")
         joint = joint_of(name)
+        if joint in holding.locked or joint in tree.weightless:
+            continue  # a joint that is held has no signals, wherever they would be
         if joint is not None and joint not in joints:
             raise InputError(
                 f"{path}: {name!r} in [signals]: the URDF has no such joint, only {', '.join(joints)}; did you mean "

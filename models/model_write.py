@@ -8,6 +8,7 @@ from typing import Any
 from ..files import written_whole
 from .effects import get_effect
 from .floating.tree import FloatingTree
+from .holding import Holding
 from .model import Model, Placed, places
 from .rig.file import sling_table
 from .rig.rig import Rig
@@ -48,6 +49,7 @@ def save_model(model: Model, path: str | Path, note: str) -> None:
         lines.append(f"bandwidth = {_toml(model.bandwidth)}")
     if isinstance(model.tree, FloatingTree):
         lines.append(f"base = {_toml(model.tree.body)}")
+    lines += holding_lines(model.holding)
     if isinstance(model.tree, Rig) and model.urdf is not None:
         lines += ["", "[slings]"]
         for name, fields in sling_table(model.tree).items():
@@ -64,6 +66,16 @@ def save_model(model: Model, path: str | Path, note: str) -> None:
         lines += ["", "[parameters]", *(f"{_toml(k)} = {float(v)!r}" for k, v in model.values.items())]
     with written_whole(path, "choose a folder that exists") as part:
         part.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def holding_lines(holding: Holding) -> list[str]:
+    """Lines of a model file that say which joints move, which are held where, and what inertias are mended."""
+    lines = []
+    if holding.joints is not None:
+        lines.append(f"joints = {_toml(list(holding.joints))}")
+    if holding.locked:
+        lines.append(f"locked = {{ {', '.join(f'{_toml(k)} = {_toml(v)}' for k, v in holding.locked.items())} }}")
+    return lines + ([f"inertia_fix = {_toml(holding.fix)}"] if holding.fix else [])
 
 
 def _toml(value: Any) -> str:

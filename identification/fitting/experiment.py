@@ -163,7 +163,13 @@ class Scales:
 
 
 def load_experiments(
-    model: Model, paths: Sequence[str | Path], body: RigidBody, band: float | None = None, *, torque: bool = True
+    model: Model,
+    paths: Sequence[str | Path],
+    body: RigidBody,
+    band: float | None = None,
+    *,
+    torque: bool = True,
+    datasets: Sequence[xr.Dataset] = (),
 ) -> list[Experiment]:
     """Read and condition recordings for a model; all in one analysis band, the narrowest that any of them carries.
 
@@ -178,6 +184,8 @@ def load_experiments(
         Edge of the analysis band [Hz].
     torque : bool
         Whether recorded torque counts; a motion needs none.
+    datasets : sequence of xarray.Dataset
+        The recordings, where they were read before; none: they are read here.
 
     Raises
     ------
@@ -188,7 +196,7 @@ def load_experiments(
         raise InputError("recordings: none is given; give one or more")
     kinds: dict[str, JointKind] = {j.name: j.kind for j in model.tree.joints}
     if torque:
-        datasets = [read_recording(path, model.signals, kinds) for path in paths]
+        datasets = datasets or [read_recording(path, model.signals, kinds) for path in paths]
     else:
         datasets = [without_torque(read_recording(path, motion_signals(model), kinds), model) for path in paths]
     measured = [_tensions(d, model) for d in datasets]
