@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import InputError, nearest
 from ..files import toml_table
+from ..recordings.mixes import read_signal
 from ..recordings.read import SUFFIXES
 from ..recordings.signals import FORMS, Signal, is_signal, joint_of
 from .effects import get_effect
@@ -223,20 +224,7 @@ def _signals(path: Path, table: Any, tree: Tree, holding: Holding) -> dict[str, 
         slings = [f"tension.{s.name}" for s in tree.slings] if isinstance(tree, Rig) else [name]
         if name.startswith("tension.") and name not in slings:
             raise InputError(f"{path}: {name!r} in [signals]: the rig has no such sling, only {', '.join(slings)}")
-        fields = {"column": entry} if isinstance(entry, str) else entry
-        if not isinstance(fields, dict) or not isinstance(fields.get("column"), str):
-            raise InputError(
-                f"{path}: [signals] {name} = {entry!r}; allowed is {{ column = ..., unit = ..., gain = ... }}"
-            )
-        extra = set(fields) - {"column", "unit", "gain"}
-        if extra:
-            raise InputError(f"{path}: [signals] {name} has {sorted(extra)[0]!r}; allowed are column, unit, gain")
-        if not isinstance(fields.get("unit"), str | None):
-            raise InputError(f"{path}: [signals] {name} unit = {fields['unit']!r}; allowed is text in quotes")
-        gain = fields.get("gain")
-        if isinstance(gain, bool) or not isinstance(gain, int | float | str | None):
-            raise InputError(f"{path}: [signals] {name} gain = {gain!r}; allowed is a number or a scalar's name")
-        signals[name] = Signal(fields["column"], fields.get("unit"), gain)
+        signals[name] = read_signal(path, name, entry)
     return signals
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from ..files import written_whole
+from ..recordings.mixes import signal_fields
 from .effects import get_effect
 from .floating.tree import FloatingTree
 from .holding import Holding
@@ -59,9 +60,7 @@ def save_model(model: Model, path: str | Path, note: str) -> None:
     if model.signals:
         lines += ["", "[signals]"]
         for name, signal in model.signals.items():
-            fields = {"column": signal.column, "unit": signal.unit, "gain": signal.gain}
-            inner = ", ".join(f"{k} = {_toml(v)}" for k, v in fields.items() if v is not None)
-            lines.append(f"{_toml(name)} = {{ {inner} }}")
+            lines.append(f"{_toml(name)} = {_toml(signal_fields(signal))}")
     if model.values:
         lines += ["", "[parameters]", *(f"{_toml(k)} = {float(v)!r}" for k, v in model.values.items())]
     with written_whole(path, "choose a folder that exists") as part:
@@ -84,4 +83,10 @@ def _toml(value: Any) -> str:
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, list):
         return "[" + ", ".join(_toml(v) for v in value) + "]"
+    if isinstance(value, dict):
+        return (
+            "{ "
+            + ", ".join(f"{k if k.isidentifier() and k.isascii() else _toml(k)} = {_toml(v)}" for k, v in value.items())
+            + " }"
+        )
     return repr(float(value)) if isinstance(value, float) else repr(value)  # NumPy's floats show their type

@@ -91,6 +91,8 @@ class Motion:
         steps included, makes [rad or m, per s, per s²].
     silent : tuple of int
         Channels whose torque is zero throughout, but for a floor of noise.
+    undriven : tuple of int
+        Channels that nothing drives: their torque is known to be zero.
     """
 
     path: str
@@ -108,6 +110,7 @@ class Motion:
     notes: tuple[str, ...]
     encoder_noise: Array
     silent: tuple[int, ...] = ()
+    undriven: tuple[int, ...] = ()
 
     def to_band(self, x: Array) -> Array:
         """Low-pass and thin an array (n_samples, ...) segment by segment: (n_band, ...)."""

@@ -132,6 +132,11 @@ class Experiment:
         return total
 
     @cached_property
+    def modelled(self) -> Array:
+        """Torque of the rigid body as the model has it, without any effect (n, J) [N·m or N]."""
+        return self.body.torque(self.motion.q, self.motion.qd, self.motion.qdd) - self.carried
+
+    @cached_property
     def measured(self) -> Array:
         """Measured torque in the analysis band (n_band, J)."""
         return self.all_to_band(self.motion.tau)
@@ -206,6 +211,9 @@ def load_experiments(
     datasets = [_without_gaps_in(t, d) for t, d in zip(measured, datasets, strict=True)]
     wanted = band or model.bandwidth
     motions = [condition(d, model.joints, wanted, fitted=torque) for d in datasets]
+    free = tuple(
+        c for c, j in enumerate(model.joints) if f"tau.{j}" in model.signals and model.signals[f"tau.{j}"].nothing
+    )
     narrowest = min(m.band for m in motions)
     if any(m.band > 1.01 * narrowest for m in motions):
         motions = [condition(d, model.joints, narrowest, fitted=torque) for d in datasets]
@@ -219,7 +227,9 @@ def load_experiments(
             for m, d in zip(motions, datasets, strict=True)
         ]
     return [
-        Experiment(m, body, {name: np.interp(m.time, d["time"].values, x) for name, x in t.items()})
+        Experiment(
+            replace(m, undriven=free), body, {name: np.interp(m.time, d["time"].values, x) for name, x in t.items()}
+        )
         for m, d, t in zip(motions, datasets, measured, strict=True)
     ]
 
@@ -290,7 +300,8 @@ def with_silence(experiments: Sequence[Experiment]) -> list[Experiment]:
     made = []
     for e in experiments:
         peak = np.max(np.abs(e.motion.tau), axis=0)
-        silent = np.flatnonzero(peak <= NOTHING * np.max(peak))
+        known = np.isin(np.arange(len(peak)), e.motion.undriven)
+        silent = np.flatnonzero((peak <= NOTHING * np.max(peak)) & ~known)
         if len(silent):
             modelled = np.max(np.abs(e.body.torque(e.motion.q, e.motion.qd, e.motion.qdd) - e.carried), axis=0)
             for c in silent[silent >= n_carriers(e.body.tree)]:
@@ -309,10 +320,17 @@ def with_silence(experiments: Sequence[Experiment]) -> list[Experiment]:
 
 
 def scales(experiments: Sequence[Experiment]) -> Mapping[str, Scales]:
-    """Peak speed, travel and peak torque of every joint over all recordings; never zero."""
+    """Peak speed, travel and peak torque of every joint over all recordings; never zero.
+
+    Of a joint that nothing drives, the rigid body's peak torque stands for its own.
+    """
     found = {}
+    undriven = experiments[0].motion.undriven
+    modelled = [e.modelled for e in experiments] if undriven else []
     for k, joint in enumerate(experiments[0].motion.joints):
         q, qd, tau = (np.concatenate([getattr(e.motion, s)[:, k] for e in experiments]) for s in ("q", "qd", "tau"))
+        if k in undriven:
+            tau = np.concatenate([m[:, k] for m in modelled])
         found[joint] = Scales(
             max(float(np.max(np.abs(qd))), 1e-9), max(float(np.ptp(q)), 1e-9), max(float(np.max(np.abs(tau))), 1e-9)
         )
