@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 ROWS = 9000
 """Rows (samples times joints) of the fit that compares readings: more change no verdict, only its cost."""
 
-INDEPENDENT = 10.0, 200.0
+INDEPENDENT = 10.0, 600.0
 """Fewest and most independent samples that a channel counts: what a model leaves out is not white."""
 
 ALL = 8

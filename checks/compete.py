@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .case import Case
+from .case import ALL, Case
 from .evidence import Fitted
 from .finding import Finding
 from .reading import Reading
@@ -16,12 +16,13 @@ ODDS = 1e-3
 SURE = 0.95
 """Probability from which on a reading is said to be the one."""
 
-SOUND = 0.15
-"""Relative residual of every channel up to which the reading as given stands, and no other is tried: a mistake of a
-sign, a unit or a channel cannot leave so little."""
+SOUND, SOUND_OF_MANY = 0.02, 0.15
+"""Relative residual of every channel up to which the reading as given stands and no other is tried; of robots of more
+joints than `case.ALL`, which cost more."""
 
-BETTER = 0.6
-"""Most of the relative residual that a reading may leave on the channel it mends best: what it explains must be plain."""
+BETTER, CHEAPER = 0.6, 8.0
+"""What a reading explains must be plain: it leaves at most this share of a channel's residual, or its parameters are
+that many nats likelier, which is an offset of four standard deviations less."""
 
 CLOSELY = 12
 """Readings that are fitted between bounds, after all were without."""
@@ -44,7 +45,7 @@ def compete(case: Case, readings: Sequence[Reading]) -> list[Judged]:
     reading.
     """
     given = case.given
-    if not readings or np.nanmax(given.relative) <= SOUND:
+    if not readings or is_sound(case):
         return []
     kinds = {r.name: sum(other.name == r.name for other in readings) for r in readings}
     prior = {r.name: np.log(ODDS / kinds[r.name]) for r in readings}
@@ -64,6 +65,12 @@ def compete(case: Case, readings: Sequence[Reading]) -> list[Judged]:
     return sorted(judged, key=lambda j: -j.odds)
 
 
+def is_sound(case: Case) -> bool:
+    """Whether the reading as given leaves so little that no other needs to be tried."""
+    bar = SOUND if len(case.joints) <= ALL else SOUND_OF_MANY
+    return bool(np.nanmax(case.given.relative) <= bar)
+
+
 def findings(case: Case, judged: Sequence[Judged]) -> list[Finding]:
     """What the best reading says, if it is sure and plain; each of its channels is a finding.
 
@@ -78,7 +85,8 @@ def findings(case: Case, judged: Sequence[Judged]) -> list[Finding]:
     share /= share.sum()
     fault = float(share[1:].sum())
     change = best.fit.relative / np.maximum(case.given.relative, 1e-12)
-    if fault < SURE or np.nanmin(change) > BETTER:
+    plain = np.nanmin(change) <= BETTER or case.given.prior - best.fit.prior >= CHEAPER
+    if fault < SURE or not plain:
         return []
     worst = int(np.nanargmin(change))
     fall = (

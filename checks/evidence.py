@@ -24,7 +24,7 @@ from .reading import Reading, Samples
 
 Array = NDArray[np.float64]
 
-FLOOR = 0.03
+FLOOR = 0.015
 """Relative residual below which nothing is told: models of sound arms leave that much."""
 
 ROUNDS = 4
@@ -66,21 +66,34 @@ class Grounds:
         self.body, self.samples, self.counted = body, samples, counted
         self.spread, self.least = _inertial_directions(body.tree, 3.0 if free else 1.0)
 
-    def fit(self, reading: Reading, columns: tuple[Array, Array, Array] | None = None, bounded: bool = True) -> Fitted:
-        """Evidence of a reading; ``columns`` (n, J, k), their widths and lower bounds (k,) come beside the usual."""
+    def fit(
+        self,
+        reading: Reading,
+        columns: tuple[Array, Array, Array] | None = None,
+        bounded: bool = True,
+        without: NDArray[np.bool_] | None = None,
+    ) -> Fitted:
+        """Evidence of a reading.
+
+        ``columns`` (n, J, k), their widths and lower bounds (k,) come beside the usual; samples ``without`` (n, J) do
+        not count in the fit, but stand in its residual.
+        """
         samples = self.samples.under(reading)
         y, design, low = self.design(samples, reading.gravity, columns)
-        used = self.counted > 0
+        # A channel brings its independent samples along where another reading gives it to another joint.
+        counted = self.counted[reading.torque_source]
+        used = counted > 0
         size = np.sqrt(np.mean(samples.tau**2, axis=0)) + 1e-300
         y, design = (y / size)[:, used], (design / size[:, None])[:, used]
-        counted, n = self.counted[used], len(y)
-        total = (samples.tau / size)[:, used]
-        scale = np.sum(total**2, axis=0)
-        grams = np.einsum("ncp,ncq->cpq", design, design, optimize=True)
-        rights = np.einsum("ncp,nc->cp", design, y)
-        weights, b = counted / (np.sum(y**2, axis=0) + FLOOR**2 * scale), np.zeros(design.shape[2])
-        rounds = ROUNDS if bounded else 2
-        for _ in range(rounds):
+        counted, n = counted[used], len(y)
+        scale = np.sum((samples.tau / size)[:, used] ** 2, axis=0)
+        kept = np.ones_like(y) if without is None else 1.0 - without[:, used]
+        told = design * kept[:, :, None]
+        # a matrix product a channel: einsum would be ten times slower
+        grams = np.stack([told[:, c].T @ told[:, c] for c in range(len(counted))])
+        rights = np.stack([told[:, c].T @ y[:, c] for c in range(len(counted))])
+        weights, b, residual = counted / (np.sum(y**2, axis=0) + FLOOR**2 * scale), np.zeros(design.shape[2]), y
+        for _ in range(ROUNDS if bounded else 2):
             matrix = np.tensordot(weights, grams, 1) + np.eye(len(b))
             right = weights @ rights
             b = np.linalg.solve(matrix, right)
@@ -88,15 +101,15 @@ class Grounds:
                 upper = np.linalg.cholesky(matrix).T
                 b = lsq_linear(upper, np.linalg.solve(upper.T, right), (low, np.inf), method="bvls").x
             residual = y - design @ b
-            weights = counted / (np.sum(residual**2, axis=0) + FLOOR**2 * scale)
-        share = np.sum(residual**2, axis=0) / scale
+            weights = counted / (np.sum((residual * kept) ** 2, axis=0) + FLOOR**2 * scale)
+        share = np.sum((residual * kept) ** 2, axis=0) / scale
         prior = 0.5 * float(b @ b)
         value = -0.5 * float(counted @ np.log(share + FLOOR**2)) - prior - 0.5 * reading.free * np.log(max(n, 2))
         relative = np.full(len(used), np.nan)
         relative[used] = np.sqrt(share)
         whole = np.zeros((n, len(used)))
         whole[:, used] = residual
-        return Fitted(value, relative, prior, whole, b)
+        return Fitted(float(value), relative, prior, whole, b)
 
     def design(
         self, samples: Samples, gravity: Array | None, columns: tuple[Array, Array, Array] | None
@@ -116,11 +129,11 @@ class Grounds:
 
 
 def _inertial_directions(tree: Tree, wide: float) -> tuple[Array, Array]:
-    """How links may differ from the robot's file (10 L, 6 L), one standard deviation each, and lower bounds (6 L,).
+    """How links may differ from the robot's file (10 L, 7 L), one standard deviation each, and lower bounds (7 L,).
 
-    Of each link: mass and all that goes with it by 30 %; a load at its centre of 10 % of the whole robot's mass; its
-    centre along three axes by 30 % of its size, with a load's share; its own inertia by half. ``wide`` times that where
-    the model file says that inertia is free.
+    Of each link: mass and all that goes with it by 30 %; loads of 10 % of the whole robot's mass, at its centre and as
+    far out again; its centre along three axes by 6 % of its size, and 1 % of the whole robot's mass as far; its own
+    inertia by half. ``wide`` times that where the model file says that inertia is free.
     """
     whole = sum(float(link.phi[0]) for link in tree.links)
     reach = max((float(np.linalg.norm(joint.translation)) for joint, *_ in tree.bodies), default=0.0)
@@ -131,10 +144,11 @@ def _inertial_directions(tree: Tree, wide: float) -> tuple[Array, Array]:
         size = extent + float(np.linalg.norm(com)) + 0.3 * reach
         steps = [(0.3 * link.phi, -3.0)]
         load = 0.1 * whole
-        about = load * (com @ com * np.eye(3) - np.outer(com, com))
-        steps.append((np.concatenate([[load], load * com, about[np.triu_indices(3)]]), 0.0))
+        for point in (com, 2.0 * com):
+            about = load * (point @ point * np.eye(3) - np.outer(point, point))
+            steps.append((np.concatenate([[load], load * point, about[np.triu_indices(3)]]), 0.0))
         for axis in np.eye(3):
-            moved = (0.3 * mass + 0.05 * whole) * size * axis
+            moved = (0.06 * mass + 0.01 * whole) * size * axis
             change = com @ moved * 2 * np.eye(3) - np.outer(com, moved) - np.outer(moved, com)
             steps.append((np.concatenate([[0.0], moved, change[np.triu_indices(3)]]), -np.inf))
         steps.append((np.concatenate([np.zeros(4), 0.5 * inertia[np.triu_indices(3)]]), -2.0))

@@ -12,7 +12,7 @@ from ..models.model import Model
 from ..models.rigid_body import RigidBody
 from ..models.snare.setup import SnareTree
 from .case import Case
-from .compete import compete, findings
+from .compete import compete, findings, is_sound
 from .finding import Finding
 from .kinds import ORDER, kinds
 
@@ -31,33 +31,47 @@ def check(
     progress("reading and conditioning the recordings")
     datasets = read_all(model, recordings)
     model = with_recorded_joints(model, datasets)
-    body = RigidBody(model.tree)
-    experiments = with_silence(load_experiments(model, recordings, body, datasets=datasets))
-    return run_checks(model, datasets, experiments, progress)
+    found = early_checks(model, datasets)
+    if any(f.fault for f in found):
+        return found
+    experiments = with_silence(load_experiments(model, recordings, RigidBody(model.tree), datasets=datasets))
+    return run_checks(model, datasets, experiments, found, progress)
+
+
+def early_checks(model: Model, datasets: Sequence[xr.Dataset]) -> tuple[Finding, ...]:
+    """What is seen before any filter is applied: jumps, and clocks that are none.
+
+    Where one is found, readings cannot be compared: what was recorded is no motion.
+    """
+    case = Case(model, datasets, ())
+    return _sorted([f for kind in kinds() if kind.early and kind.find is not None for f in kind.find(case)])
 
 
 def run_checks(
     model: Model,
     datasets: Sequence[xr.Dataset],
     experiments: Sequence[Experiment],
+    early: Sequence[Finding] = (),
     progress: Callable[[str], None] = lambda _: None,
 ) -> tuple[Finding, ...]:
-    """Findings on recordings as read and conditioned, those of contradiction first.
+    """Findings on recordings as read and conditioned, after what was found early; those of contradiction first.
 
-    What is found early (a jump, a clock) ends it: readings cannot be compared on what is no motion. Of the readings
-    that compete the best one is told; what recordings contradict each other in is only asked where it is none.
+    Of the readings that compete the best one is told. What is cut off, and what recordings contradict each other in, is
+    only asked where there is none.
     """
     progress("checking whether the recordings can belong to the model")
     case = Case(model, datasets, experiments, progress)
-    found: list[Finding] = []
-    for kind in kinds():
-        if kind.early and kind.find is not None:
-            found += kind.find(case)
-    if not any(f.fault for f in found) and case.comparable:
+    found = list(early)
+    if not any(f.fault for f in found) and case.comparable and not is_sound(case):
         readings = [r for kind in kinds() if kind.readings is not None for r in kind.readings(case)]
         found += findings(case, compete(case, readings))
     contradicted = any(f.fault for f in found)
     for kind in kinds():
         if kind.find is not None and not kind.early and not (contradicted and kind.name in ("mixed", "saturation")):
             found += kind.find(case)
+    return _sorted(found)
+
+
+def _sorted(found: Sequence[Finding]) -> tuple[Finding, ...]:
+    """Contradictions first, then in the order of kinds."""
     return tuple(sorted(found, key=lambda f: (not f.fault, ORDER.index(f.name))))

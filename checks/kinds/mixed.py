@@ -32,7 +32,7 @@ def find(case: Case) -> list[Finding]:
     best = None
     inertial = own @ grounds.spread
     for k, link in enumerate(case.tree.links):
-        columns = inertial[:, :, 6 * k : 6 * k + 6]
+        columns = inertial[:, :, 7 * k : 7 * k + 7]
         best = _better(best, case, same, daily, columns, 3.0, f"the mass properties of {link.name}", link.name)
     for c in range(n):
         column = np.zeros((len(samples.q), n, 1))
@@ -102,7 +102,7 @@ def _better(best, case, same, daily, columns, width, what, at):
 
 def _distance(parameters: np.ndarray, runs: int, n: int) -> np.ndarray:
     """How far each recording is from the first (runs,), by its own amplitudes at the end of the list."""
-    each = (n and 6) if n >= 6 * (runs - 1) else 1
+    each = 7 if n >= 7 * (runs - 1) else 1
     own = parameters[-each * (runs - 1) :].reshape(runs - 1, -1)
     middle = np.median(np.vstack([np.zeros(own.shape[1]), own]), axis=0)
     return np.linalg.norm(np.vstack([np.zeros(own.shape[1]), own]) - middle, axis=1)
