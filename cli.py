@@ -1,4 +1,4 @@
-"""The command line: ``snarelab identify | diagnose | simulate | export | cosim | tolerance``.
+"""The command line: ``snarelab check | identify | diagnose | simulate | export | cosim | tolerance``.
 
 Exit status 0: it ran, whatever the verdict. 2: unusable input, one line on standard error, nothing written.
 130: interrupted (Ctrl-C, or SIGTERM). 1: a fault of the program.
@@ -78,6 +78,12 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=__version__)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
+    p = commands.add_parser("check", help="see whether recordings can belong to a model")
+    p.add_argument("model", metavar="MODEL.toml")
+    p.add_argument("recordings", nargs="+", metavar="RECORDING")
+    p.add_argument("--json", metavar="OUT.json", help="where to write the result; - for standard output")
+    p.set_defaults(run=_check)
+
     p = commands.add_parser("identify", help="fit every parameter of a model to recordings")
     p.add_argument("model", metavar="MODEL.toml")
     p.add_argument("recordings", nargs="+", metavar="RECORDING")
@@ -100,6 +106,7 @@ def _parser() -> argparse.ArgumentParser:
         help="where to write the motion that best parts the rivals left (system = 'arm')",
     )
     p.add_argument("--jobs", type=positive, metavar="N", help=JOBS)
+    p.add_argument("--anyway", action="store_true", help="name physics even where recordings and model contradict")
     p.set_defaults(run=_diagnose)
 
     p = commands.add_parser("simulate", help="what a model would read along a recorded motion")
@@ -118,8 +125,22 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _check(given: argparse.Namespace) -> None:
+    from .checks.run import check_file
+    from .identification.results import CheckResult
+
+    _writable(given.json, [], given.recordings)
+    with Progress() as progress:
+        result = CheckResult(*check_file(given.model, given.recordings, progress=progress))
+    if given.json:
+        _write_json(result.to_json(), given.json)
+    if given.json != "-":
+        print(result)
+
+
 def _identify(given: argparse.Namespace) -> None:
     from .identification.identify import identify  # engines load only for a command that needs them
+    from .identification.results import check_lines
     from .models.model_file import load_model
     from .models.model_write import save_model
 
@@ -134,11 +155,12 @@ def _identify(given: argparse.Namespace) -> None:
     if given.json:
         _write_json(result, given.json)
     if given.json != "-":
-        print(_parameter_table(result))
+        print("\n".join([_parameter_table(result), *check_lines(getattr(found, "checks", ()))]))
 
 
 def _diagnose(given: argparse.Namespace) -> None:
     from .identification.diagnose import diagnose
+    from .identification.results import check_lines
     from .identification.search.next_experiment import next_experiment
     from .models.model_file import load_model
     from .models.model_write import save_model
@@ -155,8 +177,10 @@ def _diagnose(given: argparse.Namespace) -> None:
                 "--next-experiment out; the result says for each rival what would part it"
             )
     with Progress() as progress:
-        answer = diagnose(model, given.recordings, given.holdout, progress=progress, jobs=given.jobs)
-        if given.next_experiment:
+        answer = diagnose(
+            model, given.recordings, given.holdout, progress=progress, jobs=given.jobs, anyway=given.anyway
+        )
+        if given.next_experiment and answer.diagnosis.fit:
             planned = next_experiment(answer.model, answer.diagnosis, given.recordings, progress=progress)
     found = answer.diagnosis
     if planned:
@@ -170,7 +194,7 @@ def _diagnose(given: argparse.Namespace) -> None:
     if given.json:
         _write_json(found.to_json(), given.json)
     if given.json != "-":
-        print(found.sentence)
+        print("\n".join([found.sentence, *check_lines(found.checks)]))
         for step in found.steps:
             print(f"  {step.label:<60} fitted {100 * step.train:6.2f} %   held out {100 * step.holdout:6.2f} %")
         if given.next_experiment:

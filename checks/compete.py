@@ -17,12 +17,16 @@ SURE = 0.95
 """Probability from which on a reading is said to be the one."""
 
 SOUND, SOUND_OF_MANY = 0.02, 0.15
-"""Relative residual of every channel up to which the reading as given stands and no other is tried; of robots of more
-joints than `case.ALL`, which cost more."""
+"""Relative residual of every channel up to which the reading as given stands and no other is tried; the second of
+robots of more joints than `case.ALL`, which cost more."""
 
 BETTER, CHEAPER = 0.6, 8.0
 """What a reading explains must be plain: it leaves at most this share of a channel's residual, or its parameters are
 that many nats likelier, which is an offset of four standard deviations less."""
+
+LEFT = 0.25
+"""Most that a reading may leave of the torque on the channel that it mends best, or, where only its parameters are
+likelier, on any: a reading that explains hardly more is one of several mistakes, or none."""
 
 CLOSELY = 12
 """Readings that are fitted between bounds, after all were without."""
@@ -40,8 +44,8 @@ class Judged:
 def compete(case: Case, readings: Sequence[Reading]) -> list[Judged]:
     """Judge readings, best first; nothing where the reading as given is sound.
 
-    All are fitted without bounds first, and the `CLOSELY` best with them. Odds are evidence times prior odds; `ODDS` are
-    shared by the readings of one kind. Positions, speeds and torques far beyond the URDF's limits count against a
+    All are fitted without bounds first, and the `CLOSELY` best with them. Odds are evidence times prior odds. The
+    readings of one kind share `ODDS`. Positions, speeds and torques far beyond the URDF's limits count against a
     reading.
     """
     given = case.given
@@ -85,10 +89,11 @@ def findings(case: Case, judged: Sequence[Judged]) -> list[Finding]:
     share /= share.sum()
     fault = float(share[1:].sum())
     change = best.fit.relative / np.maximum(case.given.relative, 1e-12)
-    plain = np.nanmin(change) <= BETTER or case.given.prior - best.fit.prior >= CHEAPER
-    if fault < SURE or not plain:
-        return []
     worst = int(np.nanargmin(change))
+    plain = change[worst] <= BETTER and best.fit.relative[worst] <= LEFT
+    likelier = case.given.prior - best.fit.prior >= CHEAPER and np.nanmax(best.fit.relative) <= LEFT
+    if fault < SURE or not (plain or likelier):
+        return []
     fall = (
         f"the error of tau.{case.joints[worst]} falls from {100 * case.given.relative[worst]:.3g} % to "
         f"{100 * best.fit.relative[worst]:.2g} %"
@@ -121,7 +126,7 @@ def beyond_limits(case: Case, reading: Reading) -> str:
 
 
 def _beyond(case: Case, reading: Reading) -> list[tuple[float, str]]:
-    """Share of samples beyond a limit by more than a quarter of it, and where; position, speed (twice), effort (thrice)."""
+    """Share of samples far beyond a limit (a quarter of a joint's range, twice a speed, three efforts), and where."""
     samples = case.samples.under(reading)
     found = []
     for j, joint in enumerate(case.tree.joints):

@@ -63,6 +63,7 @@ class Grounds:
     """
 
     def __init__(self, body: RigidBody, samples: Samples, free: bool, counted: Array) -> None:
+        """Work out once what links may differ by."""
         self.body, self.samples, self.counted = body, samples, counted
         self.spread, self.least = _inertial_directions(body.tree, 3.0 if free else 1.0)
 

@@ -24,6 +24,7 @@ class Mends:
     """
 
     def __init__(self, model: Model, dataset: xr.Dataset) -> None:
+        """Keep both."""
         self._model, self._dataset = model, dataset
 
     def scaled(self, name: str, factor: float, unit: str = "") -> str:

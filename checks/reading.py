@@ -11,7 +11,7 @@ Index = NDArray[np.int_]
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """Position is ``factor * q[source] + offset``, torque ``torque_factor * tau[torque_source]``; time goes by a factor.
+    """Position ``factor * q[source] + offset``, torque ``torque_factor * tau[torque_source]``, time by a factor.
 
     Parameters
     ----------

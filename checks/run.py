@@ -9,6 +9,7 @@ from ..errors import InputError
 from ..identification.fitting.experiment import Experiment, load_experiments, with_silence
 from ..identification.fitting.recorded import read_all, with_recorded_joints
 from ..models.model import Model
+from ..models.model_file import load_model
 from ..models.rigid_body import RigidBody
 from ..models.snare.setup import SnareTree
 from .case import Case
@@ -36,6 +37,15 @@ def check(
         return found
     experiments = with_silence(load_experiments(model, recordings, RigidBody(model.tree), datasets=datasets))
     return run_checks(model, datasets, experiments, found, progress)
+
+
+def check_file(
+    model: str | Path | Model, recordings: Sequence[str | Path], *, progress: Callable[[str], None] = lambda _: None
+) -> tuple[str, tuple[Finding, ...]]:
+    """A model's name, and the findings; a moving body that no body can be is one of them, and mended for the others."""
+    if not isinstance(model, Model):
+        model = load_model(model, fix="nearest")
+    return model.name, check(model, recordings, progress=progress)
 
 
 def early_checks(model: Model, datasets: Sequence[xr.Dataset]) -> tuple[Finding, ...]:

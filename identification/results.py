@@ -1,15 +1,17 @@
 """What the Python calls give back: frozen results that show themselves as text and, in a notebook, as tables."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from typing import Any
 
 from .. import __version__
+from ..checks.finding import Finding as Check
 from ..models.model import Model
 from ..models.model_write import save_model
 from ..report.html import folded, paragraph, table
+from .data_fault import contradict
 from .diagnosis import ChannelFit, Diagnosis, Finding, Step
 from .report.findings import STATUS, missing
 from .report.page import write_report
@@ -48,7 +50,7 @@ class DiagnosisResult:
 
     @property
     def verdict(self) -> str:
-        """``missing_physics``, ``adequate`` or ``unknown_effect``."""
+        """``data_fault``, ``missing_physics``, ``adequate`` or ``unknown_effect``."""
         return self.diagnosis.verdict
 
     @property
@@ -60,6 +62,11 @@ class DiagnosisResult:
     def effects(self) -> tuple[Finding, ...]:
         """What the model left out, each with place, probability, parameters, evidence and rivals."""
         return self.diagnosis.effects
+
+    @property
+    def checks(self) -> tuple[Check, ...]:
+        """What of the recordings and the model is not as it should be, each with the line that mends it."""
+        return self.diagnosis.checks
 
     @property
     def steps(self) -> tuple[Step, ...]:
@@ -89,7 +96,7 @@ class DiagnosisResult:
             f"  {step.label:<60} fitted {100 * step.train:6.2f} %   held out {100 * step.holdout:6.2f} %"
             for step in self.steps
         ]
-        return "\n".join([self.sentence, *lines])
+        return "\n".join([self.sentence, *check_lines(self.checks), *lines])
 
     __repr__ = __str__
 
@@ -103,6 +110,42 @@ class DiagnosisResult:
             + folded(heading, cards)
             + folded("Notes", "".join(map(paragraph, self.diagnosis.notes)))
         )
+
+
+@dataclass(frozen=True, repr=False)
+class CheckResult:
+    """What `check` found: ``checks`` on the recordings of ``model``, those of contradiction first."""
+
+    model: str
+    checks: tuple[Check, ...]
+
+    @property
+    def sound(self) -> bool:
+        """Whether nothing in the recordings contradicts the model."""
+        return not contradict(self.checks)
+
+    def to_json(self) -> dict[str, Any]:
+        """What ``snarelab check --json`` writes: plain dicts, lists, numbers and text."""
+        return {"model": self.model, "sound": self.sound, "checks": [c.to_json() for c in self.checks]}
+
+    def __str__(self) -> str:
+        """What the command prints."""
+        head = "Nothing in the recordings contradicts the model." if self.sound else "Recordings and model contradict."
+        return "\n".join([head, *check_lines(self.checks)])
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        return _shown(f"<pre>{escape(str(self))}</pre>")
+
+
+def check_lines(checks: Sequence[Check]) -> list[str]:
+    """Findings for a terminal: what and where, and below it the lines for the model file."""
+    lines = []
+    for c in checks:
+        lines.append(f"{c.name} at {c.at} ({100 * c.probability:.0f} %): {c.message}")
+        lines += [f"    {line}" for line in c.mend.splitlines()]
+    return lines
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ..errors import InputError
+from ..recordings.cuts import Cuts
 from ..recordings.signals import Signal
 from .effect import Effect
 from .floating.tree import n_carriers
@@ -60,6 +61,8 @@ class Model:
         Parameters known so far, by ``effect.at.parameter`` (``inertia.<link>.<parameter>`` for inertial parameters).
     holding : Holding
         Joints of the robot's file that are held here, and what is done about inertias that no body can have.
+    cuts : Cuts
+        Samples of the recordings that are left out.
     """
 
     path: Path
@@ -73,6 +76,7 @@ class Model:
     bandwidth: float | None
     values: Mapping[str, float]
     holding: Holding = field(default_factory=Holding)
+    cuts: Cuts = field(default_factory=Cuts)
 
     @property
     def joints(self) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 import difflib
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from ..errors import InputError, nearest
 from ..files import toml_table
+from ..recordings.cuts import read_cuts
 from ..recordings.mixes import read_signal
 from ..recordings.read import SUFFIXES
 from ..recordings.signals import FORMS, Signal, is_signal, joint_of
@@ -17,6 +19,7 @@ from .effects import get_effect
 from .floating.tree import UNNAMED, n_carriers, read_floating
 from .holding import Holding, read_holding
 from .model import Model, Placed, places
+from .published_inertia import Fix
 from .rig.file import read_slings
 from .rig.rig import Rig, built_in_rig
 from .snare.setup import read_setup
@@ -39,6 +42,8 @@ _KEYS = (
     "joints",
     "locked",
     "inertia_fix",
+    "breaks",
+    "limits",
     "effects",
     "slings",
     "capture",
@@ -48,8 +53,8 @@ _KEYS = (
 )
 
 
-def load_model(path: str | Path) -> Model:
-    """Read a model file.
+def load_model(path: str | Path, fix: Fix = "") -> Model:
+    """Read a model file; ``fix`` mends a moving body that no body can be, where the file does not say so itself.
 
     Raises
     ------
@@ -92,6 +97,7 @@ def load_model(path: str | Path) -> Model:
         hint = _neighbour(urdf, ".urdf") or "check the path, which starts where the model file is"
         raise InputError(f"{path}: urdf = {raw['urdf']!r}: no such file; {hint}")
     holding = read_holding(path, raw, system)
+    holding = replace(holding, fix=holding.fix or fix)
     tree = _tree(path, raw, system, urdf, gravity, holding)
     return Model(
         path,
@@ -105,6 +111,7 @@ def load_model(path: str | Path) -> Model:
         None if bandwidth is None else float(bandwidth),
         _values(path, raw.get("parameters", {})),
         holding,
+        read_cuts(path, raw, [f"tau.{joint.name}" for joint in tree.joints]),
     )
 
 

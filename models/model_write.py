@@ -55,6 +55,8 @@ def save_model(model: Model, path: str | Path, note: str) -> None:
     if isinstance(model.tree, FloatingTree):
         lines.append(f"base = {toml_text(model.tree.body)}")
     lines += holding_lines(model.holding)
+    lines += [f"breaks = {toml_text(list(model.cuts.breaks))}"] if model.cuts.breaks else []
+    lines += [f"limits = {toml_text(dict(model.cuts.limits))}"] if model.cuts.limits else []
     if isinstance(model.tree, Rig) and model.urdf is not None:
         lines += ["", "[slings]"]
         for name, fields in sling_table(model.tree).items():

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pinocchio as pin
+
 from bench.arm import random_arm
 from bench.motion import fourier_motion
 

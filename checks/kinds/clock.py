@@ -46,8 +46,8 @@ def _clock(case: Case, dataset: xr.Dataset) -> Finding | None:
         "clock",
         "time",
         0.99,
-        f"{name}: the time stamps are not when samples were taken: they are off an even clock by {off:.2g} periods, and "
-        f"over an even one steps of position are foretold {np.sqrt(np.median(ratios)):.2g} times better",
+        f"{name}: the time stamps are not when samples were taken: they are {off:.2g} periods off an even clock, "
+        f"and over an even one steps of position are foretold {np.sqrt(np.median(ratios)):.2g} times better",
         f'"time" = {{ rate = {1 / mean:.9g} }}',
     )
 

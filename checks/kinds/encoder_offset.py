@@ -9,6 +9,9 @@ from ..reading import Reading
 STARTS = 8
 """Angles round the circle from which the zero of a rotary joint is sought."""
 
+WORTH = 3.0
+"""Log evidence that the zero nearest by an eighth of that circle must gain to be sought more finely."""
+
 LEAST = 0.02
 """[rad] Zeros nearer than this are a matter of calibration, and explained by a centre of mass as well."""
 
@@ -32,7 +35,7 @@ def readings(case: Case) -> list[Reading]:
 
 
 def _best(case: Case, j: int) -> float:
-    """Zero of a joint [rad] by the evidence without bounds: the best of a circle of angles, then of ever finer steps."""
+    """Zero of a joint [rad] by the evidence without bounds: the best of a circle, then of ever finer steps."""
 
     def value(offset: float) -> float:
         shift = np.zeros(len(case.joints))
@@ -42,11 +45,13 @@ def _best(case: Case, j: int) -> float:
     grid = np.linspace(-np.pi, np.pi, STARTS, endpoint=False)
     values = {float(x): value(float(x)) for x in grid}
     best, step = max(values, key=lambda x: values[x]), 2 * np.pi / STARTS
-    for _ in range(6):
+    for halving in range(6):
         step /= 2.0
         for x in (best - step, best + step):
             values[x] = value(x)
         best = max((best - step, best, best + step), key=lambda x: values[x])
+        if halving == 1 and values[best] < values[0.0] + WORTH:
+            return 0.0
     return float((best + np.pi) % (2 * np.pi) - np.pi)
 
 

@@ -14,10 +14,11 @@ def readings(case: Case) -> list[Reading]:
     """Gravity along each axis, none, and along the direction that goes best with the torques."""
     given = case.tree.gravity
     size = float(np.linalg.norm(given)) or EARTH
-    found = []
-    for axis in (*np.eye(3), *-np.eye(3)):
-        if np.linalg.norm(size * axis - given) > 0.05 * size:
-            found.append(_pulled(case, size * axis, "gravity points along"))
+    found = [
+        _pulled(case, size * axis, "gravity points along")
+        for axis in (*np.eye(3), *-np.eye(3))
+        if np.linalg.norm(size * axis - given) > 0.05 * size
+    ]
     if given.any():
         found.append(_pulled(case, np.zeros(3), "there is no gravity:").but(rarer=-2.0))
     fitted = _fitted(case, size)

@@ -29,7 +29,7 @@ def find(case: Case) -> list[Finding]:
                     "inertia",
                     link.name,
                     0.99,
-                    f"link {link.name} of {mass:.3g} kg has an inertia of a body {radius:.3g} m wide, and the whole robot "
+                    f"link {link.name} of {mass:.3g} kg has the inertia of a body {radius:.3g} m wide, and the robot "
                     f"is {reach:.3g} m long: a unit such as kg·mm² is read as kg·m²",
                     'inertia = "free"',
                     fault=False,

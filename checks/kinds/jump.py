@@ -10,7 +10,7 @@ from ..case import Case
 from ..finding import Finding, Kind
 
 TIMES = 12.0
-"""A step this many times what positions do about it is none that a drive makes: speeds change with the joint's inertia."""
+"""A step this many times what positions do about it is none that a drive makes: joints have inertia."""
 
 COUNTS = 25.0
 """Steps of the encoder up to which a jump is noise or its rounding."""
@@ -33,8 +33,8 @@ def find(case: Case) -> list[Finding]:
 def jumps(dataset: xr.Dataset, name: str) -> list[tuple[float, float]]:
     """(time [s], how far) of every step of a position that its neighbours do not foretell, largest first.
 
-    What is held against the steps about it is the step less what they move meanwhile; a spike that comes back at once is
-    no jump.
+    What is held against the steps about it is the step less what they move meanwhile. A spike that comes back at once
+    is no jump.
     """
     x, t = np.asarray(dataset[name].values, float), np.asarray(dataset["time"].values, float)
     good = np.isfinite(x)
@@ -78,7 +78,7 @@ def _finding(case: Case, dataset: xr.Dataset, name: str, at: float, far: float) 
         "jump",
         name,
         0.99,
-        f"{Path(str(dataset.attrs['path'])).name}: {name} jumps by {far:+.3g} {unit} between {at:.6g} s and {after:.6g} s",
+        f"{Path(dataset.attrs['path']).name}: {name} jumps by {far:+.3g} {unit} between {at:.6g} and {after:.6g} s",
         f"breaks = [{0.5 * (at + after):.9g}]",
     )
 

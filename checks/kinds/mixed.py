@@ -1,16 +1,25 @@
 """Recordings that contradict each other: one arm cannot have made both."""
 
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 
 from ..case import Case
 from ..compete import ODDS, SURE
+from ..evidence import Fitted
 from ..finding import Finding, Kind
 from ..reading import as_read
 
 WORSE = 1.5
 """Least ratio of relative residuals, on the channel that shows it best, of one arm and of two."""
+
+
+Best: TypeAlias = tuple[float, Fitted, str, str]
+"""Log odds but for the prior's, the fit, what differs, and where."""
+
+Columns: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Columns (n, J, k), their widths and lower bounds (k,)."""
 
 
 def find(case: Case) -> list[Finding]:
@@ -58,15 +67,16 @@ def find(case: Case) -> list[Finding]:
             "mixed",
             at,
             float(1 / (1 + np.exp(-min(log_odds, 50.0)))),
-            f"recordings contradict each other in {what}{which}; fitted for each, the error of tau.{case.joints[worst]} "
-            f"falls from {100 * same.relative[worst]:.3g} % to {100 * fit.relative[worst]:.2g} %",
+            f"recordings contradict each other in {what}{which}; fitted for each, the error of "
+            f"tau.{case.joints[worst]} falls from {100 * same.relative[worst]:.3g} % to "
+            f"{100 * fit.relative[worst]:.2g} %",
             f"# leave out {odd.partition(' and ')[2] or odd}, or diagnose the recordings apart: snarelab compare",
         )
     ]
 
 
-def _daily(qd: np.ndarray, run: np.ndarray, rms: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Columns for what may differ from recording to recording: viscous and Coulomb friction and a bias of each joint."""
+def _daily(qd: np.ndarray, run: np.ndarray, rms: np.ndarray) -> Columns:
+    """Columns for what may differ from day to day: viscous and Coulomb friction and a bias of each joint."""
     n, n_joints = qd.shape
     made = []
     for r in np.unique(run)[1:]:
@@ -84,7 +94,9 @@ def _daily(qd: np.ndarray, run: np.ndarray, rms: np.ndarray) -> tuple[np.ndarray
     return columns, np.ones(columns.shape[2]), np.full(columns.shape[2], -np.inf)
 
 
-def _better(best, case, same, daily, columns, width, what, at):
+def _better(
+    best: Best | None, case: Case, same: Fitted, daily: Columns, columns: np.ndarray, width: float, what: str, at: str
+) -> Best:
     """The better of the best so far and one arm whose columns have other amplitudes in every recording."""
     run = case.samples.run
     apart = np.concatenate([columns * (run == r)[:, None, None] for r in np.unique(run)[1:]], axis=2)

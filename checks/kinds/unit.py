@@ -29,7 +29,7 @@ def readings(case: Case) -> list[Reading]:
     found: list[Reading] = []
     for family in ("q", "tau"):
         tables = [_table(family, joint.kind) for joint in joints]
-        groups = [(j,) for j in case.doubtful] if n > 1 else []
+        groups: list[tuple[int, ...]] = [(j,) for j in case.doubtful] if n > 1 else []
         for kind in ("revolute", "prismatic"):
             alike = tuple(j for j in range(n) if joints[j].kind == kind)
             if alike:

@@ -201,7 +201,7 @@ def load_experiments(
         raise InputError("recordings: none is given; give one or more")
     kinds: dict[str, JointKind] = {j.name: j.kind for j in model.tree.joints}
     if torque:
-        datasets = datasets or [read_recording(path, model.signals, kinds) for path in paths]
+        datasets = datasets or [model.cuts(read_recording(path, model.signals, kinds)) for path in paths]
     else:
         datasets = [without_torque(read_recording(path, motion_signals(model), kinds), model) for path in paths]
     measured = [_tensions(d, model) for d in datasets]

@@ -18,7 +18,7 @@ from ...recordings.signals import joint_of
 def read_all(model: Model, paths: Sequence[str | Path]) -> list[xr.Dataset]:
     """Every recording, with the model's [signals]; raises InputError for whatever is wrong with one."""
     kinds: dict[str, JointKind] = {j.name: j.kind for j in model.tree.joints}
-    return [read_recording(path, model.signals, kinds) for path in paths]
+    return [model.cuts(read_recording(path, model.signals, kinds)) for path in paths]
 
 
 def with_recorded_joints(model: Model, datasets: Sequence[xr.Dataset]) -> Model:

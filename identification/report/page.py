@@ -7,7 +7,7 @@ from ...errors import InputError
 from ...files import written_whole
 from ...report.html import page
 from ..diagnosis import Diagnosis
-from .findings import STATUS, missing, verdict, where
+from .findings import STATUS, checked, missing, verdict, where
 from .fit import notes, parameters, screened, shape, step_by_step, unseen
 
 
@@ -25,7 +25,9 @@ def write_report(diagnosis: Diagnosis, path: str | Path) -> None:
 
 
 def _document(diagnosis: Diagnosis, day: date) -> str:
-    parts = (missing, where, unseen, step_by_step, shape, screened, parameters, notes)
+    parts = (missing, where, unseen, step_by_step, shape, screened, parameters, checked, notes)
+    if not diagnosis.fit:  # nothing was fitted
+        parts = (checked, notes)
     return page(
         f"{diagnosis.model}: {STATUS[diagnosis.verdict]}",
         verdict(diagnosis, day),
