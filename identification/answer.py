@@ -107,8 +107,7 @@ def report_on(
         verdict = "unknown_effect" if description else "adequate"
         remainder = f" {description[:1].upper()}{description[1:]}." if description else ""
     named = {t.judged.placed.key for t in confirmed}
-    notes = [*model.tree.notes]
-    notes += [f"{Path(e.motion.path).name}: {note}" for e in (*train, *locked) for note in e.motion.notes]
+    notes = [f"{Path(e.motion.path).name}: {note}" for e in (*train, *locked) for note in e.motion.notes]
     notes += [
         f"{t.judged.placed.effect.name} at {t.judged.placed.at} passed on the training recordings but made the "
         f"held-out one hardly better: not named"

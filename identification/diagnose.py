@@ -135,7 +135,7 @@ def diagnose(
     )
     if links:
         diagnosis, after = with_links(diagnosis, after, links, compared)
-    return Answer(replace(diagnosis, checks=checks), after)
+    return Answer(replace(diagnosis, checks=checks, notes=(*model.tree.notes, *diagnosis.notes)), after)
 
 
 def _steps(

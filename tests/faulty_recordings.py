@@ -231,7 +231,7 @@ def axis_reversed(made, seed):
 def cut_off(made, seed):
     run, k = record(made, seed), seed % len(made.viscous)
     tau = run.tau.copy()
-    level = 0.45 * np.abs(tau[:, k]).max()
+    level = 0.65 * np.abs(tau[:, k]).max()
     tau[:, k] = np.clip(tau[:, k], -level, level)
     return [replace(run, tau=tau)], "saturation", {f"tau.{run.joints[k]}"}
 

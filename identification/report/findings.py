@@ -53,8 +53,6 @@ def missing(diagnosis: Diagnosis) -> tuple[str, str, str]:
 
 def checked(diagnosis: Diagnosis) -> tuple[str, str, str]:
     """What of the recordings and the model is not as it should be, with the lines that mend it."""
-    if not diagnosis.checks:
-        return "checks", "Is the data sound?", paragraph("Nothing in the recordings contradicts the model.")
     rows = [
         [
             escape(words(check.name)),

@@ -25,9 +25,11 @@ def write_report(diagnosis: Diagnosis, path: str | Path) -> None:
 
 
 def _document(diagnosis: Diagnosis, day: date) -> str:
-    parts = (missing, where, unseen, step_by_step, shape, screened, parameters, checked, notes)
-    if not diagnosis.fit:  # nothing was fitted
+    parts = (missing, where, unseen, step_by_step, shape, screened, parameters, notes)
+    if diagnosis.verdict == "data_fault":  # nothing was fitted
         parts = (checked, notes)
+    elif diagnosis.checks:
+        parts = (*parts[:-1], checked, notes)
     return page(
         f"{diagnosis.model}: {STATUS[diagnosis.verdict]}",
         verdict(diagnosis, day),
