@@ -9,9 +9,9 @@ from ..reading import as_read
 LEAST = 0.005
 """Share of samples at the level from which on it is looked at."""
 
-BEYOND, CLEARLY = 0.8, 2.0
+BEYOND, CLEARLY = 0.65, 2.0
 """Share of samples at the level at which the model's torque must lie beyond it; and how many times what it misses
-elsewhere, on average."""
+elsewhere, on average. Filters smear the edges of what is cut off, so that not all lie beyond."""
 
 REST = 0.3
 """Share of samples that must stand below the level: the model is fitted to those."""
