@@ -89,6 +89,7 @@ INSTALL := -m pip install --quiet --no-compile --disable-pip-version-check
 .venv/tools: .venv/needed
 	$(BIN)/python -c '$(WANTED); print(*(r for x in e["all"][0][9:-1].split(",") + ["dev"] for r in e[x] if not r.startswith("snarelab[")), sep="\n")' > .venv/wanted.txt
 	$(BIN)/python $(INSTALL) -c constraints.txt -r .venv/wanted.txt
+	$(BIN)/python $(INSTALL) --no-deps -c constraints.txt example-robot-data
 	touch $@
 
 .venv/installed: .venv/tools .venv/core

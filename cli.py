@@ -1,4 +1,4 @@
-"""The command line: ``snarelab identify | diagnose | simulate | export | cosim | tolerance | completion``.
+"""The command line: ``snarelab check | identify | diagnose | simulate | export | cosim | tolerance | completion``.
 
 Exit status 0: it ran, whatever the verdict. 2: unusable input, one line on standard error, nothing written.
 130: interrupted (Ctrl-C, or SIGTERM). 1: a fault of the program.
@@ -84,6 +84,12 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=__version__)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
+    p = commands.add_parser("check", help="see whether recordings can belong to a model")
+    p.add_argument("model", metavar="MODEL.toml")
+    p.add_argument("recordings", nargs="+", metavar="RECORDING")
+    p.add_argument("--json", metavar="OUT.json", help="where to write the result; - for standard output")
+    p.set_defaults(run=_check)
+
     p = commands.add_parser("identify", help="fit every parameter of a model to recordings")
     p.add_argument("model", metavar="MODEL.toml")
     p.add_argument("recordings", nargs="+", metavar="RECORDING")
@@ -111,6 +117,7 @@ def _parser() -> argparse.ArgumentParser:
         help="where to write the motion that best parts the rivals left (system = 'arm')",
     )
     p.add_argument("--jobs", type=positive, metavar="N", help=JOBS)
+    p.add_argument("--anyway", action="store_true", help="name physics even where recordings and model contradict")
     p.set_defaults(run=_diagnose)
 
     p = commands.add_parser("simulate", help="what a model would read along a recorded motion")
@@ -127,7 +134,7 @@ def _parser() -> argparse.ArgumentParser:
             "-v", "--verbose", action="count", default=0, help="log what is under way to standard error; -vv: all of it"
         )
         command.add_argument(
-            "-q", "--quiet", action="store_true", help="no progress; identify and diagnose: no summary"
+            "-q", "--quiet", action="store_true", help="no progress; check, identify and diagnose: no summary"
         )
     p = commands.add_parser("completion", help="print what makes a shell complete these commands")
     p.add_argument("shell", choices=("bash", "zsh", "tcsh"))
@@ -139,6 +146,19 @@ def _complete(parser: argparse.ArgumentParser, shell: str) -> None:
     import shtab
 
     print(shtab.complete(parser, shell))
+
+
+def _check(given: argparse.Namespace) -> None:
+    from .checks.run import check_file
+    from .identification.results import CheckResult
+
+    _writable(given.json, [], given.recordings)
+    with Progress() as progress:
+        result = CheckResult(*check_file(given.model, given.recordings, progress=progress))
+    if given.json:
+        _write_json(result.to_json(), given.json)
+    if given.json != "-" and not given.quiet:
+        print(result)
 
 
 def _identify(given: argparse.Namespace) -> None:
@@ -180,8 +200,10 @@ def _diagnose(given: argparse.Namespace) -> None:
                 "--next-experiment out; the result says for each rival what would part it"
             )
     with Progress() as progress:
-        answer = diagnose(model, given.recordings, given.holdout, progress=progress, jobs=given.jobs)
-        if given.next_experiment:
+        answer = diagnose(
+            model, given.recordings, given.holdout, progress=progress, jobs=given.jobs, anyway=given.anyway
+        )
+        if given.next_experiment and answer.diagnosis.fit:
             planned = next_experiment(answer.model, answer.diagnosis, given.recordings, progress=progress)
     found = answer.diagnosis
     if planned:

@@ -1,6 +1,6 @@
-"""The commands as Python calls: `diagnose`, `identify` and `simulate` on files or on what is already loaded.
+"""The commands as Python calls: `diagnose`, `identify`, `check` and `simulate` on files or on what is already loaded.
 
-The package gives them as ``snarelab.diagnose``, ``snarelab.identify`` and ``snarelab.simulate``.
+The package gives them as ``snarelab.diagnose``, ``snarelab.identify``, ``snarelab.check`` and ``snarelab.simulate``.
 """
 
 import re
@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from ..checks import run as checking
 from ..errors import InputError
 from ..models.model import Model
 from ..models.model_file import load_model
@@ -21,7 +22,7 @@ from ..recordings import write_frame
 from . import diagnose as diagnosing
 from . import identify as identifying
 from . import simulate as simulating
-from .results import DiagnosisResult, IdentificationResult, ParameterEstimate
+from .results import CheckResult, DiagnosisResult, IdentificationResult, ParameterEstimate
 
 ModelLike: TypeAlias = str | Path | Model
 """A model file's path, or a `Model` that was loaded."""
@@ -38,6 +39,7 @@ def diagnose(
     progress: Callable[[str], None] = lambda _: None,
     seed: int = 0,
     jobs: int | None = None,
+    anyway: bool = False,
 ) -> DiagnosisResult:
     """Find, name and add the physics that a model leaves out; confirm it on a recording that the fit never sees.
 
@@ -55,6 +57,8 @@ def diagnose(
         Of bootstraps and nulls.
     jobs : int, optional
         Processes in which captures are simulated, by default one a core, at most four; other systems refuse it.
+    anyway : bool
+        Go on where recordings and model contradict each other; the verdict is else ``data_fault``.
 
     Returns
     -------
@@ -87,7 +91,9 @@ def diagnose(
     """
     given = _model(model)
     with _as_files([*_several(recordings), holdout]) as paths:
-        answer = diagnosing.diagnose(given, paths[:-1], paths[-1], progress=progress, seed=seed, jobs=jobs)
+        answer = diagnosing.diagnose(
+            given, paths[:-1], paths[-1], progress=progress, seed=seed, jobs=jobs, anyway=anyway
+        )
     return DiagnosisResult(answer.diagnosis, answer.model)
 
 
@@ -147,6 +153,44 @@ def identify(
     names = ParameterEstimate.__dataclass_fields__
     parameters = tuple(ParameterEstimate(**{name: p[name] for name in names}) for p in published["parameters"])
     return IdentificationResult(parameters, published["fit"], published["condition"], found.model, published)
+
+
+def check(
+    model: ModelLike,
+    recordings: RecordingLike | Sequence[RecordingLike],
+    *,
+    progress: Callable[[str], None] = lambda _: None,
+) -> CheckResult:
+    """See whether recordings can belong to a model: units, signs, channels, gravity, clocks, and one another.
+
+    Parameters
+    ----------
+    model : path or Model
+        What is believed.
+    recordings : path, xarray.Dataset or pandas.DataFrame, or a sequence of them
+    progress : callable
+        Told in a few words what is under way.
+
+    Returns
+    -------
+    CheckResult
+        Findings, each with a place, a message and the line that mends it; prints as one line each.
+
+    Raises
+    ------
+    InputError
+        Whatever is wrong with the model or a recording, in one line.
+
+    Examples
+    --------
+    >>> import snarelab
+    >>> from importlib.resources import files
+    >>> arm = files("snarelab.studies") / "bundled"
+    >>> snarelab.check(arm / "arm3.toml", [arm / "train.csv", arm / "holdout.csv"]).checks
+    ()
+    """
+    with _as_files(_several(recordings)) as paths:
+        return CheckResult(*checking.check_file(model, paths, progress=progress))
 
 
 def simulate(model: ModelLike, motion: RecordingLike | None = None) -> xr.Dataset:

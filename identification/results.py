@@ -10,17 +10,19 @@ from typing import Any
 import pandas as pd
 
 from .. import __version__
+from ..checks.finding import Finding as Check
 from ..errors import InputError
 from ..models.model import Model
 from ..models.model_write import save_model
 from ..report.html import folded, paragraph, table
+from .data_fault import contradict
 from .diagnosis import ChannelFit, Diagnosis, Finding, Step
 from .report.figures import before_and_after
 from .report.findings import STATUS, missing
 from .report.fit import changes, most_changed
 from .report.page import write_report
 from .report.words import number, percent, unit_words, with_std, words
-from .summary import parameter_table, printed
+from .summary import check_lines, parameter_table, printed
 
 # Colours come from the notebook, so that a result reads on its light page and on its dark one.
 _STYLE = """<style>
@@ -70,7 +72,7 @@ class DiagnosisResult:
 
     @property
     def verdict(self) -> str:
-        """``missing_physics``, ``adequate`` or ``unknown_effect``."""
+        """``data_fault``, ``missing_physics``, ``adequate`` or ``unknown_effect``."""
         return self.diagnosis.verdict
 
     @property
@@ -82,6 +84,11 @@ class DiagnosisResult:
     def effects(self) -> tuple[Finding, ...]:
         """What the model left out, each with place, probability, parameters, evidence and rivals."""
         return self.diagnosis.effects
+
+    @property
+    def checks(self) -> tuple[Check, ...]:
+        """What of the recordings and the model is not as it should be, each with the line that mends it."""
+        return self.diagnosis.checks
 
     @property
     def steps(self) -> tuple[Step, ...]:
@@ -146,6 +153,33 @@ class DiagnosisResult:
         )
 
 
+@dataclass(frozen=True, repr=False)
+class CheckResult:
+    """What `check` found: ``checks`` on the recordings of ``model``, those of contradiction first."""
+
+    model: str
+    checks: tuple[Check, ...]
+
+    @property
+    def sound(self) -> bool:
+        """Whether nothing in the recordings contradicts the model."""
+        return not contradict(self.checks)
+
+    def to_json(self) -> dict[str, Any]:
+        """What ``snarelab check --json`` writes: plain dicts, lists, numbers and text."""
+        return {"model": self.model, "sound": self.sound, "checks": [c.to_json() for c in self.checks]}
+
+    def __str__(self) -> str:
+        """What the command prints."""
+        head = "Nothing in the recordings contradicts the model." if self.sound else "Recordings and model contradict."
+        return "\n".join([head, *check_lines([c.to_json() for c in self.checks])])
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        return _shown(f"<pre>{escape(str(self))}</pre>")
+
+
 @dataclass(frozen=True)
 class ParameterEstimate:
     """One identified number.
@@ -201,9 +235,8 @@ class IdentificationResult:
 
     def __str__(self) -> str:
         """What the command prints."""
-        return parameter_table(
-            {"parameters": [vars(p) for p in self.parameters], "fit": self.fit, "condition": self.condition}
-        )
+        parameters = [vars(p) for p in self.parameters]
+        return parameter_table({**self.published, "parameters": parameters, "fit": self.fit})
 
     __repr__ = __str__
 

@@ -1,4 +1,4 @@
-"""What a command prints of its result: the verdict, the steps, what was found and how sure that is."""
+"""What a command prints of its result: the verdict, the checks, the steps, what was found and how sure that is."""
 
 from collections.abc import Mapping, Sequence
 from math import inf
@@ -11,10 +11,11 @@ _LABEL = 60
 
 
 def printed(diagnosis: Diagnosis) -> str:
-    """The sentence, the table of steps, and where something was found its table and what could not be told apart."""
+    """The sentence, the checks, the steps, and where something was found its table and what could not be told apart."""
     return "\n".join(
         [
             diagnosis.sentence,
+            *check_lines([c.to_json() for c in diagnosis.checks]),
             *_steps(diagnosis.steps),
             *_findings(diagnosis.effects),
             *_alike(diagnosis.effects),
@@ -23,7 +24,7 @@ def printed(diagnosis: Diagnosis) -> str:
 
 
 def parameter_table(result: Mapping[str, Any]) -> str:
-    """An identification's parameters and misfits, from the form in which it is published."""
+    """An identification's parameters, misfits and checks, from the form in which it is published."""
     lines = [f"{'effect':<26}{'at':<16}{'parameter':<24}{'value':>12}{'std':>11}  unit"]
     for p in result["parameters"]:
         flag = "  (at its bound)" if p["at_bound"] else ""
@@ -39,7 +40,16 @@ def parameter_table(result: Mapping[str, Any]) -> str:
                     f"{100 * f['relative']:.2f} % of the measured"
                 )
     lines.append(f"condition number {result['condition']:.3g}")
-    return "\n".join(lines)
+    return "\n".join([*lines, *check_lines(result.get("checks", ()))])
+
+
+def check_lines(checks: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Published findings of the checks: what and where, and below it the lines for the model file."""
+    lines = []
+    for c in checks:
+        lines.append(f"{c['name']} at {c['at']} ({100 * c['probability']:.0f} %): {c['message']}")
+        lines += [f"    {line}" for line in c["mend"].splitlines()]
+    return lines
 
 
 def value_words(name: str, value: float, std: float | None, unit: str) -> str:

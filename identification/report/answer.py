@@ -70,8 +70,9 @@ def _next(diagnosis: Diagnosis) -> str:
         {
             "missing_physics": "Take the improved model (--save-model) and diagnose it on a third recording: is it "
             "adequate there as well?",
+            "data_fault": "Mend what the checks below say, and diagnose again.",
             "adequate": "Nothing, unless an effect smaller than the limits of detection below would matter.",
             "unknown_effect": "Look at the channel, the times and the states below, and record the same motion again: "
             "does it come back?",
-        }.get(diagnosis.verdict, "Mend what the recordings say first.")
+        }[diagnosis.verdict]
     )

@@ -12,10 +12,10 @@ from .figures import residual_over_time
 from .words import chance, number, percent, spans, unit_words, with_std, words
 
 STATUS = {
+    "data_fault": "fault in the data",
     "missing_physics": "missing physics",
     "adequate": "adequate",
     "unknown_effect": "unknown effect",
-    "data_fault": "data fault",
 }
 _WORST = 4
 _CHANNELS = ("tau.", "q.", "qd.", "q_link.")
@@ -52,6 +52,22 @@ def missing(diagnosis: Diagnosis) -> tuple[str, str, str]:
     if diagnosis.description:
         cards += f'<article class="card"><h3>Without a name</h3>\n{text}</article>\n'
     return "missing", "What is missing", cards
+
+
+def checked(diagnosis: Diagnosis) -> tuple[str, str, str]:
+    """What of the recordings and the model is not as it should be, with the lines that mend it."""
+    rows = [
+        [
+            escape(words(check.name)),
+            escape(check.at),
+            chance(check.probability),
+            escape(check.message),
+            "<br>".join(f"<code>{escape(line)}</code>" for line in check.mend.splitlines()),
+        ]
+        for check in diagnosis.checks
+    ]
+    heads = ["Check", "At", "Probability", "What", "Line that mends it"]
+    return "checks", "Is the data sound?", table("What is not as it should be", heads, rows, (2,))
 
 
 def where(diagnosis: Diagnosis) -> tuple[str, str, str]:

@@ -10,7 +10,7 @@ from ...report.html import page
 from ...report.provenance import Provenance, provenance
 from ..diagnosis import Diagnosis
 from .answer import answer
-from .findings import STATUS, missing, verdict, where
+from .findings import STATUS, checked, missing, verdict, where
 from .fit import notes, parameters, screened, shape, step_by_step, unseen
 
 
@@ -31,6 +31,10 @@ def write_report(diagnosis: Diagnosis, path: str | Path, origin: Provenance | No
 def _document(diagnosis: Diagnosis, day: date, origin: Provenance) -> str:
     first = partial(answer, origin=origin)
     parts = (first, missing, where, partial(unseen, skip=1), step_by_step, shape, screened, parameters, notes)
+    if diagnosis.verdict == "data_fault":  # nothing was fitted
+        parts = (first, checked, notes)
+    elif diagnosis.checks:
+        parts = (*parts[:-1], checked, notes)
     return page(
         f"{diagnosis.model}: {STATUS[diagnosis.verdict]}",
         verdict(diagnosis, day),
