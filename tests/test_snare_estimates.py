@@ -236,7 +236,8 @@ def test_a_finding_tells_the_channel_that_it_made_best_and_rivals_that_count(mon
 def test_one_name_and_several_are_listed_with_what_the_worst_channel_gains():
     fits = _fits(searched(simulated(0.2), simulated(0.36)), [OWN], [OWN])
     some: Any = [
-        SimpleNamespace(name=n, at=a) for n, a in (("contact_friction", "pin"), ("mass", "capture"), ("x", "y"))
+        SimpleNamespace(name=n, at=a, probability=0.99)
+        for n, a in (("contact_friction", "pin"), ("mass", "capture"), ("x", "y"))
     ]
     said = [_sentence(some[:k], fits, "") for k in (1, 2, 3)]
     assert said[0].startswith("The model leaves out contact friction at pin. With that added")
