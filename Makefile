@@ -2,18 +2,21 @@
 PYTHON ?= python3
 BIN := .venv/bin
 SOURCES := $(shell git ls-files --cached --others --exclude-standard '*.py' '*.toml' '*.urdf' '*.csv' '*.json' '*.c' '*.h' 'fmu/c/*.txt' 2>/dev/null | grep -v -e '^tests/' -e '^bench/' -e '^proof/')
-STUDIES := emps kuka bam free-floating ground-capture zero-g-rig orbit-inspection orbit-hover tolerance
+STUDIES := emps kuka bam free-floating ground-capture zero-g-rig orbit-inspection orbit-hover orbit-abort tolerance
 
 BENCHES := torque friction_fit diagnosis floating cosim fmu snare ecos_inspection tolerance
 
-.PHONY: help demo test test-slow check studies bench accuracy fuzz kills mutants proof fmus docs clean $(STUDIES:%=study-%)
+.PHONY: help demo test test-slow check studies bench accuracy fuzz kills hostile mutants proof ledger fmus docs clean $(STUDIES:%=study-%)
 
 help:            ## what can be made
-	@sed -n -e 's/^\$$(STUDIES.*## /  make study-NAME\t/p' -e 's/^\([a-z-]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
+	@sed -n -e 's/^\$$(filter-out.*## /  make study-NAME\t/p' -e 's/^\([a-z-]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
 
-demo: study-emps ## set up, then the main job: name the physics that a viscous model of EMPS leaves out
+demo: study-emps ## set up the core alone, then the main job: name the physics that a viscous model of EMPS leaves out
 
-$(STUDIES:%=study-%): study-%: .venv/installed ## run one study: report and numbers in build/studies/NAME
+study-emps: .venv/core
+	$(BIN)/python -m snarelab.studies.emps
+
+$(filter-out study-emps,$(STUDIES:%=study-%)): study-%: .venv/installed ## run one study: report and numbers in build/studies/NAME
 	$(BIN)/python -m snarelab.studies.$(subst -,_,$*)
 
 studies: $(filter-out study-tolerance,$(STUDIES:%=study-%)) ## every study but the tolerances, one after the other: a quarter of an hour; CI runs them
@@ -40,8 +43,12 @@ fuzz: .venv/installed ## broken files at every reader, SECONDS for each
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt '.[fuzz]'
 	$(BIN)/python tests/fuzz --seconds $(SECONDS)
 
-kills: .venv/installed ## two hundred runs killed at random: nothing lost that was reported done
+kills: .venv/installed ## two hundred runs, and as many importers of FMUs, killed at random: nothing lost that was reported, nothing left
 	$(BIN)/python bench/kills.py
+	$(BIN)/python bench/importer_kills.py
+
+hostile: .venv/installed ## forty FMUs that crash, hang, fork and lie: each ends in one line
+	$(BIN)/python bench/hostile_fmus.py
 
 MUTANTS ?= 60
 mutants: .venv/installed ## change identification and cosim at random places, and count how often a test notices; branch coverage
@@ -50,6 +57,9 @@ mutants: .venv/installed ## change identification and cosim at random places, an
 
 proof: .venv/installed ## conceal effects in another engine's recordings, let the tool name them, and score it: half an hour
 	$(BIN)/python -m proof
+
+ledger: .venv/installed ## what the tool says of every recording that must not get worse, into bench/ledger.json: half an hour, resumed; OLD=FILE tells what moved
+	$(BIN)/python bench/ledger.py $(if $(OLD),--compare $(OLD))
 
 fmus: .venv/installed ## the shipped FMUs and a page on each, into build/fmus
 	$(BIN)/python -m snarelab.fmu.shipped
@@ -60,14 +70,27 @@ docs: .venv/installed ## the pages with their generated parts, into build/docs; 
 clean:           ## remove what was built; the environment too
 	rm -rf .venv build *.egg-info
 
-.venv/tools: constraints.txt pyproject.toml
+# What physics on an arm needs comes first and is enough for the demo; extras and tools come when a target asks for them.
+WANTED := import tomllib; p = tomllib.load(open("pyproject.toml", "rb"))["project"]; e = p["optional-dependencies"]
+INSTALL := -m pip install --quiet --no-compile --disable-pip-version-check
+
+.venv/needed: constraints.txt pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "snarelab needs Python 3.11 or newer: make PYTHON=...")'
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -c 'import tomllib; p = tomllib.load(open("pyproject.toml", "rb"))["project"]; print(*p["dependencies"], *p["optional-dependencies"]["dev"], sep="\n")' > .venv/wanted.txt
-	$(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check -c constraints.txt -r .venv/wanted.txt
+	$(BIN)/python -c '$(WANTED); print(*p["dependencies"], sep="\n")' > .venv/needed.txt
+	$(BIN)/python $(INSTALL) -c constraints.txt -r .venv/needed.txt
 	touch $@
 
-.venv/installed: .venv/tools $(SOURCES)
+.venv/core: .venv/needed $(SOURCES)
 	rm -rf build/lib build/bdist.*
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --force-reinstall .
+	$(BIN)/python $(INSTALL) --no-deps --force-reinstall .
+	touch $@
+
+.venv/tools: .venv/needed
+	$(BIN)/python -c '$(WANTED); print(*(r for x in e["all"][0][9:-1].split(",") + ["dev"] for r in e[x] if not r.startswith("snarelab[")), sep="\n")' > .venv/wanted.txt
+	$(BIN)/python $(INSTALL) -c constraints.txt -r .venv/wanted.txt
+	$(BIN)/python $(INSTALL) --no-deps -c constraints.txt example-robot-data
+	touch $@
+
+.venv/installed: .venv/tools .venv/core
 	touch $@

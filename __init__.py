@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .errors import InputError
-    from .identification.from_python import diagnose, identify, simulate
-    from .identification.results import DiagnosisResult, IdentificationResult, ParameterEstimate
+    from .identification.from_python import check, diagnose, identify, simulate
+    from .identification.results import CheckResult, DiagnosisResult, IdentificationResult, ParameterEstimate
     from .models.model import Model
     from .models.model_file import load_model
     from .recordings import read_recording
@@ -19,11 +19,13 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
+    "CheckResult",
     "DiagnosisResult",
     "IdentificationResult",
     "InputError",
     "Model",
     "ParameterEstimate",
+    "check",
     "diagnose",
     "identify",
     "load_model",
@@ -32,6 +34,8 @@ __all__ = [
 ]
 
 _PLACES = {
+    "CheckResult": ".identification.results",
+    "check": ".identification.from_python",
     "DiagnosisResult": ".identification.results",
     "IdentificationResult": ".identification.results",
     "InputError": ".errors",

@@ -1,4 +1,4 @@
-"""The command line: ``snarelab identify | diagnose | simulate | export | cosim | tolerance``.
+"""The command line: ``snarelab check | identify | diagnose | simulate | export | cosim | tolerance | completion``.
 
 Exit status 0: it ran, whatever the verdict. 2: unusable input, one line on standard error, nothing written.
 130: interrupted (Ctrl-C, or SIGTERM). 1: a fault of the program.
@@ -8,15 +8,16 @@ import argparse
 import errno
 import json
 import os
+import shlex
 import sys
 import warnings
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from . import __version__
-from .arguments import positive
+from .arguments import Once, positive
 from .cosim.command import add_parser as add_cosim
 from .errors import InputError, nearest, one_line
 from .exit_status import status_of
@@ -25,6 +26,10 @@ from .fmu.command import add_parser as add_export
 from .progress import Progress, start_logging
 from .tolerance.command import add_parser as add_tolerance
 
+if TYPE_CHECKING:
+    from .models.model import Model
+    from .report.provenance import Provenance
+
 JOBS = "processes in which captures are simulated (default: one a core, at most 4); other systems refuse it"
 
 
@@ -32,7 +37,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; see the module's text for the exit status."""
     parser = _parser()
     given = parser.parse_args(arguments)
-    start_logging(given.verbose)
+    given.words = list(sys.argv[1:] if arguments is None else arguments)
+    start_logging(given.verbose, quiet=getattr(given, "quiet", False))
     try:
         with warnings.catch_warnings():
             warnings.showwarning = _notice
@@ -78,10 +84,21 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=__version__)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
+    p = commands.add_parser("check", help="see whether recordings can belong to a model")
+    p.add_argument("model", metavar="MODEL.toml")
+    p.add_argument("recordings", nargs="+", metavar="RECORDING")
+    p.add_argument("--json", metavar="OUT.json", help="where to write the result; - for standard output")
+    p.set_defaults(run=_check)
+
     p = commands.add_parser("identify", help="fit every parameter of a model to recordings")
     p.add_argument("model", metavar="MODEL.toml")
     p.add_argument("recordings", nargs="+", metavar="RECORDING")
-    p.add_argument("--holdout", metavar="RECORDING", help="recording on which the fit is only evaluated")
+    p.add_argument(
+        "--holdout",
+        action="append",
+        metavar="RECORDING",
+        help="held-out recording, only evaluated; may be repeated",
+    )
     p.add_argument("--json", metavar="OUT.json", help="where to write the result; - for standard output")
     p.add_argument("--save-model", metavar="NEW.toml", help="where to write the model with its values")
     p.add_argument("--jobs", type=positive, metavar="N", help=JOBS)
@@ -90,7 +107,7 @@ def _parser() -> argparse.ArgumentParser:
     p = commands.add_parser("diagnose", help="find, name and add the physics that a model leaves out")
     p.add_argument("model", metavar="MODEL.toml")
     p.add_argument("recordings", nargs="+", metavar="RECORDING")
-    p.add_argument("--holdout", required=True, metavar="RECORDING", help="locked away for the proof")
+    p.add_argument("--holdout", required=True, action=Once, metavar="RECORDING", help="held out, for the proof only")
     p.add_argument("--json", metavar="OUT.json", help="where to write the result; - for standard output")
     p.add_argument("--report", metavar="OUT.html", help="where to write the report, one self-contained page")
     p.add_argument("--save-model", metavar="NEW.toml", help="where to write the model with what was found")
@@ -100,6 +117,7 @@ def _parser() -> argparse.ArgumentParser:
         help="where to write the motion that best parts the rivals left (system = 'arm')",
     )
     p.add_argument("--jobs", type=positive, metavar="N", help=JOBS)
+    p.add_argument("--anyway", action="store_true", help="name physics even where recordings and model contradict")
     p.set_defaults(run=_diagnose)
 
     p = commands.add_parser("simulate", help="what a model would read along a recorded motion")
@@ -115,31 +133,58 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument(
             "-v", "--verbose", action="count", default=0, help="log what is under way to standard error; -vv: all of it"
         )
+        command.add_argument(
+            "-q", "--quiet", action="store_true", help="no progress; check, identify and diagnose: no summary"
+        )
+    p = commands.add_parser("completion", help="print what makes a shell complete these commands")
+    p.add_argument("shell", choices=("bash", "zsh", "tcsh"))
+    p.set_defaults(run=lambda given: _complete(parser, given.shell), verbose=0)
     return parser
+
+
+def _complete(parser: argparse.ArgumentParser, shell: str) -> None:
+    import shtab
+
+    print(shtab.complete(parser, shell))
+
+
+def _check(given: argparse.Namespace) -> None:
+    from .checks.run import check_file
+    from .identification.results import CheckResult
+
+    _writable(given.json, [], given.recordings)
+    with Progress() as progress:
+        result = CheckResult(*check_file(given.model, given.recordings, progress=progress))
+    if given.json:
+        _write_json(result.to_json(), given.json)
+    if given.json != "-" and not given.quiet:
+        print(result)
 
 
 def _identify(given: argparse.Namespace) -> None:
     from .identification.identify import identify  # engines load only for a command that needs them
+    from .identification.summary import parameter_table
     from .models.model_file import load_model
     from .models.model_write import save_model
 
-    _writable(given.json, [given.save_model], [*given.recordings, given.holdout])
+    held = given.holdout or []
+    _writable(given.json, [given.save_model], [*given.recordings, *held])
     model = load_model(given.model)
     with Progress() as progress:
-        held = [given.holdout] if given.holdout else ()
         found = identify(model, given.recordings, held, progress=progress, jobs=given.jobs)
     result = found.to_json()
     if given.save_model:
         save_model(found.model, given.save_model, f"{model.name}: values from snarelab identify {__version__}")
     if given.json:
         _write_json(result, given.json)
-    if given.json != "-":
-        print(_parameter_table(result))
+    if given.json != "-" and not given.quiet:
+        print(parameter_table(result))
 
 
 def _diagnose(given: argparse.Namespace) -> None:
     from .identification.diagnose import diagnose
     from .identification.search.next_experiment import next_experiment
+    from .identification.summary import printed
     from .models.model_file import load_model
     from .models.model_write import save_model
     from .recordings import demand_suffix, write_recording
@@ -155,8 +200,10 @@ def _diagnose(given: argparse.Namespace) -> None:
                 "--next-experiment out; the result says for each rival what would part it"
             )
     with Progress() as progress:
-        answer = diagnose(model, given.recordings, given.holdout, progress=progress, jobs=given.jobs)
-        if given.next_experiment:
+        answer = diagnose(
+            model, given.recordings, given.holdout, progress=progress, jobs=given.jobs, anyway=given.anyway
+        )
+        if given.next_experiment and answer.diagnosis.fit:
             planned = next_experiment(answer.model, answer.diagnosis, given.recordings, progress=progress)
     found = answer.diagnosis
     if planned:
@@ -164,19 +211,25 @@ def _diagnose(given: argparse.Namespace) -> None:
     if given.report:
         from .identification.report.page import write_report  # it draws, which takes half a second to load
 
-        write_report(found, given.report)
+        write_report(found, given.report, _origin(given, model))
     if given.save_model:
         save_model(answer.model, given.save_model, f"{found.sentence}\nsnarelab diagnose {__version__}")
     if given.json:
         _write_json(found.to_json(), given.json)
-    if given.json != "-":
-        print(found.sentence)
-        for step in found.steps:
-            print(f"  {step.label:<60} fitted {100 * step.train:6.2f} %   held out {100 * step.holdout:6.2f} %")
+    if given.json != "-" and not given.quiet:
+        print(printed(found))
         if given.next_experiment:
             print(planned.sentence if planned else "Next experiment: no rival is left to part; none was written.")
         if given.report:
             print(f"Report: {given.report}")
+
+
+def _origin(given: argparse.Namespace, model: "Model") -> "Provenance":
+    from .report.provenance import provenance
+
+    recordings = [("Training", recording) for recording in given.recordings]
+    files = [("Model", given.model), ("Robot", model.urdf), *recordings, ("Held-out", given.holdout)]
+    return provenance(f"snarelab {shlex.join(given.words)}", files)
 
 
 def _simulate(given: argparse.Namespace) -> None:
@@ -217,24 +270,6 @@ def _write_json(result: dict[str, Any], path: str) -> None:
         return
     with written_whole(Path(path)) as part:
         part.write_text(text, encoding="utf-8")
-
-
-def _parameter_table(result: dict[str, Any]) -> str:
-    lines = [f"{'effect':<26}{'at':<16}{'parameter':<24}{'value':>12}{'std':>11}  unit"]
-    for p in result["parameters"]:
-        flag = "  (at its bound)" if p["at_bound"] else ""
-        std = "unknown" if p["std"] is None else f"{p['std']:.2g}"
-        lines.append(f"{p['effect']:<26}{p['at']:<16}{p['name']:<24}{p['value']:>12.5g}{std:>11}  {p['unit']}{flag}")
-    for channel, fit in result["fit"].items():
-        for role in ("train", "holdout"):
-            if role in fit:
-                f = fit[role]
-                lines.append(
-                    f"{channel} {role}: RMS residual {f['rms']:.4g} {fit['unit']}, "
-                    f"{100 * f['relative']:.2f} % of the measured"
-                )
-    lines.append(f"condition number {result['condition']:.3g}")
-    return "\n".join(lines)
 
 
 def _notice(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:

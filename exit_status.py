@@ -4,6 +4,7 @@ import sys
 from collections.abc import Callable
 
 from .errors import InputError
+from .extras import refusal
 from .progress import terminated_is_interrupted
 
 
@@ -14,6 +15,12 @@ def status_of(job: Callable[[], int]) -> int:
             return job()
     except InputError as error:
         print(f"snarelab: {error}", file=sys.stderr)
+        return 2
+    except ModuleNotFoundError as error:
+        said = refusal(error)
+        if said is None:
+            raise
+        print(f"snarelab: {said}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print("snarelab: interrupted; files that are there are whole; run the same command again", file=sys.stderr)

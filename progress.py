@@ -19,22 +19,23 @@ LOG = logging.getLogger("snarelab")
 _COUNT = re.compile(r"(\d+) of (?:at most )?(\d+)")
 _NUMBER = re.compile(r"(?<!round )(?<![\d.])[\d.]+")
 _INTERRUPTED = threading.Event()
+_QUIET = threading.Event()
 _RARELY = 0.2
 """Least time between two rewritten lines of the same kind [s]."""
 
 
 class Progress:
-    """A context that gives ``show(text)``.
+    """A context that gives ``show(text)``: what is under way, the time since its start, rate and time left.
 
-    Time left is extrapolated from the share that is done: the caller's ``share``, or "3 of 8" in the text, which then
-    counts from the first text of that wording on.
+    Rate and time left follow from the share that is done: the caller's ``share``, or "3 of 8" in the text, which then
+    counts from the first text of that wording on. Nothing is said of them before there is something to judge by.
     """
 
     def __init__(self) -> None:
         """Start the clock."""
-        self._shown = sys.stderr.isatty() and not LOG.isEnabledFor(logging.INFO)
+        self._shown = sys.stderr.isatty() and not LOG.isEnabledFor(logging.INFO) and not _QUIET.is_set()
         self._start = self._since = time.monotonic()
-        self._wording, self._first, self._last = "", 0.0, 0.0
+        self._wording, self._first, self._count, self._last = "", 0.0, 0, 0.0
 
     def __enter__(self) -> "Progress":
         """Ready."""
@@ -45,21 +46,28 @@ class Progress:
         if _INTERRUPTED.is_set():
             raise KeyboardInterrupt
         text, now = one_line(text), time.monotonic()
-        wording = _NUMBER.sub("", text)
-        if share is None and (count := _COUNT.search(text)):
+        wording, count = _NUMBER.sub("", text), _COUNT.search(text)
+        if share is None and count:
             share = int(count[1]) / max(int(count[2]), 1)
         if wording != self._wording:
             LOG.info(text)
             self._wording, self._since, self._first, self._last = wording, now, share or 0.0, 0.0
+            self._count = int(count[1]) if count else 0
         else:
             LOG.debug(text)
         if not self._shown or now - self._last < _RARELY:
             return
         self._last = now
-        left = ""
+        parts = [duration(now - self._start)]
         if share is not None and share > self._first and now > self._since:
-            left = f", {duration((1.0 - share) * (now - self._since) / (share - self._first))} left"
-        line = f"[{duration(now - self._start)}{left}] {text}"
+            seconds = now - self._since
+            if count and int(count[1]) > self._count:
+                parts.append(_rate((int(count[1]) - self._count) / seconds))
+            left = (1.0 - share) * seconds / (share - self._first)
+            if left >= 0.5:
+                parts.append(f"{duration(left)} left")
+        bar = "" if share is None else f" {_bar(share)}"
+        line = f"[{', '.join(parts)}]{bar} {text}"
         columns = shutil.get_terminal_size().columns  # a longer line wraps, and its first half stays
         print(f"\r\x1b[2K{line[: columns - 1]}", end="", file=sys.stderr, flush=True)
 
@@ -67,6 +75,16 @@ class Progress:
         """Leave the line empty."""
         if self._shown:
             print("\r\x1b[2K", end="", file=sys.stderr, flush=True)
+
+
+def _rate(each_second: float) -> str:
+    return f"{each_second:.2g}/s" if each_second >= 0.1 else f"{60 * each_second:.2g}/min"
+
+
+def _bar(share: float) -> str:
+    """Ten places of a bar."""
+    full = round(10 * min(max(share, 0.0), 1.0))
+    return "━" * full + "─" * (10 - full)
 
 
 def stages(say: Callable[[str], None]) -> Callable[[str], None]:
@@ -124,8 +142,12 @@ def terminated_is_interrupted() -> Iterator[None]:
         _INTERRUPTED.clear()
 
 
-def start_logging(verbose: int) -> None:
-    """Log to standard error from warnings on, with ``-v`` what is under way, with ``-vv`` every step of it."""
+def start_logging(verbose: int, quiet: bool = False) -> None:
+    """Log to standard error from warnings on, with ``-v`` what is under way, with ``-vv`` every step of it.
+
+    ``quiet``: no progress on a terminal either.
+    """
+    (_QUIET.set if quiet else _QUIET.clear)()
     level = (logging.WARNING, logging.INFO, logging.DEBUG)[min(verbose, 2)]
     LOG.setLevel(level)
     LOG.handlers.clear()

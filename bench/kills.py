@@ -2,9 +2,9 @@
 
 ``python bench/kills.py [--kills 200] [--seed 1] [COMMAND ...]`` over identify, diagnose, cosim and tolerance. Half of
 the moments are drawn evenly from the length of a run, half from its last sixth, where files are written. After each
-kill every output must be absent, or what a run before left whole; every tolerance case that was reported recorded must
-be on disk; and the processes that the run had started must end by themselves. At the end the command is run
-undisturbed, and must leave what a run leaves that was never killed.
+kill every output must be absent, or what a run before left whole; every tolerance case, and every time of a cosim run,
+that was reported must be on disk; and the processes that the run had started must end by themselves. At the end the
+command is run undisturbed, and must leave what a run leaves that was never killed.
 """
 
 import argparse
@@ -33,7 +33,7 @@ _ROWS = 800
 
 _SYSTEM = """
 step = 1e-3
-stop = 1.0
+stop = 10.0
 [participants.left]
 python = "snarelab.cosim.participants.oscillator:LeftOscillator"
 [participants.right]
@@ -93,7 +93,7 @@ def words(command: str, out: str) -> list[str]:
             *("diagnose", "arm3.toml", "train.csv", "--holdout", "holdout.csv"),
             *(*files, "--report", f"{out}/out.html"),
         ],
-        "cosim": ["cosim", "system.toml", "--out", f"{out}/out.csv"],
+        "cosim": ["cosim", "system.toml", "--out", f"{out}/out.csv", "-vv"],
         "tolerance": ["tolerance", "study.toml", "--out", f"{out}/results", "-vv"],
     }[command]
 
@@ -117,6 +117,7 @@ class Trial:
     command: str
     folder: Path
     recorded: int = 0
+    reached: float = 0.0
     outcomes: Counter[str] = field(default_factory=Counter)
 
     def __post_init__(self) -> None:
@@ -131,12 +132,19 @@ class Trial:
         """Run to the end, or kill at a moment [s]; raises Lost where an undisturbed run fails."""
         (self.folder / out).mkdir(exist_ok=True)
         mark = f"{os.getpid()}-{random.random()}"
+        (self.folder / "tmp").mkdir(exist_ok=True)
         paths = os.pathsep.join([str(self.folder), os.environ.get("PYTHONPATH", "")])
         with tempfile.TemporaryFile("w+") as log:
             process = subprocess.Popen(
                 [sys.executable, "-m", "snarelab.cli", *words(self.command, out)],
                 cwd=self.folder,
-                env={**os.environ, "PYTHONPATH": paths, "OMP_NUM_THREADS": "1", "SNARELAB_KILLS": mark},
+                env={
+                    **os.environ,
+                    "PYTHONPATH": paths,
+                    "OMP_NUM_THREADS": "1",
+                    "SNARELAB_KILLS": mark,
+                    "TMPDIR": str(self.folder / "tmp"),
+                },
                 stdout=log,
                 stderr=log,
                 start_new_session=True,
@@ -175,11 +183,15 @@ class Trial:
         if moment is not None:
             reported = [int(n) for n in re.findall(r"(\d+) of at most", log)]
             self.recorded = max([self.recorded, *reported])
+            times = [float(t) for t in re.findall(r"([\d.]+) s of [\d.]+ s", log)]
+            self.reached = max([0.0, *times]) if status else 0.0
         deadline = time.monotonic() + ORPHANS
-        while left := _alive(mark):
+        while left := alive(mark):
             if time.monotonic() > deadline:
                 raise Lost(f"{self.command}: processes {left} live on {ORPHANS:g} s after their parent was killed")
             time.sleep(0.05)
+        if self.command == "cosim" and (lost := [*(self.folder / "tmp").rglob("*")]):
+            raise Lost(f"cosim: {lost} lie about after the run's end")
 
     def _check(self) -> None:
         """Every output is whole: the same as the undisturbed run's."""
@@ -189,6 +201,11 @@ class Trial:
             same = json.loads(text) == json.loads(other) if path.suffix == ".json" else text == other
             if not same and not (path.suffix == ".html" and text.endswith("</html>\n") and len(text) == len(other)):
                 raise Lost(f"{self.command}: {path.name} is not whole")
+        if self.reached > 0:
+            unfinished = killed / "unfinished-out.csv"
+            rows = pd.read_csv(unfinished if unfinished.exists() else killed / "out.csv")
+            if rows["time"].iloc[-1] < self.reached - 1e-3:
+                raise Lost(f"cosim: {self.reached} s were reported, and rows end at {rows['time'].iloc[-1]} s")
         if self.command == "tolerance" and (killed / "results" / "cases").exists():
             frames = [pd.read_parquet(p) for p in (killed / "results" / "cases").glob("*.parquet")]
             count = len(pd.concat(frames)[["stage", "case"]].drop_duplicates()) if frames else 0
@@ -196,7 +213,7 @@ class Trial:
                 raise Lost(f"tolerance: {self.recorded} cases were reported recorded, {count} are there")
 
 
-def _alive(mark: str) -> list[int]:
+def alive(mark: str) -> list[int]:
     """Processes that a run started, by what stands in their environment."""
     found = []
     for place in Path("/proc").glob("[0-9]*"):

@@ -2,7 +2,8 @@
  *
  * -DFMI=2|3 the standard, -DSIDE=0|1 left (force in) or right (motion in). One classical Runge-Kutta step of order 4 a
  * communication step. The parameter "fault" makes it misbehave from "fault_time" on:
- * 1 error, 2 hang, 3 NaN, 4 ends its process, 5 discard, 6 fatal, 7 asks to end the simulation (FMI 3.0).
+ * 1 error, 2 hang, 3 NaN, 4 ends its process, 5 discard, 6 fatal, 7 asks to end the simulation (FMI 3.0); built with
+ * -DHOSTILE also what hostile_fmu.c has.
  */
 #include <math.h>
 #include <signal.h>
@@ -43,6 +44,10 @@ typedef struct {
 static void say(Model *m, int status, const char *text) {
     if (m->logger) m->logger(m->environment, status, "fault", text);
 }
+#endif
+
+#ifdef HOSTILE
+#include "hostile_fmu.c"
 #endif
 
 static Model *create(void) {
@@ -90,6 +95,10 @@ static int advance(Model *m, double t, double h) {
             case 5: return 2;
             case 6: say(m, 4, "the model is lost"); return 4;
         }
+#ifdef HOSTILE
+        int status = misbehave((int)v[FAULT], &v[X]);
+        if (status >= 0) return status;
+#endif
     }
     runge_kutta(&m->s, h);
     v[TIME] = t + h;
@@ -121,6 +130,16 @@ static Status set(Model *m, const unsigned *r, size_t n, const double *in) {
 
 static Status start(Model *m) {
     m->s.value[X] = m->s.value[POSITION], m->s.value[V] = m->s.value[SPEED];
+#ifdef HOSTILE
+    at_start((int)m->s.value[FAULT], &m->s.value[X]);
+#endif
+    return 0;
+}
+
+static Status end(Model *m) {
+#ifdef HOSTILE
+    at_end((int)m->s.value[FAULT]);
+#endif
     return 0;
 }
 
@@ -157,7 +176,7 @@ void fmi2FreeInstance(INSTANCE c) { free(c); }
 CALL(SetupExperiment)(INSTANCE c, fmi2Boolean a, fmi2Real b, fmi2Real t, fmi2Boolean d, fmi2Real e) { return fmi2OK; }
 CALL(EnterInitializationMode)(INSTANCE c) { return start(c); }
 CALL(ExitInitializationMode)(INSTANCE c) { return start(c); }
-CALL(Terminate)(INSTANCE c) { return fmi2OK; }
+CALL(Terminate)(INSTANCE c) { return end(c); }
 CALL(Reset)(INSTANCE c) { return start(c); }
 CALL(GetReal)(INSTANCE c, VR, fmi2Real v[]) { return get(c, r, n, v); }
 CALL(SetReal)(INSTANCE c, VR, const fmi2Real v[]) { return set(c, r, n, v); }
@@ -219,7 +238,7 @@ CALL(EnterInitializationMode)(INSTANCE c, fmi3Boolean a, fmi3Float64 b, fmi3Floa
 }
 CALL(ExitInitializationMode)(INSTANCE c) { return start(c); }
 CALL(EnterEventMode)(INSTANCE c) REFUSE
-CALL(Terminate)(INSTANCE c) { return fmi3OK; }
+CALL(Terminate)(INSTANCE c) { return end(c); }
 CALL(Reset)(INSTANCE c) { return start(c); }
 CALL(GetFloat64)(INSTANCE c, VR, fmi3Float64 v[], size_t k) { return get(c, r, n, v); }
 CALL(SetFloat64)(INSTANCE c, VR, const fmi3Float64 v[], size_t k) { return set(c, r, n, v); }

@@ -46,15 +46,20 @@ _UNITS = {
 
 
 def build(
-    folder: Path, side: Literal["left", "right"], fmi: Literal[2, 3] = 2, units: dict[str, str] | None = None
+    folder: Path,
+    side: Literal["left", "right"],
+    fmi: Literal[2, 3] = 2,
+    units: dict[str, str] | None = None,
+    defined: tuple[str, ...] = (),
 ) -> Path:
-    """Compile and pack ``folder/<side><fmi>.fmu``; ``units`` replaces the units of variables, by name."""
+    """Compile and pack ``folder/<side><fmi>.fmu``; ``units`` replaces units of variables, ``defined`` are macros."""
     name = f"{side}{fmi}"
     path = folder / f"{name}.fmu"
     with tempfile.TemporaryDirectory() as scratch:
         library = Path(scratch) / f"{name}.so"
         headers = Path(fmpy.__file__).parent / "c-code"
         options = [f"-DFMI={fmi}", f"-DSIDE={int(side == 'right')}", f"-I{headers}", "-O2", "-shared", "-fPIC", "-w"]
+        options += [f"-D{name}" for name in defined]
         compiler, _ = find_compiler("", os.environ["PATH"])  # tests name other compilers, and none, for the tool
         subprocess.run([*compiler, *options, "-o", str(library), str(SOURCE), "-lm"], check=True)
         with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:

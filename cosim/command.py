@@ -28,13 +28,14 @@ def add_parser(commands: Any) -> None:
 
 
 def run(given: argparse.Namespace) -> None:
-    """Run and write; a run that fails or is interrupted keeps its recording up to the last good step.
+    """Run and write as it goes; a run that fails or is interrupted keeps its recording up to the last good step.
 
     Raises InputError with what failed, when, and what was kept; SystemExit(130) where it is interrupted.
     """
     from dataclasses import replace
 
-    from ..recordings import demand_suffix, write_recording
+    from ..recordings.write import demand_suffix
+    from .journal import Journal
     from .setup import Hosting, load_setup
 
     out = Path(given.out)
@@ -49,21 +50,25 @@ def run(given: argparse.Namespace) -> None:
         setup = replace(setup, **{key: value for key, value in changes.items() if value is not None})
         master = _started(given.system, setup)
         span = setup.stop - setup.start
-        with Progress() as progress, terminated_is_interrupted():
+        with Progress() as progress, terminated_is_interrupted(), Journal(master.record, out) as journal:
+            report = journal.report(lambda t: progress(f"{t:.3f} s of {setup.stop:.3f} s", (t - setup.start) / span))
             try:
-                result = master.run(
-                    setup.stop, lambda t: progress(f"{t:.3f} s of {setup.stop:.3f} s", (t - setup.start) / span)
-                )
+                result = master.run(setup.stop, report)
             except StepError as error:
                 if master.time <= setup.start:
+                    journal.discard()
                     raise InputError(f"{given.system}: {error}; no step was made, nothing is written") from None
-                write_recording(master.result().recording, out)
+                journal.finish()
                 raise InputError(f"{given.system}: {error}; {out} holds the run up to there") from None
+            except InputError:  # a time that cannot be run to, or a disk that is full
+                if not master.steps:
+                    journal.discard()
+                raise
             except KeyboardInterrupt:
-                write_recording(master.result().recording, out)
+                journal.finish()
                 print(f"snarelab: interrupted at {master.time:.9g} s; {out} holds the run up to there", file=sys.stderr)
                 raise SystemExit(130) from None
-        write_recording(result.recording, out)
+            journal.finish()
     finally:
         for participant in setup.system.participants.values():
             participant.close()

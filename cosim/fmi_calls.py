@@ -13,10 +13,13 @@ from typing import Any
 from weakref import WeakValueDictionary
 
 import numpy as np
-from fmpy import fmi1, fmi2, fmi3
 
+from ..extras import needed_for
 from .fmi_variables import Slot
 from .participant import StepError
+
+with needed_for("an FMU"):
+    from fmpy import fmi1, fmi2, fmi3
 
 _STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
 _TYPES: dict[str, Any] = {

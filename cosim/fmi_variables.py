@@ -2,9 +2,9 @@
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import chain, product
 from typing import Any
 
 from ..errors import InputError
@@ -13,7 +13,7 @@ from .units import quantity
 
 _NUMBERS = ("Real", "Float32", "Float64", "Integer", "Enumeration", "Boolean")
 _WHOLE = re.compile(r"U?Int\d+")
-_MOST = 100_000
+_MOST, _MOST_DEPENDENCIES = 100_000, 5_000_000
 _BASE = {"kg": "kg", "m": "m", "s": "s", "A": "A", "K": "K", "mol": "mol", "cd": "cd", "rad": "rad"}
 
 
@@ -29,10 +29,15 @@ class Slot:
 
 @dataclass(frozen=True)
 class Interface:
-    """All scalars in the order of the model description, and where each is found in the FMU."""
+    """All scalars in the order of the model description, and where each is found in the FMU.
+
+    ``unread`` are the inputs that hold no number, by name, with their type: nothing can be connected to them, and they
+    keep the start values that the FMU gives them.
+    """
 
     variables: tuple[Variable, ...]
     slots: Mapping[Causality, tuple[Slot, ...]]
+    unread: Mapping[str, str]
 
 
 def read_interface(description: Any, path: object) -> Interface:
@@ -47,7 +52,7 @@ def read_interface(description: Any, path: object) -> Interface:
     Raises
     ------
     InputError
-        For an input of text, bytes or a clock, which nothing here could give; for numbers and dimensions that are none.
+        For numbers and dimensions that are none, and for more elements of arrays than can be read.
     """
     try:
         return _read(description, path)
@@ -60,34 +65,28 @@ def _read(description: Any, path: object) -> Interface:
     sizes = {v.valueReference: v for v in description.modelVariables}
     groups: dict[Causality, list[Slot]] = {"input": [], "output": [], "parameter": []}
     variables: list[Variable] = []
-    depends = _dependencies(description, sizes)
-    for v in description.modelVariables:
-        if v.causality not in groups:
-            continue
-        if v.type not in _NUMBERS and not _WHOLE.fullmatch(v.type):
-            if v.causality == "input":
-                raise InputError(
-                    f"{path}: input {v.name!r} holds {v.type}, not a number; such inputs are not supported"
-                )
-            continue
-        names = _names(v, sizes)
+    shown = [v for v in description.modelVariables if v.causality in groups]
+    numbers = [v for v in shown if _is_number(v)]
+    unread = {v.name: v.type for v in shown if v.causality == "input" and not _is_number(v)}
+    _check_count(numbers, sizes)
+    names_of = {v.name: _names(v, sizes) for v in numbers}
+    depends = _dependencies(description, names_of)
+    for v in numbers:
+        names = names_of[v.name]
         groups[v.causality].append(Slot(v.valueReference, v.type, names, v.variability in (None, "continuous")))
         unit = v.unit or (v.declaredType.unit if v.declaredType else None) or ""
         starts = _numbers(v.start, len(names))
+        spelled, low, high = pint_unit(unit, units.get(unit)), _number(v.min, -math.inf), _number(v.max, math.inf)
+        on = depends.get(v.name) if v.causality == "output" else ()
         variables += [
-            Variable(
-                name,
-                v.causality,
-                pint_unit(unit, units.get(unit)),
-                start,
-                v.description or "",
-                _number(v.min, -math.inf),
-                _number(v.max, math.inf),
-                depends.get(v.name) if v.causality == "output" else (),
-            )
+            Variable(name, v.causality, spelled, start, v.description or "", low, high, on)
             for name, start in zip(names, starts, strict=True)
         ]
-    return Interface(tuple(variables), {causality: tuple(slots) for causality, slots in groups.items()})
+    return Interface(tuple(variables), {causality: tuple(slots) for causality, slots in groups.items()}, unread)
+
+
+def _is_number(v: Any) -> bool:
+    return v.type in _NUMBERS or _WHOLE.fullmatch(v.type) is not None
 
 
 def pint_unit(name: str, base: Any = None) -> str:
@@ -117,28 +116,48 @@ def _zero(read: Any) -> float:
     return round(float(type(read)(0.0, read.units).to_root_units().magnitude), 9)
 
 
-def _names(v: Any, sizes: Mapping[int, Any]) -> tuple[str, ...]:
-    """A scalar's name, or one name an element, counted from 1 in the order of the values."""
+def _lengths(v: Any, sizes: Mapping[int, Any]) -> list[int]:
+    """Lengths of an array's dimensions, none of a scalar's; as many elements as can be read at most."""
     try:
         lengths = [int(d.start if d.start is not None else sizes[d.valueReference].start) for d in v.dimensions]
     except (TypeError, ValueError, KeyError):
         raise InputError(f"variable {v.name!r} has a dimension that is no whole number; correct it") from None
+    if lengths and (min(lengths) < 1 or math.prod(lengths) > _MOST):
+        raise InputError(f"variable {v.name!r} has dimensions {lengths}; 1 to {_MOST} elements can be read")
+    return lengths
+
+
+def _check_count(variables: Sequence[Any], sizes: Mapping[int, Any]) -> None:
+    """Refuse arrays that have more elements together than can be read; a scalar has its place in the description."""
+    elements = 0
+    for v in variables:
+        lengths = _lengths(v, sizes)
+        elements += math.prod(lengths) if lengths else 0
+        if elements > _MOST:
+            raise InputError(f"arrays down to {v.name!r} have {elements} elements together; {_MOST} can be read")
+
+
+def _names(v: Any, sizes: Mapping[int, Any]) -> tuple[str, ...]:
+    """A scalar's name, or one name an element, counted from 1 in the order of the values."""
+    lengths = _lengths(v, sizes)
     if not lengths:
         return (v.name,)
-    if min(lengths) < 1 or math.prod(lengths) > _MOST:
-        raise InputError(f"variable {v.name!r} has dimensions {lengths}; 1 to {_MOST} elements can be read")
     return tuple(f"{v.name}[{','.join(map(str, at))}]" for at in product(*(range(1, n + 1) for n in lengths)))
 
 
-def _dependencies(description: Any, sizes: Mapping[int, Any]) -> dict[str, tuple[str, ...] | None]:
+def _dependencies(description: Any, names_of: Mapping[str, tuple[str, ...]]) -> dict[str, tuple[str, ...] | None]:
     """Inputs that each output depends on; None where the model description does not say."""
     found: dict[str, tuple[str, ...] | None] = {}
+    count = 0
     for unknown in description.outputs:
         if unknown.dependencies is None:
             found[unknown.variable.name] = None
         else:
-            known = [v for v in unknown.dependencies if v.causality == "input"]
-            found[unknown.variable.name] = tuple(name for v in known for name in _names(v, sizes))
+            known = [names_of.get(v.name, ()) for v in unknown.dependencies if v.causality == "input"]
+            count += sum(map(len, known))
+            if count > _MOST_DEPENDENCIES:
+                raise InputError(f"outputs depend on inputs {count} times; {_MOST_DEPENDENCIES} can be read")
+            found[unknown.variable.name] = tuple(chain.from_iterable(known))
     return found
 
 

@@ -3,6 +3,10 @@
 ``jacobi`` steps all participants side by side on what was known at the start of the macro step. ``gauss_seidel`` steps
 them one after another, each on what the earlier ones have just found. Either is explicit, or is iterated: participants
 go back to the start of the step until the outputs that were assumed at its end are those that come out.
+
+At the start one value is known, and no parabola. An input that is held there is off by its slope times the step, which
+leaves an error of order H² in all that follows. Where the hold has more to lose, and all participants can restore, the
+first step is therefore iterated, on the line between its ends.
 """
 
 import math
@@ -19,7 +23,7 @@ from .energy import BondEnergy
 from .feedthrough import FeedThrough
 from .hold import combine, end_weights, hold_named
 from .iteration import Iteration, NotConverged, QuasiNewton
-from .participant import StepError
+from .participant import Participant, StepError
 from .record import Event, Record, Run
 from .step_control import StepControl
 from .sweep import Sweep
@@ -92,7 +96,11 @@ class Master:
         self._feed = FeedThrough(system, solve_loops)
         self._sweep = Sweep(system, self._hold, self._feed, sequential=scheme == "gauss_seidel")
         layout = system.layout
-        self._coupled = np.unique(layout.source[layout.factor != 0])
+        sudden = [layout.variables[name].discrete for name in layout.outputs]
+        self._coupled = np.array([k for k in np.unique(layout.source[layout.factor != 0]) if not sudden[k]], np.intp)
+        self._eventful = [
+            (name, p) for name, p in system.participants.items() if type(p).next_event is not Participant.next_event
+        ]
         self._origin, self._count = float(start), 0
         self.time = float(start)
         self.log: list[Event] = []
@@ -101,8 +109,8 @@ class Master:
         self._sizes: list[float] = []  # of the steps between them
         self._largest = np.abs(self._past[0])
         self._loop: CompiledLoop | Literal[False] | None = None  # not looked for yet
-        self._record = Record(system)
-        self._record.add(self.time, self._past[0], self._bonds.residual)
+        self.record = Record(system)
+        self.record.add(self.time, self._past[0], self._bonds.residual)
 
     def step(self) -> float:
         """Take one macro step; the time [s] reached.
@@ -113,12 +121,22 @@ class Master:
         self._advance(self.size)
         return self.time
 
+    def set_step(self, size: float) -> None:
+        """Take macro steps of another size [s] from now on."""
+        if size != self.size:
+            self.size, self._origin, self._count = float(size), self.time, 0
+
     def run(self, until: float, progress: Callable[[float], None] | None = None) -> Run:
         """Step to a time [s], whose last step is cut to end there.
 
         ``progress`` is called with the time after each step. Raises StepError where a participant fails; `result` then
         gives what there is up to the last good step.
         """
+        self.go_to(until, progress)
+        return self.result()
+
+    def go_to(self, until: float, progress: Callable[[float], None] | None = None) -> None:
+        """As `run`, for many short runs whose recording is wanted once, from `result`."""
         if not self.time <= until < math.inf:
             raise InputError(f"cannot run to {until} s: the time is {self.time:.9g} s already; give a later one")
         steps = (until - self.time) / self.size
@@ -131,16 +149,17 @@ class Master:
                 if progress:
                     progress(self.time)
                 continue
+            for _, participant in self._eventful:
+                left = min(left, participant.next_event(self.time) - self.time)
             cut = left < self.size * (1 - _SAME)
             self._advance(left if cut else self.size, keep_size=cut)
             if progress:
                 progress(self.time)
-        return self.result()
 
     def result(self) -> Run:
         """What there is so far."""
         return Run(
-            self._record.dataset(),
+            self.record.dataset(),
             self.steps,
             self.rejected,
             self.evaluations,
@@ -172,10 +191,11 @@ class Master:
 
     def _advance(self, size: float, keep_size: bool = False) -> None:
         """One accepted macro step of at most this size."""
-        states = [p.save() for p in self._participants] if self._repeats else []
+        starter = self._starter()
+        states = [p.save() for p in self._participants] if self._repeats or starter else []
         while True:
             try:
-                outputs = self._trial(size, states)
+                outputs = self._trial(size, states, starter)
                 error = self._error(outputs, size) if self._control else 0.0
             except StepError as failure:
                 if self._control is None or size <= self._control.smallest:
@@ -212,13 +232,13 @@ class Master:
             self._loop = compiled_loop(self.system, self._sweep, self.size) or False
         if self._loop is False or n < 1:
             return False
-        rows = self._record.window(points, min(n, _AT_ONCE))
+        rows = self.record.window(points, min(n, _AT_ONCE))
         done, call, unit, status = self._loop(rows, self._origin, self._count)
         if done:
             self.steps += done
             self.evaluations += done
             self._count += done
-            self._record.count += done
+            self.record.count += done
             self._past = [rows[done + k, 1:].copy() for k in reversed(range(points))]
             self.time = float(rows[points - 1 + done, 0])
         if call:
@@ -236,11 +256,34 @@ class Master:
             named = failure if call == "finite" else self._sweep.failure(unit, self.time, failure)
             raise StepError(f"{named}; last good step ended at {self.time:.9g} s") from None
 
-    def _trial(self, size: float, states: list[object]) -> np.ndarray:
+    def _starter(self) -> QuasiNewton | None:
+        """A solver for the first step, where a held input would cost the hold its order."""
+        plain = self._solver is None and self._control is None
+        if not plain or self.steps or self._hold.degree < 2 or not all(p.can_restore for p in self._participants):
+            return None
+        return QuasiNewton(Iteration())
+
+    def _trial(self, size: float, states: list[object], starter: QuasiNewton | None) -> np.ndarray:
         """Outputs (n_outputs,) at the end of a step, by one sweep or by iteration."""
+        if starter is not None:
+            try:
+                return self._iterated(starter, size, states)
+            except NotConverged as error:
+                self.log.append(Event(self.time, size, f"the start was not iterated ({error}): inputs were held"))
+                self._restore(states)
         if self._solver is None:
             self.evaluations += 1
             return self._sweep(self.time, size, self._past, self._sizes)
+        try:
+            return self._iterated(self._solver, size, states)
+        except NotConverged as error:
+            raise StepError(
+                f"{self.system.name}: the iteration of the step at {self.time:.9g} s did not converge ({error}); "
+                "take smaller steps"
+            ) from None
+
+    def _iterated(self, solver: QuasiNewton, size: float, states: list[object]) -> np.ndarray:
+        """Outputs at the end of a step that are those assumed there; raises NotConverged."""
         guess = self._predicted(size)
         fresh, reached = True, guess
 
@@ -257,13 +300,7 @@ class Master:
 
         scale = np.maximum(self._largest, np.abs(guess))[self._coupled]
         scale[scale == 0] = 1.0
-        try:
-            self._solver.solve(sweep_from, guess[self._coupled], scale)
-        except NotConverged as error:
-            raise StepError(
-                f"{self.system.name}: the iteration of the step at {self.time:.9g} s did not converge ({error}); "
-                "take smaller steps"
-            ) from None
+        solver.solve(sweep_from, guess[self._coupled], scale)
         return reached
 
     def _predicted(self, size: float) -> np.ndarray:
@@ -295,7 +332,9 @@ class Master:
         if self._repeats:
             np.maximum(self._largest, np.abs(outputs), out=self._largest)
         self.steps += 1
-        self._record.add(self.time, outputs, self._bonds.residual)
+        for name, participant in self._eventful:
+            self.log += [Event(self.time, size, f"{name}: {text}") for text in participant.events()]
+        self.record.add(self.time, outputs, self._bonds.residual)
 
     def _first_outputs(self) -> np.ndarray:
         outputs = np.zeros(len(self.system.layout.outputs))

@@ -5,9 +5,11 @@ vector each, in the order of `Participant.variables`, so that the master's loop 
 given once, by name, at initialisation.
 """
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, Literal
 
 import numpy as np
@@ -37,6 +39,9 @@ class Variable:
     depends : tuple of str or None
         For an output: the inputs that change it at once, without a step (direct feed-through). Empty: none.
         None: unknown; the master then moves each input at the start and looks.
+    discrete : bool
+        For an output: it holds its value between sudden changes, as a command does. Whatever reads it is given the
+        value at the start of each step, never a line or parabola through changes.
     """
 
     name: str
@@ -47,6 +52,7 @@ class Variable:
     minimum: float = -np.inf
     maximum: float = np.inf
     depends: tuple[str, ...] | None = ()
+    discrete: bool = False
 
 
 class Participant(ABC):
@@ -56,7 +62,8 @@ class Participant(ABC):
     ``state = save()`` and ``restore(state)`` give exactly the same future, bit for bit, also in another instance of the
     same participant; `can_restore` says whether they exist. A step that fails raises `StepError` and leaves the
     participant so that `restore` still works. `input_order` is how many derivatives of the inputs a step follows,
-    `can_vary_step` whether steps may differ in size.
+    `can_vary_step` whether steps may differ in size, `start_limit` how long `initialize` may take at least [s] however
+    little a step is given, and `unread` which inputs hold no number, with their type: they keep their start values.
     """
 
     name: str
@@ -64,6 +71,8 @@ class Participant(ABC):
     can_restore: bool = False
     input_order: int = 0
     can_vary_step: bool = True
+    start_limit: float = 60.0
+    unread: Mapping[str, str] = MappingProxyType({})
 
     @abstractmethod
     def initialize(self, time: float = 0.0, parameters: Mapping[str, float] | None = None) -> None:
@@ -103,6 +112,14 @@ class Participant(ABC):
     def restore(self, state: Any) -> None:
         """Return to a saved state, exactly."""
         raise NotImplementedError(f"{self.name}: cannot restore a state")  # optional: asked only if `can_restore`
+
+    def next_event(self, time: float) -> float:
+        """When it next does something sudden after a time [s]; no macro step goes past it. Infinity: never."""
+        return math.inf
+
+    def events(self) -> tuple[str, ...]:
+        """What it did during the last step that belongs in the log, a line each; asked once after each good step."""
+        return ()
 
     def compiled_calls(self) -> Any:
         """What `snarelab.cosim.compiled_loop` needs to drive it from C; None where only Python can."""

@@ -1,18 +1,18 @@
 """A participant in a process of its own: it runs beside the others, and when it hangs or dies only the run ends.
 
 One message a step goes each way. What needs no answer (saving, restoring, forgetting a state) travels with the next
-step, and saved states stay in the process, so that a repeated step costs no further messages.
+step, and saved states stay in the process, so that a repeated step costs no further messages. A warden stands between
+(`snarelab.warden`): whatever a participant has started or written to temporary files goes with it.
 """
 
 import contextlib
 import os
 import pickle
-import shutil
 import signal
 import socket
+import struct
 import subprocess
 import sys
-import tempfile
 import weakref
 from collections.abc import Callable, Mapping
 from multiprocessing.connection import Connection
@@ -21,11 +21,17 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..scratch import scratch_root
 from .participant import Participant, StepError
 
-_CHILD = "import sys, snarelab.cosim.process as p; p._serve(int(sys.argv[1]))"
+_CHILD = (
+    "import sys; from snarelab.warden import guard; link, parent = map(int, sys.argv[1:]); guard(link, parent); "
+    "import snarelab.cosim.process as p; p._serve(link)"
+)
 _FAREWELL = 1.0  # s that a process gets to end by itself
+_BURIAL = 10.0  # s for its warden to end what it has left
 _START = 60.0  # s for loading engines, where the time-out for steps is shorter
+_LARGEST = 256 << 20  # bytes of an answer; what claims more is none
 
 
 class OwnProcess(Participant):
@@ -38,7 +44,8 @@ class OwnProcess(Participant):
     *arguments, **keywords
         For ``make``; they are pickled.
     timeout : float
-        Longest wait for a step [s], after which the process is ended; at least 60 s until the first one.
+        Longest wait for a step [s], after which the process is ended. Where the participant asks for more to initialise
+        (`Participant.start_limit`), it has that; for its construction it has at least 60 s.
 
     Raises
     ------
@@ -56,16 +63,19 @@ class OwnProcess(Participant):
         if not timeout > 0:
             raise InputError(f"{self.name}: timeout {timeout} s must be positive")
         here, there = socket.socketpair()
-        scratch = tempfile.mkdtemp(prefix="snarelab-process-")  # a process that is killed cleans up nothing
+        # A process that dies with half an answer sent would else be waited for without end.
+        here.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, struct.pack("@ll", *divmod(int(timeout * 1e6), 10**6)))
+        paths = os.pathsep.join(path for path in sys.path if path)
         self._process = subprocess.Popen(
-            [sys.executable, "-c", _CHILD, str(there.fileno())],
+            [sys.executable, "-c", _CHILD, str(there.fileno()), str(os.getpid())],
             stdin=subprocess.DEVNULL,
             pass_fds=[there.fileno()],
-            env={**os.environ, "TMPDIR": scratch, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)},
+            env={**os.environ, "TMPDIR": scratch_root(), "PYTHONPATH": paths},
+            start_new_session=True,  # Ctrl-C is for the master, which then closes this process
         )
         there.close()
         self._link = Connection(here.detach())
-        self._end = weakref.finalize(self, _end, self._process, self._link, scratch)
+        self._end = weakref.finalize(self, _end, self._process, self._link)
         self._waiting: list[tuple[str, Any]] = []
         self._tokens = 0
         try:
@@ -73,7 +83,8 @@ class OwnProcess(Participant):
         except StepError as error:
             self._end()
             raise InputError(str(error)) from None
-        self.name, self.variables, self.can_restore, self.input_order, self.can_vary_step = facts
+        self.name, self.variables, self.can_restore, self.input_order, self.can_vary_step, start, self.unread = facts
+        self._timeout = max(timeout, start)
         self._shown = np.zeros(len(self.names("output")))
         self._inputs: tuple[np.ndarray, ...] | None = None
 
@@ -153,9 +164,14 @@ class OwnProcess(Participant):
                 raise StepError(
                     f"{self.name}: gave no answer for {self._timeout:g} s {self._doing}; its process was ended"
                 )
-            kind, content = self._link.recv()
+            answer = self._link.recv_bytes(_LARGEST)
         except (EOFError, OSError):
             raise self._lost() from None
+        try:
+            kind, content = pickle.loads(answer)
+        except Exception:  # the participant has written to where answers go
+            self._end()
+            raise StepError(f"{self.name}: its process gave no proper answer {self._doing}, and was ended") from None
         if kind == "done":
             return content
         raise (InputError if kind == "input" else StepError)(content)
@@ -166,6 +182,8 @@ class OwnProcess(Participant):
             self._process.wait(_FAREWELL)
         code = self._process.poll()
         self._end()
+        if code is None:
+            return StepError(f"{self.name}: its process broke off {self._doing}, and was ended")
         how = f"was killed by {signal.Signals(-code).name}" if code and code < 0 else f"ended with status {code}"
         return StepError(f"{self.name}: its process {how} {self._doing}")
 
@@ -184,16 +202,18 @@ class _Token:
         self.waiting.append(("forget", self.number))
 
 
-def _end(process: subprocess.Popen[bytes], link: Connection, scratch: str) -> None:
+def _end(process: subprocess.Popen[bytes], link: Connection) -> None:
+    """Hang up, upon which the warden ends everything."""
     link.close()
-    process.kill()
-    process.wait()
-    shutil.rmtree(scratch, ignore_errors=True)
+    try:
+        process.wait(_BURIAL)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
 
 
 def _serve(descriptor: int) -> None:
     """The other side: answers until told to close, or until nobody is there any more."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the master, which then closes this process
     link = Connection(descriptor)
     participant: Any = None
     states: dict[int, Any] = {}
@@ -202,6 +222,8 @@ def _serve(descriptor: int) -> None:
             waiting, (what, content) = link.recv()
         except EOFError:
             return
+        except OSError:  # a participant that closes what is not its own has closed this
+            os._exit(1)
         answer: tuple[str, Any]
         try:
             for action, number in waiting:
@@ -215,7 +237,8 @@ def _serve(descriptor: int) -> None:
                 make, arguments, keywords = pickle.loads(content)
                 participant = make(*arguments, **keywords)
                 p = participant
-                answer = "done", (p.name, p.variables, p.can_restore, p.input_order, p.can_vary_step)
+                able = p.can_restore, p.input_order, p.can_vary_step
+                answer = "done", (p.name, p.variables, *able, p.start_limit, dict(p.unread))
             elif what == "close":
                 states.clear()
                 participant.close()
@@ -226,7 +249,10 @@ def _serve(descriptor: int) -> None:
             answer = "input" if isinstance(error, InputError) else "step", str(error)
         except Exception as error:  # whatever it is, the master is told and the run's data is kept
             answer = "step", f"{type(error).__name__}: {error}"
-        link.send(answer)
+        try:
+            link.send(answer)
+        except OSError:
+            os._exit(1)
 
 
 def _act(participant: Participant, what: str, content: Any) -> np.ndarray:

@@ -8,15 +8,14 @@ import numpy as np
 import xarray as xr
 
 from ..errors import InputError
-from ..recordings import default_unit
-from ..recordings.signals import is_signal
+from ..recordings.signals import default_unit, is_signal
 from .system import System
 from .units import conversion
 
 
 @dataclass(frozen=True)
 class Event:
-    """Something worth a line in the log: a step rejected, or accepted in spite of its error."""
+    """Something worth a line in the log: a step rejected, accepted in spite of its error, or not started well."""
 
     time: float
     size: float
@@ -89,22 +88,31 @@ class Record:
             self._rows = larger
         return self._rows[self.count - back : self.count + n]
 
-    def dataset(self) -> xr.Dataset:
-        """Everything so far.
+    @property
+    def headers(self) -> list[str]:
+        """Names of the columns of `rows` and `dataset`, time first.
 
         A column is called ``participant.variable [unit]``, or by the variable alone where that is a name that
         recordings have (``q.joint1``, in its default unit) and only one participant shows it; then
         ``residual.<bond> [J]``, what the coupling has made or lost of energy.
         """
-        rows = self._rows[: self.count]
-        columns = {
-            name: ("time", factor * rows[:, 1 + i] + offset) for i, (name, factor, offset) in enumerate(self._columns)
-        }
-        columns |= {
-            f"residual.{name} [J]": ("time", rows[:, 1 + len(self._columns) + i].copy())
-            for i, name in enumerate(self._bonds)
-        }
-        return xr.Dataset(columns, coords={"time": rows[:, 0].copy()})
+        return ["time", *(name for name, _, _ in self._columns), *(f"residual.{name} [J]" for name in self._bonds)]
+
+    def rows(self, first: int = 0) -> np.ndarray:
+        """Rows from one on, (n_rows, n_headers), in the headers' units."""
+        return np.column_stack(self._in_units(first))
+
+    def _in_units(self, first: int) -> list[np.ndarray]:
+        """Columns from a row on, in the headers' order and units."""
+        rows = self._rows[first : self.count]
+        shown = [factor * rows[:, i] + offset for i, (_, factor, offset) in enumerate(self._columns, 1)]
+        return [rows[:, 0].copy(), *shown, *(rows[:, i].copy() for i in range(1 + len(shown), rows.shape[1]))]
+
+    def dataset(self) -> xr.Dataset:
+        """Everything so far, in columns called as in `headers`."""
+        time, *columns = self._in_units(0)
+        named = {name: ("time", column) for name, column in zip(self.headers[1:], columns, strict=True)}
+        return xr.Dataset(named, coords={"time": time})
 
 
 def _columns(system: System) -> list[tuple[str, float, float]]:

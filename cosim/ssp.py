@@ -8,11 +8,11 @@ that its FMU gives, as SSP has it. A system inside a system is dissolved: its co
 
 import posixpath
 import shutil
-import tempfile
 import weakref
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -20,9 +20,11 @@ from xml.etree import ElementTree
 
 from ..errors import InputError, nearest
 from ..files import ZIP_FAULTS
+from ..scratch import scratch_folder
+from .experiment import Setup
 from .fmi_variables import pint_unit
+from .hosting import Hosting
 from .participant import Participant
-from .setup import Hosting, Setup
 from .ssp_parameters import Values, bound_parameters, number, transformation
 from .system import Connection, System
 from .units import conversion
@@ -53,7 +55,7 @@ class _Flat:
 
 def read_ssp(path: Path, hosting: Hosting) -> Setup:
     """Read a system and build its participants; raises InputError with the file's name for whatever is wrong in it."""
-    folder = Path(tempfile.mkdtemp(prefix="snarelab-ssp-"))
+    folder = Path(scratch_folder("ssp-"))
     built: dict[str, Participant] = {}
     try:
         with _opened(path) as archive:
@@ -129,7 +131,7 @@ class _NoDoctype(ElementTree.TreeBuilder):
 
 def _flatten(archive: zipfile.ZipFile, system: ElementTree.Element, path: str, flat: _Flat) -> None:
     """Collect components, connections and parameters of a system and of those inside it."""
-    flat.values += bound_parameters(archive, system, path)
+    flat.values += bound_parameters(partial(parsed, archive), system, path)
     for element in system.iterfind("ssd:Elements/*", _NAMES):
         kind, name = element.tag.rpartition("}")[2], element.get("name", "")
         below = f"{path}.{name}" if path else name
@@ -141,7 +143,7 @@ def _flatten(archive: zipfile.ZipFile, system: ElementTree.Element, path: str, f
             _flatten(archive, element, below, flat)
         elif kind == "Component" and element.get("type", _FMU) == _FMU:
             flat.components[below.replace(".", "_")] = below, element
-            flat.values += bound_parameters(archive, element, below)
+            flat.values += bound_parameters(partial(parsed, archive), element, below)
         else:
             raise InputError(f"element {below!r} is a {element.get('type', kind)}; FMUs and systems can be read")
     kinds = {e.get("name"): _kinds(e) for e in system.iterfind("ssd:Elements/*", _NAMES)} | {None: _kinds(system)}

@@ -2,7 +2,7 @@
 
 import math
 import posixpath
-import zipfile
+from collections.abc import Callable
 from dataclasses import dataclass
 from urllib.parse import unquote
 from xml.etree import ElementTree
@@ -44,14 +44,18 @@ class Values:
     offset: float
 
 
-def bound_parameters(archive: zipfile.ZipFile, element: ElementTree.Element, path: str) -> list[Values]:
+Read = Callable[[str], ElementTree.Element]
+"""Gives the root of a file of the archive, by its name there."""
+
+
+def bound_parameters(read: Read, element: ElementTree.Element, path: str) -> list[Values]:
     """All values bound to a component or system at ``path`` ("" is the outermost system)."""
     found: list[Values] = []
     for binding in element.iterfind("ssd:ParameterBindings/ssd:ParameterBinding", _NAMES):
-        values = _content(archive, binding, binding.find("ssd:ParameterValues/ssv:ParameterSet", _NAMES))
+        values = _content(read, binding, binding.find("ssd:ParameterValues/ssv:ParameterSet", _NAMES))
         mapping = binding.find("ssd:ParameterMapping", _NAMES)
         inside = None if mapping is None else mapping.find("ssm:ParameterMapping", _NAMES)
-        targets = {} if mapping is None else _targets(_content(archive, mapping, inside))
+        targets = {} if mapping is None else _targets(_content(read, mapping, inside))
         prefix = binding.get("prefix", "")
         for parameter in values.iterfind("ssv:Parameters/ssv:Parameter", _NAMES):
             value, unit = _value(parameter)
@@ -65,17 +69,13 @@ def bound_parameters(archive: zipfile.ZipFile, element: ElementTree.Element, pat
     return found
 
 
-def _content(
-    archive: zipfile.ZipFile, holder: ElementTree.Element, inside: ElementTree.Element | None
-) -> ElementTree.Element:
+def _content(read: Read, holder: ElementTree.Element, inside: ElementTree.Element | None) -> ElementTree.Element:
     """What a binding or mapping holds itself, or the file that it names."""
-    from .ssp import parsed
-
     if inside is not None:
         return inside
     if holder.get("source") is None:
         raise InputError("a parameter binding has neither values nor a source; give one")
-    return parsed(archive, posixpath.normpath(unquote(holder.get("source", ""))))
+    return read(posixpath.normpath(unquote(holder.get("source", ""))))
 
 
 def _targets(mapping: ElementTree.Element) -> dict[str, list[tuple[str, float, float, bool]]]:

@@ -6,10 +6,11 @@ from typing import Any
 from xml.etree import ElementTree
 
 from ..errors import InputError
+from ..extras import needed_for
 from ..files import written_whole
+from .experiment import Setup
 from .participant import Participant
 from .process import OwnProcess
-from .setup import Setup
 from .ssp import ENTRY, RUN, SSC, SSD
 from .ssp_parameters import SSV
 
@@ -25,8 +26,8 @@ def write_ssp(setup: Setup, path: str | Path) -> None:
     pass over; step control, power bonds and the limits of an iteration stay behind. The file appears whole or not at
     all. Raises InputError for participants that are no FMUs.
     """
-    import fmpy
-
+    with needed_for("writing an SSP file"):
+        import fmpy
     path, system = Path(path), setup.system
     files = {name: _file(name, participant) for name, participant in system.participants.items()}
     stored: dict[Path, str] = {}

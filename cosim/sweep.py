@@ -62,6 +62,9 @@ class Sweep:
             range(len(self._participants)), key=lambda i: type(self._participants[i]).begin is Participant.begin
         )
         layout = self._layout
+        sudden = np.array([layout.variables[name].discrete for name in layout.outputs], dtype=bool)
+        jumps = sudden[layout.source] & (layout.factor != 0)
+        self._jumps = [np.flatnonzero(jumps[at]) for at in layout.input_slices]
         self.mean_inputs = np.zeros(len(layout.inputs))
         self._reading = [
             (
@@ -112,7 +115,7 @@ class Sweep:
 
     def plan(self, size: float) -> Plan | None:
         """What a compiled loop needs; None where it could not do the same."""
-        if any(self._orders) or self._feed.loops:
+        if any(self._orders) or self._feed.loops or any(len(jumps) for jumps in self._jumps):
             return None
         back, ahead = (tuple(start - k for k in range(self._hold.degree + 1)) for start in (0.0, 1.0))
         before = weights(self._hold, back, size, 0)[0], end_weights(back)
@@ -142,7 +145,7 @@ class Sweep:
         begun = []
         for i in self._starts:
             try:
-                self._give(i, held[self._orders[i]], size)
+                self._give(i, held[self._orders[i]], size, past[0])
                 self._participants[i].begin(time, size)
                 begun.append(i)
             except Exception as error:  # the others must come to rest before anything else is done
@@ -179,7 +182,7 @@ class Sweep:
         for i, participant in enumerate(self._participants):
             where = self._layout.output_slices[i]
             try:
-                self._give(i, held[self._orders[i]], size)
+                self._give(i, held[self._orders[i]], size, past[0])
                 participant.begin(time, size)
                 participant.finish()
                 if i in self._follow:
@@ -198,15 +201,23 @@ class Sweep:
                     held[order][-1][where] = combine(row, known)
         return outputs
 
-    def _give(self, i: int, held: list[np.ndarray], size: float) -> None:
-        """Set a participant's inputs, and their derivatives where it takes them."""
+    def _give(self, i: int, held: list[np.ndarray], size: float, start: np.ndarray) -> None:
+        """Set a participant's inputs, and their derivatives where it takes them.
+
+        What comes from a discrete output is what that was at the step's start, ``start`` (n_outputs,).
+        """
         source, factor, offset, mean, still = self._reading[i]
+        jumps = self._jumps[i]
         values = factor * held[0][source] + offset
+        if len(jumps):
+            values[jumps] = factor[jumps] * start[source[jumps]] + offset[jumps]
         participant, order = self._participants[i], self._orders[i]
         participant.set_inputs(values)
         mean[:] = values
         if participant.input_order and not self._hold.middle:
             slopes = [factor * row[source] for row in held[1 : order + 1]]
+            for slope in slopes if len(jumps) else ():
+                slope[jumps] = 0.0
             first, second = (*slopes, still, still)[:2]
             participant.set_input_derivatives(first, second)
             if slopes:

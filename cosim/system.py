@@ -177,6 +177,9 @@ class System:
         if participant not in self.participants:
             known = nearest(participant, self.participants)
             return [f"{place}: there is no participant {participant!r}; nearest is {known!r}"]
+        text = self.participants[participant].unread.get(name.partition(".")[2])
+        if text is not None:
+            return [f"{place}: {name!r} holds {text}, not a number; nothing can be connected to it, leave it out"]
         fitting = [n for c in (wanted, other) if c for n in self.names(c) if n.startswith(f"{participant}.")]
         reason = f"is an {variable.causality}, not an {wanted}" if variable else f"is no variable of {participant}"
         hint = f"nearest {wanted} is {nearest(name, fitting)!r}" if fitting else f"{participant} has no {wanted}"

@@ -30,9 +30,10 @@ from typing import Any
 
 from ..errors import InputError, nearest
 from ..files import toml_table
+from .experiment import Setup
+from .hosting import Hosting
 from .iteration import Iteration
 from .participant import Participant
-from .setup import Hosting, Setup
 from .step_control import StepControl
 from .system import Connection, PowerBond, System
 

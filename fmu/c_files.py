@@ -1,12 +1,13 @@
 """Source files of an FMU: the model's own, generated, and ours and FMI's, copied."""
 
 import hashlib
+import math
 from importlib.resources import files
 from typing import Any
 
 import casadi as ca
 
-from ..errors import InputError
+from ..extras import needed_for
 from .equations import Equations, Variable
 
 _OURS = ("instance.h", "instance.c", "calls.c")
@@ -45,13 +46,19 @@ def model_header(variables: tuple[Variable, ...], shapes: dict[str, int], conten
     digest = hashlib.sha256("\0".join([repr(variables), repr(shapes), content]).encode()).hexdigest()
     token = f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"
     names = ", ".join(f'"{name}"' for name in ("time", *(v.name for c in groups.values() for v in c)))
+    given = groups["parameter"]
+    least = [v.minimum if v.refuses else -math.inf for v in given]
+    most = [v.maximum if v.refuses else math.inf for v in given]
     lines = [
         "/* Written at export. */",
+        "#include <math.h>",
         f'#define MODEL_TOKEN "{token}"',
         *(f"#define {name} {value}" for name, value in shapes.items()),
         *(f"#define N_{causality.upper()}S {len(members)}" for causality, members in groups.items()),
         f"static const double START_INPUT[] = {{{_numbers([v.start for v in groups['input']])}}};",
         f"static const double START_PARAMETER[] = {{{_numbers([v.start for v in groups['parameter']])}}};",
+        f"static const double LEAST_PARAMETER[] = {{{_numbers(least)}}};",
+        f"static const double MOST_PARAMETER[] = {{{_numbers(most)}}};",
         "static const char FIXED_PARAMETER[] = {"
         + ", ".join(str(int(v.fixed)) for v in groups["parameter"])
         + (", 0};" if groups["parameter"] else "0};"),
@@ -62,7 +69,8 @@ def model_header(variables: tuple[Variable, ...], shapes: dict[str, int], conten
 
 def _numbers(values: list[float]) -> str:
     """C's spelling of numbers, with one zero more: an array in C has at least one element."""
-    return ", ".join([*(repr(float(value)) for value in values), "0.0"])
+    spelled = {math.inf: "INFINITY", -math.inf: "-INFINITY"}
+    return ", ".join([*(spelled.get(value) or repr(float(value)) for value in values), "0.0"])
 
 
 def _generated(equations: Equations) -> str:
@@ -79,10 +87,6 @@ def _generated(equations: Equations) -> str:
 def _copied(version: int, ours: tuple[str, ...]) -> dict[str, str]:
     folder = files("snarelab.fmu") / "c"
     texts = {name: (folder / name).read_text(encoding="utf-8") for name in (*ours, f"fmi{version}.c")}
-    try:
+    with needed_for("an export, for FMI's headers,"):
         headers = files("fmpy") / "c-code"
-    except ModuleNotFoundError:
-        raise InputError(
-            "an export takes FMI's headers from the package FMPy, which is missing: pip install fmpy"
-        ) from None
     return texts | {name: (headers / name).read_text(encoding="utf-8") for name in _HEADERS[version]}

@@ -35,6 +35,8 @@ class Variable:
         Parameters only: cannot be changed once initialization has ended.
     depends : tuple of str or None
         For an output: the inputs that change it at once. None: unknown, which counts as all.
+    refuses : bool
+        Parameters only: whether values out of bounds are refused, or the bounds are for the importer's information.
     """
 
     name: str
@@ -46,6 +48,7 @@ class Variable:
     maximum: float = np.inf
     fixed: bool = False
     depends: tuple[str, ...] | None = ()
+    refuses: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,9 +118,13 @@ class Ledger:
         bounds: tuple[float, float] = (-np.inf, np.inf),
         fixed: bool = False,
     ) -> ca.SX:
-        """A new parameter and its symbol; bounds that do not hold the start are left out."""
+        """A new parameter and its symbol; bounds that do not hold the start are left out.
+
+        A fixed one says where the motion starts: beyond a joint's limits, the model's equations hold as well.
+        """
         low, high = bounds if bounds[0] <= start <= bounds[1] else (-np.inf, np.inf)
-        return self._added(self._parameters, Variable(name, "parameter", unit, start, description, low, high, fixed))
+        made = Variable(name, "parameter", unit, start, description, low, high, fixed, refuses=not fixed)
+        return self._added(self._parameters, made)
 
     def output(self, name: str, unit: str, expression: ca.SX, description: str) -> None:
         """A new output."""

@@ -1,13 +1,12 @@
 """The Python process of a hosted FMU: builds one participant and answers the FMU's library over a socket.
 
-A copy of this file lies in each hosted FMU, beside ``host.json``, which says what to build; the package is imported
-when the FMU is instantiated. It is where an FMU and the co-simulation's participants meet; it is run, never imported.
-See ``hosted.c`` for the messages.
+A copy of this file lies in each hosted FMU, beside ``host.json``, which says what to build, and ``warden.py``, which
+ends this process with the importer; the package is imported when the FMU is instantiated. It is where an FMU and the
+co-simulation's participants meet; it is run, never imported. See ``hosted.c`` for the messages.
 """
 
 import json
 import os
-import pickle
 import socket
 import struct
 import sys
@@ -33,6 +32,7 @@ class Host:
         module = import_module(config["module"])
         self.numpy = import_module("numpy")
         self.step_error = import_module("snarelab.cosim.participant").StepError
+        self.state = import_module("snarelab.fmu.state")
         self.participant = getattr(module, config["class"])(**config["arguments"])
         for causality in ("input", "parameter", "output"):
             if list(self.participant.names(causality)) != config[causality]:
@@ -66,14 +66,17 @@ class Host:
 
     def save(self, _: bytes) -> bytes:
         """The state's bytes."""
-        return pickle.dumps(self.participant.save(), protocol=5)
+        return self.state.dumps(self.participant.save())
 
     def restore(self, payload: bytes) -> bytes:
         """Start time, parameters, state's bytes; a participant that was built otherwise is built anew first."""
         split = 8 * (1 + self.n_parameters)
+        state = self.state.loads(payload[split:])
         if self.built != payload[:split]:
             self._build(payload[:split])
-        self.participant.restore(pickle.loads(payload[split:]))
+        self.built = None  # a restore that fails half-way leaves what must be built anew
+        self.participant.restore(state)
+        self.built = payload[:split]
         return self.numpy.asarray(self.participant.outputs(), float).tobytes()
 
     def _build(self, numbers: bytes) -> None:
@@ -96,9 +99,23 @@ def _received(link: socket.socket, size: int) -> bytes:
     return bytes(data)
 
 
+def _guarded() -> socket.socket:
+    """The importer's socket, in a process that ends with the importer; a model's standard input is empty."""
+    sys.path.pop(0)  # this folder: nothing in it is for the model
+    source = Path(__file__).with_name("warden.py")
+    warden: dict[str, Any] = {"__name__": "snarelab_warden"}
+    exec(compile(source.read_text(encoding="utf-8"), str(source), "exec"), warden)
+    link = socket.socket(fileno=os.dup(0))
+    nothing = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(nothing, 0)
+    os.close(nothing)
+    warden["guard"](link.fileno(), int(sys.argv[1]))
+    return link
+
+
 def main() -> None:
     """Answer until the importer closes the socket."""
-    link = socket.socket(fileno=os.dup(0))
+    link = _guarded()
     host: Host | None = None
     while True:
         code, size = _HEAD.unpack(_received(link, _HEAD.size))

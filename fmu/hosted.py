@@ -140,6 +140,7 @@ def write_hosted_class(cls: type, arguments: dict[str, Any], path: str | Path, v
     resources = {
         "host.json": json.dumps({"token": token, **config}, indent=1),
         "host.py": (files("snarelab.fmu") / "host.py").read_text(encoding="utf-8"),
+        "warden.py": (files("snarelab") / "warden.py").read_text(encoding="utf-8"),
         "python.txt": sys.executable + "\n",
     }
     return pack(about, variables, sources, resources, path, version)

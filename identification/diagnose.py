@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks.run import early_checks, run_checks
 from ..models.effects import effects
 from ..models.hidden_state import prepare
 from ..models.model import Model
@@ -18,11 +19,13 @@ from ..models.rigid_body import RigidBody
 from ..models.snare.setup import SnareTree
 from .answer import report_on
 from .confirm import confirm
+from .data_fault import contradict, data_fault
 from .diagnosis import Diagnosis, Step
 from .fitting.assembly import Assembly
 from .fitting.base_parameters import base_parameters
 from .fitting.experiment import Experiment, demand_apart, load_experiments, scales, with_silence
 from .fitting.fit import Fit, channel_rms, fit
+from .fitting.recorded import read_all, with_recorded_joints
 from .identify import demand_one_process, inertial_values, physical
 from .links.answer import with_links
 from .links.diagnose import diagnose_links
@@ -53,6 +56,7 @@ def diagnose(
     progress: Callable[[str], None] = lambda _: None,
     seed: int = 0,
     jobs: int | None = None,
+    anyway: bool = False,
 ) -> Answer:
     """Find, name, add and confirm the physics that a model leaves out.
 
@@ -69,6 +73,8 @@ def diagnose(
         Of bootstraps and nulls.
     jobs : int or None
         Processes in which captures are simulated; None: one a core, at most four. For captures only.
+    anyway : bool
+        Go on where recordings and model contradict each other; else the verdict is ``data_fault``.
 
     Raises
     ------
@@ -84,10 +90,18 @@ def diagnose(
     demand_one_process(model, jobs)
     progress("reading and conditioning the recordings")
     prepare(effects().values())
+    *read, held = read_all(model, [*recordings, holdout])
+    model = with_recorded_joints(model, [*read, held])
     body = RigidBody(model.tree)
-    train = with_silence(load_experiments(model, recordings, body))
+    checks = early_checks(model, [*read, held])
+    if contradict(checks) and not anyway:
+        return Answer(data_fault(model, checks), model)
+    train = with_silence(load_experiments(model, recordings, body, datasets=read))
     band = min(e.motion.band for e in train)
-    locked = with_silence(load_experiments(model, [holdout], body, band))
+    locked = with_silence(load_experiments(model, [holdout], body, band, datasets=[held]))
+    checks = run_checks(model, [*read, held], [*train, *locked], checks, progress)
+    if contradict(checks) and not anyway:
+        return Answer(data_fault(model, checks, [*train, *locked]), model)
     base = base_parameters(body) if model.inertia == "free" else None
     best = confirm(search(model, base, scales(train), train, progress=progress, seed=seed), train, locked, progress)
     last, rejected = best, {t.judged.placed.key: t for t in best.rejected}
@@ -121,7 +135,7 @@ def diagnose(
     )
     if links:
         diagnosis, after = with_links(diagnosis, after, links, compared)
-    return Answer(diagnosis, after)
+    return Answer(replace(diagnosis, checks=checks, notes=(*model.tree.notes, *diagnosis.notes)), after)
 
 
 def _steps(

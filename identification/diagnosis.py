@@ -7,6 +7,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks.finding import Finding as Check
+
 Array = NDArray[np.float64]
 
 
@@ -143,7 +145,7 @@ class Diagnosis:
 
     Parameters
     ----------
-    verdict : "missing_physics", "adequate" or "unknown_effect"
+    verdict : "data_fault", "missing_physics", "adequate" or "unknown_effect"
     sentence : str
         The verdict in one or two sentences, with names, places and numbers.
     description : str
@@ -166,9 +168,11 @@ class Diagnosis:
         Conditioning and excitation, in words.
     band : float
         Analysis band's edge [Hz].
+    checks : tuple of Check
+        What of the recordings and the model is not as it should be; a ``data_fault`` where they contradict each other.
     """
 
-    verdict: Literal["missing_physics", "adequate", "unknown_effect"]
+    verdict: Literal["data_fault", "missing_physics", "adequate", "unknown_effect"]
     sentence: str
     description: str
     model: str
@@ -182,6 +186,7 @@ class Diagnosis:
     limits: tuple[Limit, ...]
     notes: tuple[str, ...]
     band: float
+    checks: tuple[Check, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """The published form: plain dicts, lists, numbers and text."""
@@ -190,6 +195,7 @@ class Diagnosis:
             "sentence": self.sentence,
             "description": self.description,
             "model": self.model,
+            "checks": [c.to_json() for c in self.checks],
             "effects": [_finding(e) for e in self.effects],
             "location": [
                 {

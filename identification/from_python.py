@@ -1,6 +1,6 @@
-"""The commands as Python calls: `diagnose`, `identify` and `simulate` on files or on what is already loaded.
+"""The commands as Python calls: `diagnose`, `identify`, `check` and `simulate` on files or on what is already loaded.
 
-The package gives them as ``snarelab.diagnose``, ``snarelab.identify`` and ``snarelab.simulate``.
+The package gives them as ``snarelab.diagnose``, ``snarelab.identify``, ``snarelab.check`` and ``snarelab.simulate``.
 """
 
 import re
@@ -10,18 +10,19 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeAlias
 
+import numpy as np
 import pandas as pd
-import pyarrow as pa
 import xarray as xr
 
+from ..checks import run as checking
 from ..errors import InputError
 from ..models.model import Model
 from ..models.model_file import load_model
-from ..recordings import write_recording
+from ..recordings import write_frame
 from . import diagnose as diagnosing
 from . import identify as identifying
 from . import simulate as simulating
-from .results import DiagnosisResult, IdentificationResult, ParameterEstimate
+from .results import CheckResult, DiagnosisResult, IdentificationResult, ParameterEstimate
 
 ModelLike: TypeAlias = str | Path | Model
 """A model file's path, or a `Model` that was loaded."""
@@ -38,6 +39,7 @@ def diagnose(
     progress: Callable[[str], None] = lambda _: None,
     seed: int = 0,
     jobs: int | None = None,
+    anyway: bool = False,
 ) -> DiagnosisResult:
     """Find, name and add the physics that a model leaves out; confirm it on a recording that the fit never sees.
 
@@ -55,6 +57,8 @@ def diagnose(
         Of bootstraps and nulls.
     jobs : int, optional
         Processes in which captures are simulated, by default one a core, at most four; other systems refuse it.
+    anyway : bool
+        Go on where recordings and model contradict each other; the verdict is else ``data_fault``.
 
     Returns
     -------
@@ -87,7 +91,9 @@ def diagnose(
     """
     given = _model(model)
     with _as_files([*_several(recordings), holdout]) as paths:
-        answer = diagnosing.diagnose(given, paths[:-1], paths[-1], progress=progress, seed=seed, jobs=jobs)
+        answer = diagnosing.diagnose(
+            given, paths[:-1], paths[-1], progress=progress, seed=seed, jobs=jobs, anyway=anyway
+        )
     return DiagnosisResult(answer.diagnosis, answer.model)
 
 
@@ -149,6 +155,44 @@ def identify(
     return IdentificationResult(parameters, published["fit"], published["condition"], found.model, published)
 
 
+def check(
+    model: ModelLike,
+    recordings: RecordingLike | Sequence[RecordingLike],
+    *,
+    progress: Callable[[str], None] = lambda _: None,
+) -> CheckResult:
+    """See whether recordings can belong to a model: units, signs, channels, gravity, clocks, and one another.
+
+    Parameters
+    ----------
+    model : path or Model
+        What is believed.
+    recordings : path, xarray.Dataset or pandas.DataFrame, or a sequence of them
+    progress : callable
+        Told in a few words what is under way.
+
+    Returns
+    -------
+    CheckResult
+        Findings, each with a place, a message and the line that mends it; prints as one line each.
+
+    Raises
+    ------
+    InputError
+        Whatever is wrong with the model or a recording, in one line.
+
+    Examples
+    --------
+    >>> import snarelab
+    >>> from importlib.resources import files
+    >>> arm = files("snarelab.studies") / "bundled"
+    >>> snarelab.check(arm / "arm3.toml", [arm / "train.csv", arm / "holdout.csv"]).checks
+    ()
+    """
+    with _as_files(_several(recordings)) as paths:
+        return CheckResult(*checking.check_file(model, paths, progress=progress))
+
+
 def simulate(model: ModelLike, motion: RecordingLike | None = None) -> xr.Dataset:
     """Torque that a model gives along a recorded motion; what the sensors of a capture read.
 
@@ -206,20 +250,19 @@ def _as_files(recordings: Sequence[RecordingLike]) -> Iterator[list[str | Path]]
             if isinstance(recording, str | Path):
                 written[id(recording)] = recording
                 continue
-            path = Path(folder) / f"recording {k}.parquet"
+            if isinstance(recording, xr.Dataset):
+                table = recording.to_dataframe().reset_index()
+            elif isinstance(recording, pd.DataFrame):
+                table = recording.reset_index() if recording.index.name else recording
+            else:
+                raise InputError(
+                    f"recording {k}: is a {type(recording).__name__}; give a path, an xarray.Dataset or a "
+                    "pandas.DataFrame"
+                )
+            path = Path(folder) / f"recording {k}.csv"
             try:
-                if isinstance(recording, pd.DataFrame):
-                    recording.to_parquet(path)
-                elif isinstance(recording, xr.Dataset):
-                    write_recording(recording, path)
-                else:
-                    raise InputError(
-                        f"recording {k}: is a {type(recording).__name__}; give a path, an xarray.Dataset or a "
-                        "pandas.DataFrame"
-                    )
-            except InputError:
-                raise
-            except (ValueError, TypeError, pa.ArrowException) as error:
+                write_frame(_numbers(table), path)
+            except (ValueError, TypeError) as error:
                 said = " ".join(str(error).split())
                 raise InputError(f"recording {k}: is no table of numbers: {said}; give a column a signal") from None
             written[id(recording)] = path
@@ -227,4 +270,19 @@ def _as_files(recordings: Sequence[RecordingLike]) -> Iterator[list[str | Path]]
             yield [written[id(recording)] for recording in recordings]
         except InputError as error:
             # The caller knows no file; a recording's number is its place among all that were given.
-            raise InputError(re.sub(rf"{re.escape(folder)}/(recording \d+)\.parquet", r"\1", str(error))) from None
+            raise InputError(re.sub(rf"{re.escape(folder)}/(recording \d+)\.csv", r"\1", str(error))) from None
+
+
+def _numbers(table: pd.DataFrame) -> pd.DataFrame:
+    """Every column as numbers, stamps as seconds since their epoch; ValueError or TypeError where one is neither."""
+    columns: dict[str, np.ndarray] = {}
+    for position, name in enumerate(table.columns):
+        if not isinstance(name, str):
+            raise TypeError(f"column {name!r} has no name")
+        values = table.iloc[:, position]
+        if pd.api.types.is_datetime64_any_dtype(values):
+            since = values.dt.tz_convert(None) if values.dt.tz is not None else values
+            columns.setdefault(name, (since - pd.Timestamp(0)).dt.total_seconds().to_numpy())
+        else:
+            columns.setdefault(name, values.to_numpy(dtype=float, na_value=np.nan))
+    return pd.DataFrame(columns)

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..checks.finding import Finding as Check
+from ..checks.run import early_checks, run_checks
 from ..errors import InputError
 from ..models.floating.tree import channel
 from ..models.inertia import Array
@@ -19,6 +21,7 @@ from .fitting.consistent_inertia import ConsistentInertia, consistent_inertia
 from .fitting.experiment import Experiment, demand_apart, load_experiments, scales, with_silence
 from .fitting.fit import Fit, channel_rms, fit
 from .fitting.friction_curve import friction_curves, identifiable
+from .fitting.recorded import read_all, with_recorded_joints
 
 if TYPE_CHECKING:
     from .snare.identify import IdentifiedCaptures
@@ -37,6 +40,7 @@ class Identified:
     holdout: tuple[Experiment, ...]
     base: BaseParameters | None
     inertia: ConsistentInertia | None
+    checks: tuple[Check, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """The published form."""
@@ -68,13 +72,19 @@ class Identified:
                     entry["unit"] = "N" if joint.kind == "prismatic" else "N*m"
         answer: dict[str, Any] = {
             "model": self.model.name,
+            "checks": [c.to_json() for c in self.checks],
             "parameters": parameters,
             "fit": fits,
             "condition": found.condition,
             "band": {"value": self.train[0].motion.band, "unit": "Hz"},
             "starts": {"tried": found.starts, "agreed": found.agreed},
             "notes": [
-                f"{Path(e.motion.path).name}: {note}" for e in (*self.train, *self.holdout) for note in e.motion.notes
+                *self.model.tree.notes,
+                *(
+                    f"{Path(e.motion.path).name}: {note}"
+                    for e in (*self.train, *self.holdout)
+                    for note in e.motion.notes
+                ),
             ],
         }
         curves = friction_curves(found, self.train)
@@ -141,16 +151,24 @@ def identify(
         return identify_captures(model, recordings, holdout, progress=progress, jobs=jobs)
     demand_one_process(model, jobs)
     progress("reading and conditioning the recordings")
+    read = read_all(model, [*recordings, *holdout])
+    model = with_recorded_joints(model, read)
+    fitted, held = read[: len(recordings)], read[len(recordings) :]
     body = RigidBody(model.tree)
-    train = with_silence(load_experiments(model, recordings, body))
+    checks = early_checks(model, read)
+    try:
+        train = with_silence(load_experiments(model, recordings, body, datasets=fitted))
+    except InputError as error:
+        raise InputError(f"{error}; {checks[0].message}: {checks[0].mend}" if checks else error) from None
     band = min(e.motion.band for e in train)
-    locked = with_silence(load_experiments(model, holdout, body, band)) if holdout else []
+    locked = with_silence(load_experiments(model, holdout, body, band, datasets=held)) if holdout else []
+    checks = run_checks(model, read, [*train, *locked], checks, progress)
     base = base_parameters(body) if model.inertia == "free" else None
     assembly = Assembly(model.tree, model.effects, base, scales(train), model.values)
     found = fit(assembly, train, progress=progress, seed=seed)
     found, inertia = physical(found, train)
     values = {**model.values, **assembly.values(found.theta), **inertial_values(model, inertia)}
-    return Identified(replace(model, values=values), found, tuple(train), tuple(locked), base, inertia)
+    return Identified(replace(model, values=values), found, tuple(train), tuple(locked), base, inertia, checks)
 
 
 def demand_one_process(model: Model, jobs: int | None) -> None:

@@ -1,19 +1,28 @@
 """What the Python calls give back: frozen results that show themselves as text and, in a notebook, as tables."""
 
+import base64
 from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
+
 from .. import __version__
+from ..checks.finding import Finding as Check
+from ..errors import InputError
 from ..models.model import Model
 from ..models.model_write import save_model
 from ..report.html import folded, paragraph, table
+from .data_fault import contradict
 from .diagnosis import ChannelFit, Diagnosis, Finding, Step
+from .report.figures import before_and_after
 from .report.findings import STATUS, missing
+from .report.fit import changes, most_changed
 from .report.page import write_report
 from .report.words import number, percent, unit_words, with_std, words
+from .summary import check_lines, parameter_table, printed
 
 # Colours come from the notebook, so that a result reads on its light page and on its dark one.
 _STYLE = """<style>
@@ -27,6 +36,21 @@ _STYLE = """<style>
 .snarelab-result h3{font-size:1.05em;margin:.9rem 0 .2rem}
 .snarelab-result summary{cursor:pointer}
 </style>"""
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A picture that a notebook shows: ``svg`` holds its bytes."""
+
+    svg: bytes
+
+    def _repr_svg_(self) -> str:
+        return self.svg.decode("utf-8")
+
+    def _repr_html_(self) -> str:
+        data = base64.b64encode(self.svg).decode("ascii")
+        source = f'src="data:image/svg+xml;base64,{data}"'
+        return f'<img alt="measured, model before and after" style="max-width:100%" {source}>'
 
 
 @dataclass(frozen=True, repr=False)
@@ -48,7 +72,7 @@ class DiagnosisResult:
 
     @property
     def verdict(self) -> str:
-        """``missing_physics``, ``adequate`` or ``unknown_effect``."""
+        """``data_fault``, ``missing_physics``, ``adequate`` or ``unknown_effect``."""
         return self.diagnosis.verdict
 
     @property
@@ -62,6 +86,11 @@ class DiagnosisResult:
         return self.diagnosis.effects
 
     @property
+    def checks(self) -> tuple[Check, ...]:
+        """What of the recordings and the model is not as it should be, each with the line that mends it."""
+        return self.diagnosis.checks
+
+    @property
     def steps(self) -> tuple[Step, ...]:
         """The model as given and after each effect added: relative misfit on both sets (0 to 1)."""
         return self.diagnosis.steps
@@ -70,6 +99,28 @@ class DiagnosisResult:
     def fit(self) -> tuple[ChannelFit, ...]:
         """Misfit of every channel before and after, in the channel's unit, and its noise floor."""
         return self.diagnosis.fit
+
+    def to_frame(self) -> pd.DataFrame:
+        """What was found as a table: a row a parameter, with value, deviation, unit and the effect's probability."""
+        rows = [
+            (f.name, f.at, f.probability, name, e.value, e.std, e.unit, e.at_bound)
+            for f in self.effects
+            for name, e in f.parameters.items()
+        ]
+        heads = ["effect", "at", "probability", "parameter", "value", "std", "unit", "at_bound"]
+        return pd.DataFrame(rows, columns=heads)
+
+    def plot(self, channel: str | None = None) -> Drawing:
+        """Measurement and model before and after on a channel, held-out; by default on the one that changed most.
+
+        Shows itself in a notebook; its ``svg`` are the bytes of the picture. Raises InputError for another channel.
+        """
+        traces = {trace.channel: trace for trace in most_changed(self.diagnosis)}
+        name = next(iter(traces), "") if channel is None else channel
+        if name not in traces:
+            raise InputError(f"channel {name!r} was not recorded; there are {', '.join(traces) or 'none'}")
+        trace = traces[name]
+        return Drawing(before_and_after(trace, changes([trace])))
 
     def to_json(self) -> dict[str, Any]:
         """What ``snarelab diagnose --json`` writes: plain dicts, lists, numbers and text."""
@@ -85,11 +136,7 @@ class DiagnosisResult:
 
     def __str__(self) -> str:
         """What the command prints."""
-        lines = [
-            f"  {step.label:<60} fitted {100 * step.train:6.2f} %   held out {100 * step.holdout:6.2f} %"
-            for step in self.steps
-        ]
-        return "\n".join([self.sentence, *lines])
+        return printed(self.diagnosis)
 
     __repr__ = __str__
 
@@ -99,10 +146,38 @@ class DiagnosisResult:
         return _shown(
             f'<span class="status">{STATUS[self.diagnosis.verdict]}</span>\n'
             + paragraph(self.sentence)
-            + table("Relative misfit over all channels", ["Model", "Fitted", "Held out"], rows, (1, 2), wide=False)
+            + (self.plot()._repr_html_() if self.diagnosis.traces else "")
+            + table("Relative misfit over all channels", ["Model", "Training", "Held-out"], rows, (1, 2), wide=False)
             + folded(heading, cards)
             + folded("Notes", "".join(map(paragraph, self.diagnosis.notes)))
         )
+
+
+@dataclass(frozen=True, repr=False)
+class CheckResult:
+    """What `check` found: ``checks`` on the recordings of ``model``, those of contradiction first."""
+
+    model: str
+    checks: tuple[Check, ...]
+
+    @property
+    def sound(self) -> bool:
+        """Whether nothing in the recordings contradicts the model."""
+        return not contradict(self.checks)
+
+    def to_json(self) -> dict[str, Any]:
+        """What ``snarelab check --json`` writes: plain dicts, lists, numbers and text."""
+        return {"model": self.model, "sound": self.sound, "checks": [c.to_json() for c in self.checks]}
+
+    def __str__(self) -> str:
+        """What the command prints."""
+        head = "Nothing in the recordings contradicts the model." if self.sound else "Recordings and model contradict."
+        return "\n".join([head, *check_lines([c.to_json() for c in self.checks])])
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        return _shown(f"<pre>{escape(str(self))}</pre>")
 
 
 @dataclass(frozen=True)
@@ -146,6 +221,10 @@ class IdentificationResult:
     model: Model
     published: Mapping[str, Any]
 
+    def to_frame(self) -> pd.DataFrame:
+        """The parameters as a table, a row each."""
+        return pd.DataFrame([vars(p) for p in self.parameters])
+
     def to_json(self) -> dict[str, Any]:
         """What ``snarelab identify --json`` writes: plain dicts, lists, numbers and text."""
         return dict(self.published)
@@ -156,24 +235,16 @@ class IdentificationResult:
 
     def __str__(self) -> str:
         """What the command prints."""
-        lines = [f"{'effect':<26}{'at':<16}{'parameter':<24}{'value':>12}{'std':>11}  unit"]
-        for p in self.parameters:
-            flag = "  (at its bound)" if p.at_bound else ""
-            std = "unknown" if p.std is None else f"{p.std:.2g}"
-            lines.append(f"{p.effect:<26}{p.at:<16}{p.name:<24}{p.value:>12.5g}{std:>11}  {p.unit}{flag}")
-        lines += [
-            f"{channel} {role}: RMS residual {rms:.4g} {unit}, {100 * relative:.2f} % of the measured"
-            for channel, role, rms, relative, unit in self._misfits()
-        ]
-        return "\n".join([*lines, f"condition number {self.condition:.3g}"])
+        parameters = [vars(p) for p in self.parameters]
+        return parameter_table({**self.published, "parameters": parameters, "fit": self.fit})
 
     __repr__ = __str__
 
     def _misfits(self) -> list[tuple[str, str, float, float, str]]:
         return [
-            (channel, role, entry[role]["rms"], entry[role]["relative"], entry["unit"])
+            (channel, said, entry[role]["rms"], entry[role]["relative"], entry["unit"])
             for channel, entry in self.fit.items()
-            for role in ("train", "holdout")
+            for role, said in (("train", "training"), ("holdout", "held-out"))
             if role in entry
         ]
 

@@ -4,7 +4,10 @@ from collections.abc import Sequence
 
 from ..models.model import Placed
 from .diagnosis import ChannelFit, Finding
-from .report.words import words
+from .report.words import chance, words
+
+LIKELY = 0.5
+"""Probability [1] from which an effect is said to be there; below it, another explanation is likelier."""
 
 
 def percent(share: float, digits: int = 2) -> str:
@@ -26,10 +29,14 @@ def evidence_sentence(
     where = " and ".join(channels) if len(channels) < 3 else f"{len(channels)} channels"
     what = placed.effect.sentence
     return (
-        f"{what[:1].upper()}{what[1:]}: it explains {percent(explained)} of what the model so far left over on "
-        f"{where}; "
+        f"{what[:1].upper()}{what[1:]}: it explains {_part(explained)} what the model so far left over on {where}; "
         f"taking it out again raises the error on the held-out recording {from_to(relative_with, relative_without)}."
     )
+
+
+def _part(share: float) -> str:
+    """A share of what was left; another effect that is fitted beside it can make one's own share more than all."""
+    return "all of" if share > 0.995 else f"{percent(share)} of"
 
 
 def experiment_sentence(placed: Placed, rival: Placed) -> str:
@@ -43,26 +50,45 @@ def experiment_sentence(placed: Placed, rival: Placed) -> str:
 
 def verdict_sentence(findings: Sequence[Finding], fit: Sequence[ChannelFit], remainder: str) -> str:
     """The first sentence of the report."""
-    worst = max(fit, key=lambda f: f.holdout.relative_before - f.holdout.relative_after)
-    if not findings:
-        worst = max(fit, key=lambda f: f.holdout.relative_before)
     if findings:
-        by_name: dict[str, list[str]] = {}
-        for f in findings:
-            by_name.setdefault(f.name, []).append(f.at)
-        named = [f"{words(name)} at {listed(places)}" for name, places in by_name.items()]
+        worst = max(fit, key=lambda f: f.holdout.relative_before - f.holdout.relative_after)
         fall = from_to(worst.holdout.relative_before, worst.holdout.relative_after)
         return (
-            f"The model leaves out {listed(named)}. With that added, the error of {worst.channel} on the recording "
-            f"that the fit never saw falls {fall}.{remainder}"
+            f"The model leaves out {named(findings)}. With that added, the error of {worst.channel} on the held-out "
+            f"recording falls {fall}.{remainder}"
         )
     if remainder:
+        worst = max(fit, key=lambda f: f.holdout.relative_before)
         return f"Something is missing on {worst.channel} that no effect of the vocabulary explains.{remainder}"
-    return (
-        f"The model is adequate: nothing is left out that these recordings can show. "
-        f"On the recording that the fit never saw, the error of {worst.channel} is "
-        f"{percent(worst.holdout.relative_before)}."
+    return f"The model is adequate: nothing larger than the limits listed is left out. {_rest(fit)}"
+
+
+def _rest(fit: Sequence[ChannelFit]) -> str:
+    """What an adequate model leaves over on the channel where that stands highest above the noise."""
+    worst = max(fit, key=lambda f: f.holdout.rms_before / f.noise_floor if f.noise_floor > 0 else 0.0)
+    left = (
+        f"What it leaves over on the held-out recording is {percent(worst.holdout.relative_before)} of {worst.channel}"
     )
+    if not worst.noise_floor > 0:
+        return f"{left}."
+    return f"{left}, {worst.holdout.rms_before / worst.noise_floor:.2g} times that channel's noise floor."
+
+
+def named(findings: Sequence[Finding]) -> str:
+    """Effects with their places, the likely ones first; what is less likely than not is said to be so."""
+    sure: dict[str, list[str]] = {}
+    for f in findings:
+        if f.probability >= LIKELY:
+            sure.setdefault(f.name, []).append(f.at)
+    doubtful = [
+        f"{words(f.name)} at {f.at} ({chance(f.probability)})"
+        for f in sorted(findings, key=lambda f: -f.probability)
+        if not f.probability >= LIKELY
+    ]
+    certain = listed([f"{words(name)} at {listed(places)}" for name, places in sure.items()])
+    if not doubtful:
+        return certain
+    return f"{certain}, and perhaps {listed(doubtful)}" if certain else f"something, perhaps {listed(doubtful)}"
 
 
 def listed(items: Sequence[str]) -> str:

@@ -1,14 +1,16 @@
 """What is believed of a system: its tree, the effects it has, and where each of them acts."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ..errors import InputError
+from ..recordings.cuts import Cuts
 from ..recordings.signals import Signal
 from .effect import Effect
 from .floating.tree import n_carriers
 from .hidden_state import rows
+from .holding import Holding
 from .rig.kinematics import booms, reached_joints, slides
 from .rig.rig import Rig
 from .snare.setup import SnareTree, snare_places
@@ -57,6 +59,10 @@ class Model:
         Edge of the analysis band [Hz]; None: chosen from the recordings.
     values : mapping of str to float
         Parameters known so far, by ``effect.at.parameter`` (``inertia.<link>.<parameter>`` for inertial parameters).
+    holding : Holding
+        Joints of the robot's file that are held here, and what is done about inertias that no body can have.
+    cuts : Cuts
+        Samples of the recordings that are left out.
     """
 
     path: Path
@@ -69,6 +75,8 @@ class Model:
     signals: Mapping[str, Signal]
     bandwidth: float | None
     values: Mapping[str, float]
+    holding: Holding = field(default_factory=Holding)
+    cuts: Cuts = field(default_factory=Cuts)
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -98,7 +106,7 @@ def places(effect: Effect, tree: Tree) -> tuple[str, ...]:
     if effect.at == "joint":
         return tuple(j.name for j in tree.joints[carriers:])
     if effect.at == "link":
-        return tuple(link.name for link in tree.links[max(carriers - 1, 0) :])
+        return tuple(link.name for link in tree.links[max(carriers - 1, 0) : tree.n_joints])
     if effect.at == "base":
         return ("base",) if carriers else ()
     if effect.at != "sensor":

@@ -3,6 +3,7 @@
 import difflib
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +11,15 @@ import numpy as np
 
 from ..errors import InputError, nearest
 from ..files import toml_table
+from ..recordings.cuts import read_cuts
+from ..recordings.mixes import read_signal
 from ..recordings.read import SUFFIXES
 from ..recordings.signals import FORMS, Signal, is_signal, joint_of
 from .effects import get_effect
 from .floating.tree import UNNAMED, n_carriers, read_floating
+from .holding import Holding, read_holding
 from .model import Model, Placed, places
+from .published_inertia import Fix
 from .rig.file import read_slings
 from .rig.rig import Rig, built_in_rig
 from .snare.setup import read_setup
@@ -34,6 +39,11 @@ _KEYS = (
     "base",
     "gravity",
     "inertia",
+    "joints",
+    "locked",
+    "inertia_fix",
+    "breaks",
+    "limits",
     "effects",
     "slings",
     "capture",
@@ -43,8 +53,8 @@ _KEYS = (
 )
 
 
-def load_model(path: str | Path) -> Model:
-    """Read a model file.
+def load_model(path: str | Path, fix: Fix = "") -> Model:
+    """Read a model file; ``fix`` mends a moving body that no body can be, where the file does not say so itself.
 
     Raises
     ------
@@ -86,7 +96,9 @@ def load_model(path: str | Path) -> Model:
     if urdf is not None and _missing(urdf):
         hint = _neighbour(urdf, ".urdf") or "check the path, which starts where the model file is"
         raise InputError(f"{path}: urdf = {raw['urdf']!r}: no such file; {hint}")
-    tree = _tree(path, raw, system, urdf, gravity)
+    holding = read_holding(path, raw, system)
+    holding = replace(holding, fix=holding.fix or fix)
+    tree = _tree(path, raw, system, urdf, gravity, holding)
     return Model(
         path,
         _text(path, raw, "name", path.stem),
@@ -95,9 +107,11 @@ def load_model(path: str | Path) -> Model:
         tree,
         inertia,
         _placed(path, raw.get("effects", []), tree),
-        _signals(path, raw.get("signals", {}), tree),
+        _signals(path, raw.get("signals", {}), tree, holding),
         None if bandwidth is None else float(bandwidth),
         _values(path, raw.get("parameters", {})),
+        holding,
+        read_cuts(path, raw, [f"tau.{joint.name}" for joint in tree.joints]),
     )
 
 
@@ -118,7 +132,9 @@ def _neighbour(path: Path, suffix: str) -> str:
     return f"nearest is {near!r}" if near else ""
 
 
-def _tree(path: Path, raw: Mapping[str, Any], system: str, urdf: Path | None, gravity: Sequence[float]) -> Tree:
+def _tree(
+    path: Path, raw: Mapping[str, Any], system: str, urdf: Path | None, gravity: Sequence[float], holding: Holding
+) -> Tree:
     """The arm of a model file, on its slings where the system is a rig."""
     if "slings" in raw and (system != "zero_g_rig" or urdf is None):
         raise InputError(f"{path}: [slings] belong to system = 'zero_g_rig' with a URDF of your own; take them out")
@@ -134,7 +150,7 @@ def _tree(path: Path, raw: Mapping[str, Any], system: str, urdf: Path | None, gr
     if "base" in raw:
         raise InputError(f"{path}: key 'base' belongs to system = 'free_floating_arm'; take it out")
     if urdf is not None:
-        tree = load_urdf(urdf, tuple(gravity))
+        tree = load_urdf(urdf, tuple(gravity), held=holding.locked, moving=holding.joints, fix=holding.fix)
         if system != "zero_g_rig":
             return tree
     elif system != "zero_g_rig":
@@ -197,7 +213,7 @@ def _placed(path: Path, entries: Any, tree: Tree) -> tuple[Placed, ...]:
     return tuple(found)
 
 
-def _signals(path: Path, table: Any, tree: Tree) -> dict[str, Signal]:
+def _signals(path: Path, table: Any, tree: Tree, holding: Holding) -> dict[str, Signal]:
     if not isinstance(table, dict):
         raise InputError(f"{path}: [signals] must be a table of name = {{ column = ... }}")
     signals, joints = {}, [j.name for j in tree.joints]
@@ -205,6 +221,8 @@ def _signals(path: Path, table: Any, tree: Tree) -> dict[str, Signal]:
         if not is_signal(name):
             raise InputError(f"{path}: {name!r} in [signals] is not a signal's name; allowed are {FORMS}")
         joint = joint_of(name)
+        if joint in holding.locked or joint in tree.weightless:
+            continue  # a joint that is held has no signals, wherever they would be
         if joint is not None and joint not in joints:
             raise InputError(
                 f"{path}: {name!r} in [signals]: the URDF has no such joint, only {', '.join(joints)}; did you mean "
@@ -213,20 +231,7 @@ def _signals(path: Path, table: Any, tree: Tree) -> dict[str, Signal]:
         slings = [f"tension.{s.name}" for s in tree.slings] if isinstance(tree, Rig) else [name]
         if name.startswith("tension.") and name not in slings:
             raise InputError(f"{path}: {name!r} in [signals]: the rig has no such sling, only {', '.join(slings)}")
-        fields = {"column": entry} if isinstance(entry, str) else entry
-        if not isinstance(fields, dict) or not isinstance(fields.get("column"), str):
-            raise InputError(
-                f"{path}: [signals] {name} = {entry!r}; allowed is {{ column = ..., unit = ..., gain = ... }}"
-            )
-        extra = set(fields) - {"column", "unit", "gain"}
-        if extra:
-            raise InputError(f"{path}: [signals] {name} has {sorted(extra)[0]!r}; allowed are column, unit, gain")
-        if not isinstance(fields.get("unit"), str | None):
-            raise InputError(f"{path}: [signals] {name} unit = {fields['unit']!r}; allowed is text in quotes")
-        gain = fields.get("gain")
-        if isinstance(gain, bool) or not isinstance(gain, int | float | str | None):
-            raise InputError(f"{path}: [signals] {name} gain = {gain!r}; allowed is a number or a scalar's name")
-        signals[name] = Signal(fields["column"], fields.get("unit"), gain)
+        signals[name] = read_signal(path, name, entry)
     return signals
 
 

@@ -6,9 +6,12 @@ from pathlib import Path
 from typing import Any
 
 from ..files import written_whole
+from ..recordings.mixes import signal_fields
 from .effects import get_effect
 from .floating.tree import FloatingTree
+from .holding import Holding
 from .model import Model, Placed, places
+from .model_comments import with_comments
 from .rig.file import sling_table
 from .rig.rig import Rig
 from .snare.setup import SnareTree
@@ -17,8 +20,8 @@ from .snare.setup import SnareTree
 def save_model(model: Model, path: str | Path, note: str) -> None:
     """Write a model file that `load_model` reads back, all or nothing.
 
-    ``effects`` lists an effect by its name alone where it acts at every place, as ``{ name, at, hold }`` where it
-    does not.
+    Comments of the file that the model was read from stay. ``effects`` lists an effect by its name alone
+    where it acts at every place, as ``{ name, at, hold }`` where it does not.
     """
     path = Path(path)
     by_name: dict[str, list[Placed]] = {}
@@ -28,48 +31,74 @@ def save_model(model: Model, path: str | Path, note: str) -> None:
     for name, members in by_name.items():
         everywhere = sorted(p.at for p in members) == sorted(places(get_effect(name), model.tree))
         if everywhere and not any(p.hold for p in members):
-            listed.append(_toml(name))
+            listed.append(toml_text(name))
             continue
         for p in members:
-            hold = f", hold = {_toml(list(p.hold))}" if p.hold else ""
-            listed.append(f"{{ name = {_toml(name)}, at = {_toml(p.at)}{hold} }}")
+            hold = f", hold = {toml_text(list(p.hold))}" if p.hold else ""
+            listed.append(f"{{ name = {toml_text(name)}, at = {toml_text(p.at)}{hold} }}")
     lines = [f"# {line}" for line in note.splitlines()]
     lines += [
-        f"name = {_toml(model.name)}",
-        f"system = {_toml(model.system)}",
-        *([] if model.urdf is None else [f"urdf = {_toml(Path(os.path.relpath(model.urdf, path.parent)).as_posix())}"]),
-        f"gravity = {_toml([float(g) for g in model.tree.gravity])}",
-        f"inertia = {_toml(model.inertia)}",
+        f"name = {toml_text(model.name)}",
+        f"system = {toml_text(model.system)}",
+        *(
+            []
+            if model.urdf is None
+            else [f"urdf = {toml_text(Path(os.path.relpath(model.urdf, path.parent)).as_posix())}"]
+        ),
+        f"gravity = {toml_text([float(g) for g in model.tree.gravity])}",
+        f"inertia = {toml_text(model.inertia)}",
         "effects = [",
         *(f"    {entry}," for entry in listed),
         "]",
     ]
     if model.bandwidth is not None:
-        lines.append(f"bandwidth = {_toml(model.bandwidth)}")
+        lines.append(f"bandwidth = {toml_text(model.bandwidth)}")
     if isinstance(model.tree, FloatingTree):
-        lines.append(f"base = {_toml(model.tree.body)}")
+        lines.append(f"base = {toml_text(model.tree.body)}")
+    lines += holding_lines(model.holding)
+    lines += [f"breaks = {toml_text(list(model.cuts.breaks))}"] if model.cuts.breaks else []
+    lines += [f"limits = {toml_text(dict(model.cuts.limits))}"] if model.cuts.limits else []
     if isinstance(model.tree, Rig) and model.urdf is not None:
         lines += ["", "[slings]"]
         for name, fields in sling_table(model.tree).items():
-            lines.append(f"{_toml(name)} = {{ {', '.join(f'{k} = {_toml(v)}' for k, v in fields.items())} }}")
+            lines.append(f"{toml_text(name)} = {{ {', '.join(f'{k} = {toml_text(v)}' for k, v in fields.items())} }}")
     if isinstance(model.tree, SnareTree) and model.tree.setup.given:
-        lines += ["", "[capture]", *(f"{k} = {_toml(v)}" for k, v in model.tree.setup.given.items())]
+        lines += ["", "[capture]", *(f"{k} = {toml_text(v)}" for k, v in model.tree.setup.given.items())]
     if model.signals:
         lines += ["", "[signals]"]
         for name, signal in model.signals.items():
-            fields = {"column": signal.column, "unit": signal.unit, "gain": signal.gain}
-            inner = ", ".join(f"{k} = {_toml(v)}" for k, v in fields.items() if v is not None)
-            lines.append(f"{_toml(name)} = {{ {inner} }}")
+            lines.append(f"{toml_text(name)} = {toml_text(signal_fields(signal))}")
     if model.values:
-        lines += ["", "[parameters]", *(f"{_toml(k)} = {float(v)!r}" for k, v in model.values.items())]
+        lines += ["", "[parameters]", *(f"{toml_text(k)} = {float(v)!r}" for k, v in model.values.items())]
     with written_whole(path, "choose a folder that exists") as part:
-        part.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        part.write_text(with_comments(model.path, "\n".join(lines) + "\n"), encoding="utf-8")
 
 
-def _toml(value: Any) -> str:
+def holding_lines(holding: Holding) -> list[str]:
+    """Lines of a model file that say which joints move, which are held where, and what inertias are mended."""
+    lines = []
+    if holding.joints is not None:
+        lines.append(f"joints = {toml_text(list(holding.joints))}")
+    if holding.locked:
+        lines.append(
+            f"locked = {{ {', '.join(f'{toml_text(k)} = {toml_text(v)}' for k, v in holding.locked.items())} }}"
+        )
+    return lines + ([f"inertia_fix = {toml_text(holding.fix)}"] if holding.fix else [])
+
+
+def toml_text(value: Any) -> str:
+    """A value as TOML writes it."""
     if isinstance(value, str):
         # JSON's escapes are TOML's, but for one character that TOML wants escaped too.
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, list):
-        return "[" + ", ".join(_toml(v) for v in value) + "]"
+        return "[" + ", ".join(toml_text(v) for v in value) + "]"
+    if isinstance(value, dict):
+        return (
+            "{ "
+            + ", ".join(
+                f"{k if k.isidentifier() and k.isascii() else toml_text(k)} = {toml_text(v)}" for k, v in value.items()
+            )
+            + " }"
+        )
     return repr(float(value)) if isinstance(value, float) else repr(value)  # NumPy's floats show their type

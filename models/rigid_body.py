@@ -2,8 +2,9 @@
 
 The recursion (Luh, Walker, Paul 1980; Featherstone 2008, table 5.1) runs in link frames. Each link's wrench is written
 as a matrix times its ten inertial parameters (Atkeson, An, Hollerbach 1986), so torque and regressor are one formula.
-Letters: n samples, J joints, q position [rad or m], tau torque or force [N·m or N], phi inertial parameters
-(10 * J,) as in `snarelab.models.inertia`.
+Letters: n samples, J joints, L links (one a joint, then one a follower), q position [rad or m], tau torque or force
+[N·m or N], phi inertial parameters (10 * L,) as in `snarelab.models.inertia`. A follower's link moves with its leader,
+and what it takes is felt there, by the principle of virtual work.
 """
 
 from functools import cached_property
@@ -46,20 +47,21 @@ def _motions(tree: Tree, q: ca.SX, qd: ca.SX, qdd: ca.SX, gravity: ca.SX) -> lis
     none = ca.SX(3, 1)
     base = _Motion(ca.SX.eye(3), none, none, none, -gravity, ca.SX(3, 3))
     motions: list[_Motion] = []
-    for i, joint in enumerate(tree.joints):
+    for joint, i, times, offset in tree.bodies:
         parent = base if joint.parent < 0 else motions[joint.parent]
         axis, fixed, arm = exact(joint.axis), exact(joint.rotation), exact(joint.translation)
+        place, rate, second = q[i] * times + offset, qd[i] * times, qdd[i] * times
         if joint.kind == "revolute":
-            rotation = fixed @ turn(joint.axis, q[i])
+            rotation = fixed @ turn(joint.axis, place)
         else:
-            rotation, arm = fixed, arm + fixed @ axis * q[i]
+            rotation, arm = fixed, arm + fixed @ axis * place
         spin, spin_rate = rotation.T @ parent.spin, rotation.T @ parent.spin_rate
         acceleration = rotation.T @ (parent.acceleration + parent.curvature @ arm)
         if joint.kind == "revolute":
-            spin_rate = spin_rate + ca.cross(spin, axis * qd[i]) + axis * qdd[i]
-            spin = spin + axis * qd[i]
+            spin_rate = spin_rate + ca.cross(spin, axis * rate) + axis * second
+            spin = spin + axis * rate
         else:
-            acceleration = acceleration + 2 * ca.cross(spin, axis * qd[i]) + axis * qdd[i]
+            acceleration = acceleration + 2 * ca.cross(spin, axis * rate) + axis * second
         motions.append(_Motion(rotation, arm, spin, spin_rate, acceleration, _curvature(spin, spin_rate)))
     return motions
 
@@ -91,16 +93,16 @@ def symbolic_torque(tree: Tree, q: ca.SX, qd: ca.SX, qdd: ca.SX, gravity: ca.SX,
     q, qd, qdd : casadi.SX (J,)
     gravity : casadi.SX (3,)
         In the world frame [m/s²].
-    phi : casadi.SX (10 * J,)
+    phi : casadi.SX (10 * L,)
     """
     motions = _motions(tree, q, qd, qdd, gravity)
     matrices = [_wrench_matrix(motion) for motion in motions]
     forces = [force @ phi[10 * i : 10 * i + 10] for i, (force, _) in enumerate(matrices)]
     moments = [moment @ phi[10 * i : 10 * i + 10] for i, (_, moment) in enumerate(matrices)]
     torque = ca.SX(tree.n_joints, 1)
-    for i in reversed(range(tree.n_joints)):
-        joint, motion = tree.joints[i], motions[i]
-        torque[i] = ca.dot(exact(joint.axis), moments[i] if joint.kind == "revolute" else forces[i])
+    for i, (joint, own, times, _) in reversed(list(enumerate(tree.bodies))):
+        motion = motions[i]
+        torque[own] += times * ca.dot(exact(joint.axis), moments[i] if joint.kind == "revolute" else forces[i])
         if joint.parent >= 0:
             on_parent = motion.rotation @ forces[i]
             forces[joint.parent] += on_parent
@@ -109,18 +111,21 @@ def symbolic_torque(tree: Tree, q: ca.SX, qd: ca.SX, qdd: ca.SX, gravity: ca.SX,
 
 
 def _symbolic_regressor(tree: Tree, q: ca.SX, qd: ca.SX, qdd: ca.SX, gravity: ca.SX) -> ca.SX:
-    """Matrix (J, 10 * J): each joint's unit twist, carried outward, times each link's wrench matrix."""
+    """Matrix (J, 10 * L): each joint's unit twist, carried outward, times each link's wrench matrix."""
     motions = _motions(tree, q, qd, qdd, gravity)
     matrices = [_wrench_matrix(motion) for motion in motions]
-    blocks = [[ca.SX(1, 10) for _ in tree.joints] for _ in tree.joints]
-    for j, moved in enumerate(tree.joints):
-        axis, none = exact(moved.axis), ca.SX(3, 1)
-        twists = {j: (axis, none) if moved.kind == "revolute" else (none, axis)}
-        for i in range(j, tree.n_joints):
-            parent, motion = tree.joints[i].parent, motions[i]
-            if parent in twists:
-                turn, slide = twists[parent]
+    bodies, none = tree.bodies, ca.SX(3, 1)
+    blocks = [[ca.SX(1, 10) for _ in bodies] for _ in tree.joints]
+    for j in range(tree.n_joints):
+        twists: dict[int, tuple[ca.SX, ca.SX]] = {}
+        for i, (joint, own, times, _) in enumerate(bodies):
+            motion = motions[i]
+            if joint.parent in twists:
+                turn, slide = twists[joint.parent]
                 twists[i] = (motion.rotation.T @ turn, motion.rotation.T @ (slide + ca.cross(turn, motion.translation)))
+            if own == j:
+                axis, (turn, slide) = exact(joint.axis) * times, twists.get(i, (none, none))
+                twists[i] = (turn + axis, slide) if joint.kind == "revolute" else (turn, slide + axis)
             if i in twists:
                 force, moment = matrices[i]
                 turn, slide = twists[i]
@@ -132,7 +137,7 @@ class RigidBody:
     """Torque, regressor, mass matrix and tangent of a `Tree`, each compiled when it is first asked for.
 
     Every method takes arrays of shape (n, J), and raises InputError where a shape does not fit or a number is not
-    finite. ``phi`` (10 * J,) stands in for the tree's inertial parameters, ``gravity`` (3,) for its gravity [m/s²].
+    finite. ``phi`` (10 * L,) stands in for the tree's inertial parameters, ``gravity`` (3,) for its gravity [m/s²].
     """
 
     def __init__(self, tree: Tree) -> None:
@@ -151,7 +156,7 @@ class RigidBody:
         return self._torque(*self._motion(q=q, qd=qd, qdd=qdd), self._gravity(gravity), self._phi(phi))[0][:, :, 0]
 
     def regressor(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, gravity: ArrayLike | None = None) -> Array:
-        """Matrix (n, J, 10 * J) with ``torque = regressor @ phi``."""
+        """Matrix (n, J, 10 * L) with ``torque = regressor @ phi``."""
         return self._regressor(*self._motion(q=q, qd=qd, qdd=qdd), self._gravity(gravity))[0]
 
     def mass_matrix(self, q: ArrayLike, phi: ArrayLike | None = None) -> Array:
@@ -194,7 +199,7 @@ class RigidBody:
 
     def _symbols(self) -> list[ca.SX]:
         n_joints = self.tree.n_joints
-        sizes = {"q": n_joints, "qd": n_joints, "qdd": n_joints, "gravity": 3, "phi": 10 * n_joints}
+        sizes = {"q": n_joints, "qd": n_joints, "qdd": n_joints, "gravity": 3, "phi": 10 * len(self.tree.links)}
         return [ca.SX.sym(name, size) for name, size in sizes.items()]
 
     def _motion(self, **given: ArrayLike) -> list[Array]:
@@ -217,7 +222,7 @@ class RigidBody:
         return list(arrays.values())
 
     def _phi(self, phi: ArrayLike | None) -> Array:
-        return self._constant("phi", self.tree.phi if phi is None else phi, 10 * self.tree.n_joints)
+        return self._constant("phi", self.tree.phi if phi is None else phi, 10 * len(self.tree.links))
 
     def _gravity(self, gravity: ArrayLike | None) -> Array:
         return self._constant("gravity", self.tree.gravity if gravity is None else gravity, 3)

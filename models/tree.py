@@ -4,7 +4,7 @@ Frames: joint i's frame sits at a fixed pose on the parent link; the link behind
 at zero, turned about (revolute) or moved along (prismatic) ``axis`` otherwise. The base is the world frame.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -31,6 +31,8 @@ class Joint:
         Position limits [rad or m]; infinite where there are none.
     speed : float
         Velocity limit [rad/s or m/s].
+    effort : float
+        Limit of torque or force [N·m or N]; infinite where there is none.
     """
 
     name: str
@@ -42,6 +44,20 @@ class Joint:
     lower: float = float("-inf")
     upper: float = float("inf")
     speed: float = float("inf")
+    effort: float = float("inf")
+
+
+@dataclass(frozen=True, eq=False)
+class Follower:
+    """A joint without a freedom of its own (URDF's ``mimic``): it stands at ``multiplier * q[leader] + offset``.
+
+    ``joint.parent`` counts links: joints' links first, then followers'. What moves with it is felt at the leader.
+    """
+
+    joint: Joint
+    leader: int
+    multiplier: float = 1.0
+    offset: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +72,9 @@ class Link:
 class Tree:
     """Joints and links of a fixed-base tree; ``links[i]`` is moved by ``joints[i]``, parents stand before children.
 
+    Behind the joints' links stand those of the ``followers``, in their order. ``notes`` are what a reader of the
+    robot's file did that a user should know, ``weightless`` the joints that are held because they move no mass.
+
     Raises
     ------
     InputError
@@ -67,15 +86,19 @@ class Tree:
     joints: tuple[Joint, ...]
     links: tuple[Link, ...]
     gravity: Array
+    followers: tuple[Follower, ...] = field(default=(), kw_only=True)
+    notes: tuple[str, ...] = field(default=(), kw_only=True)
+    weightless: tuple[str, ...] = field(default=(), kw_only=True)
 
     def __post_init__(self) -> None:
         """Refuse what the recursions could not run through."""
-        if not self.joints or len(self.joints) != len(self.links):
+        moving = (*self.joints, *(f.joint for f in self.followers))
+        if not self.joints or len(moving) != len(self.links):
             raise InputError(
-                f"{self.name}: {len(self.joints)} joints and {len(self.links)} links; "
+                f"{self.name}: {len(moving)} joints and {len(self.links)} links; "
                 "give one link per joint, and at least one"
             )
-        for index, joint in enumerate(self.joints):
+        for index, joint in enumerate(moving):
             if not -1 <= joint.parent < index:
                 raise InputError(
                     f"{self.name}: joint '{joint.name}' is number {index} and has parent {joint.parent}; "
@@ -86,10 +109,16 @@ class Tree:
 
     @property
     def n_joints(self) -> int:
-        """Number of joints J."""
+        """Number of joints J: degrees of freedom, so without followers."""
         return len(self.joints)
 
     @property
+    def bodies(self) -> tuple[tuple[Joint, int, float, float], ...]:
+        """Of every link: what moves it, and by which freedom: (joint, index, multiplier, offset), parents first."""
+        own = [(joint, i, 1.0, 0.0) for i, joint in enumerate(self.joints)]
+        return (*own, *((f.joint, f.leader, f.multiplier, f.offset) for f in self.followers))
+
+    @property
     def phi(self) -> Array:
-        """Inertial parameters of all links, one after the other, shape (10 * n_joints,)."""
+        """Inertial parameters of all links, one after the other, shape (10 * L,)."""
         return np.concatenate([link.phi for link in self.links])

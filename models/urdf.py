@@ -1,7 +1,8 @@
 """A URDF file as a `Tree`: Drake reads the kinematics, the inertias are taken as published.
 
 Drake's parser replaces an inertia that no body can have by another one, with a warning, and ends the process on limits
-that cross. Inertias and limits are therefore read here; an inertia is refused with the nearest physical one.
+that cross. Inertias and limits are therefore read here, and `published_inertia` judges the bodies that they add up to.
+A joint that mimics another is a follower of it.
 Joint damping and friction in the file are not read: they are effects, to be identified. A limit that the file leaves
 out is infinite.
 """
@@ -9,7 +10,7 @@ out is infinite.
 import re
 import xml.etree.ElementTree as ET
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 from xml.parsers import expat
@@ -18,10 +19,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from ..errors import InputError
+from ..errors import InputError, nearest
 from ..files import content
 from . import inertia
+from .hold import hold
 from .inertia import Array
+from .mimic import grouped
+from .published_inertia import Fix, checked_bodies
 from .tree import Joint, Link, Tree
 
 _MOST = 1000
@@ -30,7 +34,14 @@ _KINEMATIC = ("parent", "child", "origin", "axis")
 _INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
-def load_urdf(path: str | Path, gravity: ArrayLike = (0.0, 0.0, -9.81)) -> Tree:
+def load_urdf(
+    path: str | Path,
+    gravity: ArrayLike = (0.0, 0.0, -9.81),
+    *,
+    held: Mapping[str, float] | None = None,
+    moving: Sequence[str] | None = None,
+    fix: Fix = "",
+) -> Tree:
     """Read a URDF; its root link stands still in the world, links behind fixed joints are welded to what carries them.
 
     Parameters
@@ -39,12 +50,19 @@ def load_urdf(path: str | Path, gravity: ArrayLike = (0.0, 0.0, -9.81)) -> Tree:
         Meshes need not be there: shapes are not read.
     gravity : array (3,)
         In the world frame [m/s²].
+    held : mapping of str to float, optional
+        Joints that are held, and where [rad or m].
+    moving : sequence of str, optional
+        The joints that move; all others are held, at zero where ``held`` does not say.
+    fix : "" or "nearest"
+        Whether a body that cannot be is refused, or gets the nearest inertia that one can have.
 
     Raises
     ------
     InputError
-        Where the file is missing or is no URDF of one tree; a joint is not revolute, continuous, prismatic or fixed, or
-        mimics another; nothing moves; an inertia is not physical; or a joint moves no mass.
+        Where the file is missing or is no URDF of one tree; a joint is not revolute, continuous, prismatic or fixed;
+        a joint hangs behind one that mimics; nothing moves, or nothing that has mass; or a moving body's inertia is
+        not physical.
     """
     path = Path(path)
     down = np.asarray(gravity, float)
@@ -52,29 +70,46 @@ def load_urdf(path: str | Path, gravity: ArrayLike = (0.0, 0.0, -9.81)) -> Tree:
         raise InputError(f"{path}: gravity is {gravity}; give three finite numbers [m/s²]")
     robot = read_robot(path)
     root = checked_root(path, robot)
-    parameters = {link.get("name", ""): link_parameters(path, link) for link in robot.findall("link")}
+    parameters, odd = {}, {}
+    for link in robot.findall("link"):
+        name = link.get("name", "")
+        parameters[name], alone = _link(path, link)
+        if not inertia.is_physical(alone):
+            odd[name] = alone
     limits = {joint.get("name", ""): _limits(path, joint) for joint in robot.findall("joint")}
 
-    joints: list[Joint] = []
-    names: list[str] = []
-    moved: list[Array] = []
+    moved: list[tuple[Joint, Link]] = []
     for drake_joint, parent, rotation, translation in walk(parse_plant(path, robot, root), root):
         child = drake_joint.child_body().name()
         if drake_joint.type_name() == "weld":
             if parent >= 0:
-                moved[parent] = moved[parent] + inertia.transform(parameters[child], rotation, translation)
+                joint, carrier = moved[parent]
+                phi = carrier.phi + inertia.transform(parameters[child], rotation, translation)
+                moved[parent] = joint, Link(carrier.name, phi)
             continue
         kind = "revolute" if drake_joint.type_name() == "revolute" else "prismatic"
         axis = drake_joint.revolute_axis() if kind == "revolute" else drake_joint.translation_axis()
         name = drake_joint.name()
-        joints.append(Joint(name, kind, axis, parent, rotation, translation, *limits[name]))
-        names.append(child)
-        moved.append(parameters[child])
-    if not joints:
+        moved.append(
+            (Joint(name, kind, axis, parent, rotation, translation, *limits[name]), Link(child, parameters[child]))
+        )
+    if not moved:
         raise InputError(f"{path}: no joint moves; give at least one revolute, continuous or prismatic joint")
-    links = [Link(name, phi) for name, phi in zip(names, moved, strict=True)]
-    _check_mass_outboard(path, joints, links)
-    return Tree(robot.get("name", path.stem), tuple(joints), tuple(links), down)
+    tree = grouped(path, robot, moved, down)
+    angles = dict(held or {})
+    if moving is not None:
+        known = [joint.name for joint in tree.joints]
+        for name in moving:
+            if name not in known:
+                raise InputError(
+                    f"{path}: joint {name!r} is not one that moves ({', '.join(known)}); nearest is "
+                    f"{nearest(name, known)!r}"
+                )
+        angles = {name: angles.get(name, 0.0) for name in known if name not in moving}
+    try:
+        return checked_bodies(path, hold(tree, angles), odd, fix)
+    except InputError as error:
+        raise InputError(str(error) if str(error).startswith(str(path)) else f"{path}: {error}") from None
 
 
 def read_robot(path: Path) -> ET.Element:
@@ -116,8 +151,6 @@ def checked_root(path: Path, robot: ET.Element) -> str:
         name, kind = joint.get("name"), joint.get("type")
         if kind not in _KINDS:
             raise InputError(f"{path}: joint '{name}' is of type '{kind}'; allowed are {', '.join(_KINDS)}")
-        if joint.find("mimic") is not None:
-            raise InputError(f"{path}: joint '{name}' mimics another, which is not supported; fix it or free it")
         for part, key in (("origin", "xyz"), ("origin", "rpy"), ("axis", "xyz")):
             found = joint.find(part)
             if found is not None and key in found.attrib:
@@ -147,23 +180,29 @@ def _numbers(path: Path, where: str, text: str | None, count: int) -> Array:
     return values
 
 
-def _limits(path: Path, joint: ET.Element) -> tuple[float, float, float]:
-    """Lower and upper position limit and speed limit of one joint; infinite where the file has none."""
+def _limits(path: Path, joint: ET.Element) -> tuple[float, float, float, float]:
+    """Lower and upper limit of position, of speed and of effort of one joint; infinite where the file has none."""
     limit, name = joint.find("limit"), f"joint '{joint.get('name')}'"
     given = {} if limit is None else limit.attrib
-    keys = ("velocity",) if joint.get("type") == "continuous" else ("lower", "upper", "velocity")
+    keys = ("velocity", "effort") if joint.get("type") == "continuous" else ("lower", "upper", "velocity", "effort")
     values = {key: float(_numbers(path, f"{name}: limit {key}", given[key], 1)[0]) for key in keys if key in given}
     lower, upper, speed = values.get("lower", -np.inf), values.get("upper", np.inf), values.get("velocity", np.inf)
     if lower > upper or speed < 0:
         raise InputError(f"{path}: {name} has limits {given}; give lower <= upper and a velocity of at least 0")
-    return lower, upper, speed
+    effort = values.get("effort", np.inf)
+    return lower, upper, speed, effort if effort > 0 else np.inf  # many files have 0 where nobody knew
 
 
 def link_parameters(path: Path, link: ET.Element) -> Array:
     """Inertial parameters phi (10,) of one link as published, about its own frame."""
+    return _link(path, link)[0]
+
+
+def _link(path: Path, link: ET.Element) -> tuple[Array, Array]:
+    """Inertial parameters of one link as published: about its own frame, and about its centre of mass."""
     inertial = link.find("inertial")
     if inertial is None:
-        return np.zeros(10)
+        return np.zeros(10), np.zeros(10)
     name = f"link '{link.get('name')}'"
     empty = ET.Element("absent")
     origin, mass_element, tensor = (inertial.find(tag) for tag in ("origin", "mass", "inertia"))
@@ -174,28 +213,10 @@ def link_parameters(path: Path, link: ET.Element) -> Array:
     mass = float(_numbers(path, f"{name}: mass value", given_mass, 1)[0])
     given = [(empty if tensor is None else tensor).get(key) for key in _INERTIA]
     moments = [float(_numbers(path, f"{name}: {key}", text, 1)[0]) for key, text in zip(_INERTIA, given, strict=True)]
-    if mass < 0 or (mass == 0 and np.any(moments)):
-        raise InputError(
-            f"{path}: {name} has mass {mass:g} kg, inertia {moments}; give it a mass above 0, or no <inertial>"
-        )
+    if mass < 0:
+        raise InputError(f"{path}: {name} has mass {mass:g} kg; give it a mass of at least 0, or no <inertial>")
     about_com = np.concatenate([[mass], np.zeros(3), moments])
-    if not inertia.is_physical(about_com):
-        _refuse_inertia(path, name, mass, inertia.symmetric(moments))
-    return inertia.transform(about_com, Rotation.from_euler("xyz", angles).as_matrix(), com)
-
-
-def _refuse_inertia(path: Path, name: str, mass: float, matrix: Array) -> None:
-    """Say what is wrong with an inertia and what the nearest possible one is, ready to paste."""
-    small, middle, large = np.linalg.eigvalsh(matrix)
-    fault = f"{small:.6g} is negative" if small < 0 else f"{large:.6g} > {small:.6g} + {middle:.6g}"
-    nearest = inertia.nearest_physical(mass, np.zeros(3), matrix)[4:]
-    scale = np.abs(nearest).max() * 1e-12
-    paste = " ".join(f'{key}="{0.0 if abs(x) < scale else x:.12g}"' for key, x in zip(_INERTIA, nearest, strict=True))
-    raise InputError(
-        f"{path}: {name} has an inertia that no body can have: principal moments "
-        f"{small:.6g}, {middle:.6g}, {large:.6g} kg·m² ({fault}); "
-        f"correct it, or take the nearest possible one: <inertia {paste}/>"
-    )
+    return inertia.transform(about_com, Rotation.from_euler("xyz", angles).as_matrix(), com), about_com
 
 
 def parse_plant(path: Path, robot: ET.Element, root: str) -> Any:
@@ -247,16 +268,3 @@ def walk(plant: Any, root: str) -> Iterator[tuple[Any, int, Array, Array]]:
         else:
             behind, at, moving = moving, RigidTransform(), moving + 1
         pending.extend((child, behind, at) for child in reversed(outward.get(joint.child_body().name(), [])))
-
-
-def _check_mass_outboard(path: Path, joints: list[Joint], links: list[Link]) -> None:
-    """Refuse a joint with no mass behind it: its motion would have no torque, and its mass matrix no inverse."""
-    masses = [float(link.phi[0]) for link in links]
-    for i in reversed(range(len(joints))):
-        if masses[i] <= 0:
-            raise InputError(
-                f"{path}: joint '{joints[i].name}' moves no mass: link '{links[i].name}' and all beyond it have none; "
-                "give one an <inertial>, or make the joint fixed"
-            )
-        if joints[i].parent >= 0:
-            masses[joints[i].parent] += masses[i]

@@ -65,6 +65,10 @@ class Columns:
         What the reader did that a user should know.
     row : callable
         Turns a sample's index into the row number that a person sees in the file.
+    order : tuple of str
+        Headers in the file's order, where columns can be given by number.
+    mixed : frozenset of str
+        Columns that others were made of.
     """
 
     path: Path
@@ -73,6 +77,8 @@ class Columns:
     problems: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     row: Callable[[int], int] = lambda index: index + 1
+    order: tuple[str, ...] = ()
+    mixed: frozenset[str] = frozenset()
 
     @property
     def names(self) -> list[str]:

@@ -58,6 +58,11 @@ FEWEST = 64
 """Samples in the longest run from which on its spectrum tells the encoders' noise."""
 
 
+FAST, ENOUGH = 1500.0, 500.0
+"""[Hz] Rate from which on a recording is thinned before anything else, and the least it is thinned to: six times what
+the widest band needs."""
+
+
 @dataclass(frozen=True)
 class Motion:
     """One recording on a uniform clock, ready to be fitted.
@@ -91,6 +96,8 @@ class Motion:
         steps included, makes [rad or m, per s, per s²].
     silent : tuple of int
         Channels whose torque is zero throughout, but for a floor of noise.
+    undriven : tuple of int
+        Channels that nothing drives: their torque is known to be zero.
     """
 
     path: str
@@ -108,6 +115,7 @@ class Motion:
     notes: tuple[str, ...]
     encoder_noise: Array
     silent: tuple[int, ...] = ()
+    undriven: tuple[int, ...] = ()
 
     def to_band(self, x: Array) -> Array:
         """Low-pass and thin an array (n_samples, ...) segment by segment: (n_band, ...)."""
@@ -169,6 +177,12 @@ def condition(dataset: xr.Dataset, joints: Sequence[str], band: float | None = N
         if _usable(pieces) < PLENTY * _usable(bridged[0]):
             pieces, uniform_note, longest = bridged
     notes += uniform_note
+    if 1.0 / period >= FAST:
+        every = int(1.0 / (period * ENOUGH))
+        pieces = [p for p in (_thinned(piece, every) for piece in pieces) if len(p[0]) > 1]
+        notes.append(f"recorded at {1 / period:.4g} Hz: low-passed, and every {every} samples make one")
+        period *= every
+        longest = max(longest, period)
     rate = 1.0 / period
     limit = "as asked"
     positions = max([p[1] for p in pieces], key=len, default=np.zeros((0, len(joints))))
@@ -230,6 +244,14 @@ def condition(dataset: xr.Dataset, joints: Sequence[str], band: float | None = N
         tuple(notes),
         np.sqrt([white * rate / 2 * np.sum(np.convolve(k, low_pass(thinning)) ** 2) for k in kernels]),
     )
+
+
+def _thinned(piece: tuple[Array, Array, Array, Array, float], every: int) -> tuple[Array, Array, Array, Array, float]:
+    """A run at a slower rate: position, torque and temperature through one low-pass without delay."""
+    time, q, tau, temperature, step = piece
+    half, n = thin_half(every), thinned_length(len(time), every)
+    kept = slice(half, half + (n - 1) * every + 1, every) if n else slice(0, 0)
+    return time[kept], thin(q, every), thin(tau, every), temperature[kept], step * every
 
 
 def _usable(pieces: Sequence[tuple[Array, Array, Array, Array, float]]) -> float:

@@ -1,10 +1,14 @@
-"""CSV tables: comma, semicolon or tab; one header row; lines that start with ``#`` are comments.
+"""CSV tables: comma, semicolon or tab; lines that start with ``#`` are comments.
+
+The first row is the header, but where all its cells are numbers: columns are then called ``1``, ``2`` and so on. A cell
+may hold a list in brackets, of the same length in every row: its column is then a table of columns.
 
 pandas' C parser reads the whole file; only if a cell is not a number are the lines walked to say which one.
 """
 
 import csv
 import io
+import json
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -30,7 +34,7 @@ def read(path: Path) -> Columns:
     try:
         if not data.isascii():
             data.decode()
-        header, separator, table = _table(path, data)
+        header, separator, table, bare = _table(path, data)
     except UnicodeDecodeError as error:
         raise InputError(
             f"{path}: is not UTF-8 text ({error.reason} at byte {error.start}); save it as UTF-8"
@@ -52,16 +56,51 @@ def read(path: Path) -> Columns:
                 problems[name] = "holds text; write numbers, or leave cells empty"
                 continue
             try:
-                values = _numbers(data, separator, position)
+                lists = _lists(values)
+                values = _numbers(data, separator, position, bare) if lists is None else lists
             except (ValueError, csv.Error) as error:
                 problems[name] = str(error)
                 continue
         arrays[name] = values
-    return Columns(path, arrays, problems=problems, notes=tuple(notes), row=lambda index: _row_number(data, index))
+    if bare:
+        notes.append(f"the first row is one of numbers: its {len(header)} columns are called 1 to {len(header)}")
+    order = tuple(dict.fromkeys(header))
+    return Columns(
+        path,
+        arrays,
+        problems=problems,
+        notes=tuple(notes),
+        row=lambda index: _row_number(data, index - bare),
+        order=order,
+    )
 
 
-def _table(path: Path, data: bytes) -> tuple[list[str], str, pd.DataFrame]:
-    """Header, separator and cells; raises csv.Error for a cell of more than 131072 characters."""
+def _is_bare(cells: list[str]) -> bool:
+    """Whether a first row holds numbers where a header should be."""
+    try:
+        return bool([float(cell) for cell in cells])
+    except ValueError:
+        return False
+
+
+def _lists(values: np.ndarray) -> np.ndarray | None:
+    """A column of lists in brackets as a table (n_samples, k); None where it holds something else."""
+    cells = [str(cell).strip() for cell in values]
+    if not cells or not all(cell.startswith("[") and cell.endswith("]") for cell in cells):
+        return None
+    try:
+        rows = json.loads("[" + ",".join(cells).replace("nan", "NaN") + "]")
+        table = np.array(rows, np.float64)
+    except (ValueError, RecursionError):
+        table = np.empty(0)
+    if table.ndim != 2 or not table.size:
+        lengths = sorted({cell.count(",") + 1 for cell in cells})
+        raise ValueError(f"holds lists in its cells, of {lengths[:3]} entries; as many numbers in every row are wanted")
+    return table
+
+
+def _table(path: Path, data: bytes) -> tuple[list[str], str, pd.DataFrame, bool]:
+    """Header, separator, cells, whether there is no header; raises csv.Error for cells of over 131072 characters."""
     lines = _lines(data)
     _, first = next(lines, (0, ""))
     if not first:
@@ -69,16 +108,19 @@ def _table(path: Path, data: bytes) -> tuple[list[str], str, pd.DataFrame]:
     separator = max(",;\t", key=first.count)
     header = _cells(first, separator)
     check_count(path, len(header))
+    bare = _is_bare(header)
+    if bare:
+        header = [str(k + 1) for k in range(len(header))]
     # pandas would take a first row that is too long for row labels; later ones it refuses itself
     if len(_cells(next(lines, (0, ""))[1], separator)) > len(header):
         raise InputError(f"{path}: {_long_row(data, separator, len(header))}")
     try:
-        return header, separator, _parse(data, separator, header)
+        return header, separator, _parse(data, separator, header, bare), bare
     except pd.errors.ParserError as error:
         raise InputError(f"{path}: {_long_row(data, separator, len(header))}") from error
 
 
-def _parse(data: bytes, separator: str, header: list[str]) -> pd.DataFrame:
+def _parse(data: bytes, separator: str, header: list[str], bare: bool) -> pd.DataFrame:
     if (
         data.startswith(b"#") or b"\n#" in data or b"\r#" in data
     ):  # pandas' own comments would also cut cells such as #REF!
@@ -87,7 +129,7 @@ def _parse(data: bytes, separator: str, header: list[str]) -> pd.DataFrame:
         io.BytesIO(data),
         sep=separator,
         engine="c",
-        header=0,
+        header=None if bare else 0,
         names=list(range(len(header))),
         na_values=list(_MISSING),
         keep_default_na=False,
@@ -108,9 +150,10 @@ def _cells(line: str, separator: str) -> list[str]:
     return [cell.strip() for cell in next(csv.reader([line], delimiter=separator, skipinitialspace=True))]
 
 
-def _rows(data: bytes, separator: str) -> Iterator[tuple[int, list[str]]]:
+def _rows(data: bytes, separator: str, bare: bool = False) -> Iterator[tuple[int, list[str]]]:
     lines = _lines(data)
-    next(lines)
+    if not bare:
+        next(lines)
     return ((number, _cells(line, separator)) for number, line in lines)
 
 
@@ -129,10 +172,10 @@ def _long_row(data: bytes, separator: str, width: int) -> str:
     return "is not a table that can be read; check its quotes"
 
 
-def _numbers(data: bytes, separator: str, position: int) -> np.ndarray:
+def _numbers(data: bytes, separator: str, position: int, bare: bool) -> np.ndarray:
     """One column cell by cell; ValueError saying where the first text is."""
     values = []
-    for number, cells in _rows(data, separator):
+    for number, cells in _rows(data, separator, bare):
         cell = cells[position] if position < len(cells) else ""
         try:
             values.append(np.nan if cell in _MISSING else float(cell.replace("_", " ")))  # Python reads 1_0 as 10

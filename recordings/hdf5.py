@@ -4,12 +4,17 @@ import pickle
 import subprocess
 import sys
 import threading
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import InputError
+from ..extras import needed_for
 from .columns import LARGEST, Columns, sorted_by_kind
+
+_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+"""HDF5 File Format Specification 3.0, section II.A."""
 
 PATIENCE = 30.0
 """Longest that a file may take to be read [s], and 1 s more for each 4 MB of it."""
@@ -20,6 +25,18 @@ def read(path: Path) -> Columns:
     return sorted_by_kind(path, datasets(path))
 
 
+def is_hdf5(path: Path) -> bool:
+    """Whether a file bears HDF5's signature: at its start, or after a block of 512, 1024, ... bytes."""
+    size, place = path.stat().st_size, 0
+    with path.open("rb") as file:
+        while place + len(_SIGNATURE) <= size:
+            file.seek(place)
+            if file.read(len(_SIGNATURE)) == _SIGNATURE:
+                return True
+            place = max(512, 2 * place)
+    return False
+
+
 def datasets(path: Path, matlab: bool = False) -> dict[str, np.ndarray]:
     """All datasets by their path in the file; what is no column (text, images) is an array of objects.
 
@@ -27,6 +44,9 @@ def datasets(path: Path, matlab: bool = False) -> dict[str, np.ndarray]:
     transposed and text as integers: ``matlab`` undoes the first and marks the second. A process of its own reads the
     file, see `hdf5_apart`; the first sight of it costs a quarter of a second.
     """
+    with needed_for(f"{path}: an HDF5 file"):
+        if find_spec("h5py") is None:
+            raise ModuleNotFoundError(name="h5py")
     script = str(Path(__file__).with_name("hdf5_apart.py"))
     command = [sys.executable, "-P", script, str(path.resolve()), str(LARGEST), *(["matlab"] if matlab else [])]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, stdin=subprocess.DEVNULL)

@@ -7,7 +7,6 @@ import io
 from collections.abc import Iterator
 from pathlib import Path
 
-import h5py
 import numpy as np
 import scipy.io
 from scipy.io.matlab import mat_struct
@@ -15,13 +14,13 @@ from scipy.io.matlab import mat_struct
 from ..errors import InputError
 from ..files import content
 from .columns import LARGEST, Columns, sorted_by_kind
-from .hdf5 import datasets
+from .hdf5 import datasets, is_hdf5
 from .matlab_structure import check_structure
 
 
 def read(path: Path) -> Columns:
     """Read every numeric variable of a MATLAB file; cells, objects and struct arrays cannot be columns."""
-    if h5py.is_hdf5(path):
+    if is_hdf5(path):
         return sorted_by_kind(path, datasets(path, matlab=True))
     try:
         data = content(path, LARGEST)

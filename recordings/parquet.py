@@ -3,11 +3,14 @@
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from ..errors import InputError
+from ..extras import needed_for
 from .columns import Columns, check_size
+
+with needed_for("a Parquet file"):
+    import pyarrow as pa
+    import pyarrow.parquet as pq
 
 
 def read(path: Path) -> Columns:

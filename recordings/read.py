@@ -10,8 +10,9 @@ import xarray as xr
 
 from ..errors import InputError, nearest
 from ..files import bounded_memory
-from . import csv_table, hdf5, matlab, parquet, ros_bag
+from . import csv_table, hdf5, matlab
 from .columns import Columns, check_count, split_header
+from .mixes import with_mixes
 from .signals import FORMS, JointKind, Signal, default_unit, is_signal, joint_of
 from .timebase import UNIFORM, sampling
 from .units import convert, fits, parse_unit
@@ -19,10 +20,17 @@ from .units import convert, fits, parse_unit
 if TYPE_CHECKING:
     import pint
 
+
+def _parquet(path: Path) -> Columns:
+    from . import parquet  # an extra brings what it is read with
+
+    return parquet.read(path)
+
+
 _READERS: Mapping[str, Callable[[Path], Columns]] = {
     ".csv": csv_table.read,
     ".tsv": csv_table.read,
-    ".parquet": parquet.read,
+    ".parquet": _parquet,
     ".mat": matlab.read,
     ".h5": hdf5.read,
     ".hdf5": hdf5.read,
@@ -73,7 +81,9 @@ def read_recording(
             raise InputError(f"{path}: {name!r} in [signals] is not a signal's name; allowed are {FORMS}")
     columns = _load(path, signals)
     check_count(path, len(columns.names))
-    headers = _signal_headers(columns, signals)
+    undriven = [name for name, signal in signals.items() if signal.nothing]
+    columns, signals = with_mixes(columns, signals)
+    headers = {name: header for name, header in _signal_headers(columns, signals).items() if name not in undriven}
     time_header, time = _time(columns, signals, headers)
     del headers["time"]
     if not headers:
@@ -108,6 +118,9 @@ def read_recording(
             tried(name, _check_numbers, columns, header, values)
         if name not in faults:
             variables[name] = ("time", values, {"unit": wanted, "column": header})
+    for name in undriven:
+        unit = default_unit(name, kinds.get(joint_of(name) or name, "revolute"))
+        variables[name] = ("time", np.zeros(len(time)), {"unit": unit, "column": "none"})
     idle = [f"{name} is left out, no fit needs it: {fault}" for name, fault in faults.items()]
     dataset = xr.Dataset(variables, {"time": ("time", time, {"unit": "s", "column": time_header})})
     used = {"time": time_header} | {name: raw[name][0] if raw[name] else header for name, header in headers.items()}
@@ -123,8 +136,11 @@ def _load(path: Path, signals: Mapping[str, Signal]) -> Columns:
     if not (path.is_dir() or path.is_file()):
         raise InputError(f"{path}: is no plain file; give a file, or the folder of a ROS 2 bag")
     if path.is_dir() or suffix in _BAGS:
+        from . import ros_bag  # an extra brings what it is read with
+
         with bounded_memory(path):
-            return ros_bag.read(path, {name: signal.column for name, signal in signals.items()})
+            wanted = {f"{name} {k}": str(c) for name, s in signals.items() for k, c in enumerate(s.parts)}
+            return ros_bag.read(path, wanted)
     if suffix not in _READERS:
         raise InputError(
             f"{path}: suffix {suffix!r} is not one of a recording; known are {' '.join(SUFFIXES)} "
@@ -150,7 +166,7 @@ def _signal_headers(columns: Columns, signals: Mapping[str, Signal]) -> dict[str
 
     A struct or group is read as a dot: ``q/joint1`` is ``q.joint1``.
     """
-    headers = {name: signal.column for name, signal in signals.items()}
+    headers = {name: str(signal.column) for name, signal in signals.items()}
     for header in [*columns.arrays, *columns.problems]:
         name = split_header(header)[0].replace("/", ".")
         if is_signal(name):
@@ -164,7 +180,7 @@ def _left_out(columns: Columns, used: Mapping[str, str], gains: set[str]) -> lis
     for header in [*columns.arrays, *columns.problems]:
         bare = split_header(header)[0]
         name = bare.replace("/", ".")
-        if header in taken or {header, bare} & gains:
+        if header in taken or {header, bare} & (gains | columns.mixed):
             continue
         if name in used:
             notes.append(f"column {header!r} is ignored; {name} is taken from {used[name]!r}")

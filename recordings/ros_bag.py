@@ -18,13 +18,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rosbags.highlevel import AnyReader
-from rosbags.interfaces import Connection, Nodetype
-from rosbags.typesys import Stores, get_typestore
 
 from ..errors import InputError, nearest
+from ..extras import needed_for
 from ..files import content
 from .columns import Columns
+
+with needed_for("a ROS 2 bag"):
+    from rosbags.highlevel import AnyReader
+    from rosbags.interfaces import Connection, Nodetype
+    from rosbags.typesys import Stores, get_typestore
 
 _JOINT_STATE = "sensor_msgs/msg/JointState"
 _FAMILIES = {"q": "position", "qd": "velocity", "tau": "effort"}

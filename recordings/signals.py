@@ -4,8 +4,8 @@
 sensor ``force torque``; ``angle.ring``.
 """
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from typing import Literal
 
 JointKind = Literal["revolute", "prismatic"]
@@ -34,19 +34,39 @@ class Signal:
 
     Parameters
     ----------
-    column : str
-        The recording's column: a header, ``"group/name"`` or ``"name[0]"`` in MATLAB and HDF5 files,
-        ``"/topic/field.path"`` in ROS 2 bags.
+    column : str or int
+        The recording's column: a header, ``"group/name"`` or ``"name[0]"`` in MATLAB and HDF5 files, and where a table
+        has lists in its cells; ``"/topic/field.path"`` in ROS 2 bags; or its number, from 1.
     unit : str, optional
         The column's unit; the header's own unit, or the signal's default, where it is left out.
         With a gain it is what the gain counts per: a header in another unit of its dimension is converted first.
     gain : float or str, optional
         Signal's default unit (N·m or N for ``tau``) per unit of the column, or the name of a number in the recording.
+    columns : mapping of str to float
+        Instead of ``column``: columns and their weights, summed before unit and gain.
+    offset : float
+        Added to the column, or the mix, before unit and gain.
+    rate : float, optional
+        Instead of ``column``, for time: samples a second [Hz] of a recording that has no clock.
+    nothing : bool
+        Of a torque: nothing drives the joint, it is zero.
     """
 
-    column: str
+    column: str | int
     unit: str | None = None
     gain: float | str | None = None
+    columns: Mapping[str, float] = field(default_factory=dict)
+    offset: float = 0.0
+    rate: float | None = None
+    nothing: bool = False
+
+    @property
+    def parts(self) -> Mapping[str | int, float]:
+        """Columns that it is made of, and their weights."""
+        if self.nothing or self.rate is not None:
+            return {}
+        made: dict[str | int, float] = {}
+        return {**made, **self.columns} if self.columns else {self.column: 1.0}
 
 
 def is_signal(name: str) -> bool:

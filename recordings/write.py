@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-import pyarrow as pa
-import pyarrow.parquet as pq
+import pandas as pd
 import xarray as xr
 
 from ..errors import InputError
+from ..extras import needed_for
 from ..files import written_whole
 
 
@@ -15,6 +15,9 @@ def demand_suffix(path: str | Path) -> None:
     suffix = Path(path).suffix
     if suffix.lower() not in (".csv", ".parquet"):
         raise InputError(f"{path}: a recording is written as .csv or .parquet, not {suffix!r}; change the suffix")
+    if suffix.lower() == ".parquet":
+        with needed_for(f"{path}: a Parquet file"):
+            import pyarrow  # noqa: F401  what pandas writes it with
 
 
 def write_recording(dataset: xr.Dataset, path: str | Path) -> None:
@@ -23,10 +26,13 @@ def write_recording(dataset: xr.Dataset, path: str | Path) -> None:
     The file appears whole or not at all. Raises InputError for another suffix, or where the file cannot be written.
     """
     demand_suffix(path)
-    path = Path(path)
-    table = dataset.to_dataframe().reset_index()
+    write_frame(dataset.to_dataframe().reset_index(), Path(path))
+
+
+def write_frame(table: pd.DataFrame, path: Path) -> None:
+    """Write a table's columns, without its index, as CSV or Parquet, whole or not at all."""
     with written_whole(path) as part:
         if path.suffix.lower() == ".csv":
             table.to_csv(part, index=False, lineterminator="\n")
         else:
-            pq.write_table(pa.Table.from_pandas(table, preserve_index=False), part)
+            table.to_parquet(part, index=False)

@@ -23,6 +23,7 @@ SHADE = "#56B4E9"
 GREY = "#9AA3AB"
 
 _STYLE = {
+    "svg.hashsalt": "snarelab",  # The same picture is the same bytes.
     "svg.fonttype": "none",  # The browser's own fonts: text stays text, and no glyph can be missing.
     "text.parse_math": False,  # A "$" in a column's name is a dollar sign.
     "figure.facecolor": "white",
@@ -50,6 +51,13 @@ _STYLE = {
 }
 _DOTS_PER_INCH = 130
 
+# On a dark page a picture's paper, ink and grid are the page's; what has a colour of its own keeps it. Print is light.
+_DARK = """ <style>@media screen and (prefers-color-scheme:dark){
+[style*="fill: #ffffff"]{fill:#14181c!important}[style*="fill: #000000"],text{fill:#e4e8ec!important}
+[style*="stroke: #000000"]{stroke:#e4e8ec!important}[style*="stroke: #e3e7ea"]{stroke:#2c343b!important}
+[style*="stroke: #56616b"]{stroke:#a2adb7!important}[style*="fill: #56616b"]{fill:#a2adb7!important}}</style>
+"""
+
 
 @contextmanager
 def drawing() -> Iterator[None]:
@@ -64,7 +72,8 @@ def svg(figure: Figure) -> bytes:
     """The figure as SVG with its time axes named, without a date: the same diagnosis draws the same picture."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="svg", dpi=_DOTS_PER_INCH, metadata={"Date": None, "Creator": None})
-    return with_time_axes(buffer.getvalue(), figure)
+    drawn = buffer.getvalue().replace(b" <defs>", _DARK.encode("ascii") + b" <defs>", 1)
+    return with_time_axes(drawn, figure)
 
 
 def margins(figure: Figure, left: float, right: float, bottom: float, top: float) -> dict[str, float]:

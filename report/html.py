@@ -4,14 +4,14 @@ import base64
 from collections.abc import Sequence
 from html import escape
 
-from . import time_cursor
+from . import time_cursor, zoom
 from .time_axes import time_axes
 
 STYLE = """
 :root{color-scheme:light dark;--paper:#fff;--ink:#1c2329;--quiet:#56616b;--line:#d5dbe0;--card:#f5f7f9;--accent:#00588f;
---missing:#a34700;--adequate:#00664b;--unknown:#7a3f66}
+--missing:#a34700;--adequate:#00664b;--unknown:#7a3f66;--plate:#fff}
 @media (prefers-color-scheme:dark){:root{--paper:#14181c;--ink:#e4e8ec;--quiet:#a2adb7;--line:#37414a;--card:#1e242a;
---accent:#6cbcf0}}
+--accent:#6cbcf0;--plate:#14181c}}
 *{box-sizing:border-box}
 body{margin:0;background:var(--paper);color:var(--ink);font:16px/1.5 system-ui,-apple-system,"Segoe UI",Roboto,
 "Helvetica Neue",Arial,sans-serif;overflow-wrap:anywhere}
@@ -55,21 +55,33 @@ td.n,.share{white-space:nowrap}
 margin-right:.6rem}
 .bar i{display:block;height:100%;background:#0072b2}
 figure{margin:1rem 0}
-.plate{background:#fff;border:1px solid var(--line);border-radius:.5rem;padding:.5rem;overflow-x:auto}
-.plot{position:relative;min-width:40rem}
+.plate{background:var(--plate);border:1px solid var(--line);border-radius:.5rem;padding:.5rem;overflow-x:auto}
+.plot{position:relative}
 .plot img{display:block;width:100%;height:auto}
 .plate.small{max-width:48rem}
 figcaption{margin-top:.35rem;max-width:50rem}
 details{margin:1rem 0}
 summary{cursor:pointer;color:var(--accent)}
 .on-paper{display:none}
+.provenance{font-size:.85rem}
+code{font-size:.92em}
+.card>h3{margin-bottom:.25rem}
 footer{margin:3rem auto 2rem;color:var(--quiet);font-size:.85rem}
 @media (max-width:40rem){.bar{display:none}th,td{padding-right:.7rem}
 .facts{grid-template-columns:1fr}.facts dd{margin-bottom:.4rem}}
-@media print{:root{--paper:#fff;--ink:#000;--quiet:#444;--line:#bbb;--card:#fff;--accent:#000}
+@media print{:root{--paper:#fff;--ink:#000;--quiet:#444;--line:#bbb;--card:#fff;--accent:#000;--plate:#fff}
 @page{margin:15mm}body{font-size:10.5pt}nav,.on-screen{display:none}.on-paper{display:block}
 .plate{border:0;padding:0}.plot{min-width:0}
 figure,.card,tr{break-inside:avoid}h2,h3,summary{break-after:avoid}.scroll,.plate{overflow:visible}
+.card{padding:.3rem .6rem}.scroll table{font-size:8pt}.scroll th,.scroll td{padding-right:.5rem}
+.wide td:not(.n),tbody th{min-width:0}
+header{padding-top:0}h1{font-size:13pt;margin:.3rem 0 .4rem}header .facts{font-size:8pt;
+grid-template-columns:max-content 1fr max-content 1fr}
+#answer{break-after:page;font-size:8.5pt;line-height:1.3}
+#answer h2{margin:.4rem 0 .2rem;padding-top:.2rem;font-size:11pt}
+#answer h3{font-size:9pt}#answer figure,#answer p,#answer h3,#answer .scroll{margin:.25rem 0}
+#answer table,#answer figcaption{font-size:8.5pt}#answer th,#answer td{padding-top:.1rem;padding-bottom:.1rem}
+#answer .plot img{max-height:75mm;width:auto;max-width:100%}#answer .provenance{font-size:7.5pt}
 .status{-webkit-print-color-adjust:exact;print-color-adjust:exact}.bar,.bar i{print-color-adjust:exact}
 details::details-content{content-visibility:visible;block-size:auto}}
 """
@@ -100,14 +112,17 @@ def page(title: str, header: str, sections: Sequence[tuple[str, str, str]], foot
     )
     style, script = STYLE, _SCROLLING
     if ' data-time-axes="' in body:
-        style, script = STYLE + time_cursor.STYLE, _SCROLLING + time_cursor.SCRIPT
+        style, script = style + time_cursor.STYLE, script + time_cursor.SCRIPT
+    packed = ""
+    if ' class="zoom"' in body:
+        style, script, packed = style + zoom.STYLE, script + zoom.SCRIPT, zoom.library()
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head><meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         '<link rel="icon" href="data:,">\n'
         f"<title>{escape(title)}</title>\n<style>{style}</style></head>\n<body>\n<header>{header}</header>\n"
         f'<nav aria-label="Sections">{links}</nav>\n<main>\n{body}\n</main>\n'
-        f"<footer>{escape(footer)}</footer>\n<script>{script}</script>\n</body>\n</html>\n"
+        f"<footer>{escape(footer)}</footer>\n{packed}<script>{script}</script>\n</body>\n</html>\n"
     )
 
 
@@ -148,13 +163,13 @@ def table(
     )
 
 
-def figure(svg: bytes, alternative: str, caption: str, small: bool = False) -> str:
-    """A picture on a white plate, so that it reads the same on light and dark paper; plots over time share a cursor."""
+def figure(svg: bytes, alternative: str, caption: str, small: bool = False, zoom: str = "") -> str:
+    """A picture on a plate; plots over time share a cursor. ``zoom`` is what `zoomable` gave of the same plot."""
     data = base64.b64encode(svg).decode("ascii")
     return (
         f'<figure><div class="plate{" small" if small else ""}">'
         f'<div class="plot"{time_axes(svg)}><img src="data:image/svg+xml;base64,{data}" alt="{escape(alternative)}">'
-        "</div></div>"
+        f"</div></div>{zoom}"
         f"<figcaption>{escape(caption)}</figcaption></figure>\n"
     )
 

@@ -20,10 +20,10 @@ from ..models.model_file import load_model
 from ..models.model_write import save_model
 from ..progress import stages
 from ..recordings import find_recording
+from ..report.provenance import provenance
 from .outcome import FOLDER, Quantity, write_json, write_result
 
 HERE = Path(__file__).parent
-OUT = FOLDER / "emps"
 
 PUBLISHED = {
     "mass": (95.1089, "kg"),
@@ -38,9 +38,8 @@ PUBLISHED_ERROR = {"train": 0.040834, "holdout": 0.059824}
 
 
 def main() -> int:
-    """Run the study; leaves report, numbers and the improved model in ``build/studies/emps``."""
-    begun = time.monotonic()
-    OUT.mkdir(parents=True, exist_ok=True)
+    """Run the study; leaves report, numbers and the improved model in ``build/studies/emps`` (or ``bundled``)."""
+    begun, name = time.monotonic(), "emps"
     quantities: list[Quantity] = []
     try:
         train, holdout = find_recording("DATA_EMPS.mat"), find_recording("DATA_EMPS_PULSES.mat")
@@ -48,14 +47,17 @@ def main() -> int:
     except InputError as error:
         _say(f"The EMPS recordings cannot be had: {error}.")
         _say("A bundled recording of a three-joint arm is diagnosed instead; another engine (MuJoCo) made it.")
-        model, train, holdout = (HERE / "bundled" / name for name in ("arm3.toml", "train.csv", "holdout.csv"))
+        name = "bundled"
+        model, train, holdout = (HERE / name / file for file in ("arm3.toml", "train.csv", "holdout.csv"))
     else:
         quantities += _published(train, holdout)
+    out = FOLDER / name
+    out.mkdir(parents=True, exist_ok=True)
     answer = _diagnose(model, train, holdout)
     found = answer.diagnosis
     _say(_table(found))
-    save_model(answer.model, OUT / "model.toml", found.sentence)
-    again = _diagnose(OUT / "model.toml", train, holdout).diagnosis
+    save_model(answer.model, out / "model.toml", found.sentence)
+    again = _diagnose(out / "model.toml", train, holdout).diagnosis
     _say(f"  {again.sentence}")
     last = found.steps[-1]
     quantities += [
@@ -64,11 +66,12 @@ def main() -> int:
         Quantity("named", "", ", ".join(f"{e.name} at {e.at}" for e in found.effects), "reference"),
         Quantity("second_verdict", "", again.verdict, "reference"),
     ]
-    write_json(OUT / "diagnosis.json", found.to_json())
+    write_json(out / "diagnosis.json", found.to_json())
     more = {"recording": train.name, "steps": [vars(s) for s in found.steps]}
-    write_result("emps", quantities, time.monotonic() - begun, more)
-    write_report(found, OUT / "report.html")
-    _say(f"\n{found.sentence}\nReport: {(OUT / 'report.html').resolve()}")
+    write_result(name, quantities, time.monotonic() - begun, more)
+    origin = provenance("make study-emps", [("Model", model), ("Training", train), ("Held-out", holdout)])
+    write_report(found, out / "report.html", origin)
+    _say(f"\n{found.sentence}\nReport: {(out / 'report.html').resolve()}")
     return 0
 
 
@@ -99,7 +102,7 @@ def _published(train: Path, holdout: Path) -> list[Quantity]:
 
 def _table(found: Diagnosis) -> str:
     """The README's table."""
-    lines = ["| model | error, fitted | error, held out |", "| --- | ---: | ---: |"]
+    lines = ["| model | error, training | error, held-out |", "| --- | ---: | ---: |"]
     lines += [f"| {s.label} | {100 * s.train:.2f} % | {100 * s.holdout:.2f} % |" for s in found.steps]
     return "\n".join(lines)
 

@@ -22,13 +22,18 @@ from ..tolerance.run import run_study
 from ..tolerance.study import Study, load_study
 from .outcome import FOLDER, Quantity, table, write_result
 
-STUDIES = {"ground": "ground_", "inspection": ""}
+STUDIES = {
+    "ground": "ground_",
+    "inspection": "",
+    "latched_inspection": "latched.",
+    "latched_hover": "latched.hover_",
+}
 """And what stands before the names of their quantities: without another word they are of the inspection case."""
 _FILES = Path(__file__).parents[1] / "tolerance"
 
 
 def main() -> int:
-    """Run both studies, or go on with them; leaves reports and numbers in ``build/studies/tolerance``."""
+    """Run all studies, or go on with them; leaves reports and numbers in ``build/studies/tolerance``."""
     begun = time.monotonic()
     folder = FOLDER / "tolerance"
     folder.mkdir(parents=True, exist_ok=True)
@@ -67,6 +72,11 @@ def _quantities(prefix: str, content: dict[str, Any]) -> list[Quantity]:
         _quantity(f"{prefix}envelope_angle", "rad", content["envelope_angle"]),
         Quantity(f"{prefix}undecided", "1", content["width"], "reference"),
         Quantity(f"{prefix}cases", "1", content["cases"], "reference"),
+        *(
+            Quantity(f"{prefix}proxy_{key}", "1", content["proxy"][key], "reference")
+            for key in ("disagree", "latched_against", "failed_against")
+            if "proxy" in content
+        ),
     ]
 
 
@@ -93,7 +103,7 @@ def _page(quantities: list[Quantity], found: list[tuple[dict[str, Any], str]]) -
         rows,
         numeric=(1, 2),
     )
-    parts = [("numbers", "In numbers", numbers), ("studies", "The two studies", f"<ul>{links}</ul>")]
+    parts = [("numbers", "In numbers", numbers), ("studies", "The studies", f"<ul>{links}</ul>")]
     header = "<h1>How far off may the arm arrive?</h1>" + "".join(
         paragraph(c["sentence"]) + paragraph(c["box"]) for c, _ in found
     )

@@ -13,10 +13,13 @@ INERTIA = MASS * LENGTH**2 + 0.02
 RATE = 200
 
 
-def record(path, seed, seconds, *, rounding=0.0, stribeck=0.0, speed=0.08, drag=0.0, stops=False, knocks=()):
+def record(
+    path, seed, seconds, *, rounding=0.0, stribeck=0.0, speed=0.08, drag=0.0, stops=False, knocks=(), wander=0.0
+):
     """A pendulum under a PD servo; friction of 3 N·m, rounded over ``rounding`` [rad/s] or sharp.
 
-    It swings, or goes from point to point and ``stops`` there; something shakes it at the ``knocks`` [s].
+    It swings, or goes from point to point and ``stops`` there; something shakes it at the ``knocks`` [s]. Its
+    disturbance is in a band or, where ``wander`` is above zero, a random walk of that RMS [N·m] about its mean.
     """
     rng = np.random.default_rng(seed)
     steps, fine = int(1000 * seconds), 4
@@ -34,6 +37,9 @@ def record(path, seed, seconds, *, rounding=0.0, stribeck=0.0, speed=0.08, drag=
     ahead = INERTIA * np.gradient(wanted, 1e-3) + MASS * GRAVITY * LENGTH * np.cos(target)
     push = np.asarray(sosfilt(butter(2, (0.3, 12.0), "bandpass", fs=1000, output="sos"), rng.normal(size=steps)))
     push *= 0.3 / np.sqrt(np.mean(push**2))
+    if wander:
+        push = np.cumsum(rng.normal(size=steps))
+        push = wander * (push - push.mean()) / push.std()
     for at in knocks:
         push += 9.0 * np.sin(2 * np.pi * 7 * t) * np.exp(-(((t - at) / 0.15) ** 2))
     kp, kd, h = INERTIA * 30.0**2, INERTIA * 45.0, 1e-3 / fine

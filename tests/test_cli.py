@@ -140,3 +140,66 @@ def test_a_notice_takes_the_line_of_the_progress(monkeypatch):
         show("reading")
         warnings.warn("no C compiler", UserWarning, stacklevel=2)
     assert screen.getvalue().endswith("reading\r\x1b[2Ksnarelab: no C compiler\n\r\x1b[2K")
+
+
+def test_quiet_says_nothing_that_was_not_asked_for(arm_folder, capfd, monkeypatch):
+    screen = Terminal()
+    monkeypatch.setattr(sys, "stderr", screen)
+    assert main([*arguments("identify"), "--quiet"]) == 0
+    assert (capfd.readouterr().out, screen.getvalue()) == ("", "")
+    assert (arm_folder / "out.json").is_file()
+    assert main(["identify", "arm.toml", "none.csv", "-q"]) == 2
+    assert screen.getvalue().startswith("snarelab: none.csv: ")
+
+
+def test_every_holdout_of_identify_counts(arm_folder, capfd):
+    """Of two held-out recordings, the error is that over both."""
+    table(3).to_csv("third.csv", index=False)
+    errors = []
+    for held in (["hold.csv"], ["third.csv"], ["hold.csv", "third.csv"]):
+        options = [word for name in held for word in ("--holdout", name)]
+        assert main(["identify", "arm.toml", "train.csv", *options, "--json", "-"]) == 0
+        errors.append(json.loads(capfd.readouterr().out)["fit"]["tau.joint1"]["holdout"]["rms"])
+    assert min(errors[:2]) < errors[2] < max(errors[:2])
+
+
+@pytest.mark.usefixtures("arm_folder")
+def test_a_second_holdout_of_diagnose_is_refused_and_not_dropped(capfd):
+    with pytest.raises(SystemExit) as stopped:
+        main(["diagnose", "arm.toml", "train.csv", "--holdout", "hold.csv", "--holdout", "other.csv"])
+    assert stopped.value.code == 2
+    assert "--holdout: given twice, hold.csv and other.csv; give one" in capfd.readouterr().err
+
+
+def test_comments_of_a_model_file_survive(arm_folder):
+    """Saved over its own source, twice: order, spelling and comments stay, and the note is not piled up."""
+    source = arm_folder / "arm.toml"
+    text = source.read_text(encoding="utf-8")
+    source.write_text(f"# Bench of March, gripper off.\n{text}\n# the end\n", encoding="utf-8")
+    for _ in range(2):
+        assert main(["identify", "arm.toml", "train.csv", "--save-model", "arm.toml"]) == 0
+    saved = source.read_text(encoding="utf-8")
+    assert saved.count("values from snarelab identify") == saved.count("# Bench of March, gripper off.\n") == 1
+    assert saved.count("# the end") == 1
+    assert all(line in saved.splitlines() for line in text.splitlines() if line.startswith(("urdf", 'effects = ["')))
+    assert "viscous_friction.joint2.coefficient" in snarelab.load_model(source).values
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "tcsh"])
+def test_completion_knows_every_command(capfd, shell):
+    assert main(["completion", shell]) == 0
+    script = capfd.readouterr().out
+    assert all(word in script for word in ("diagnose", "identify", "holdout", "save-model", "tolerance"))
+
+
+def test_bash_takes_the_completion(tmp_path):
+    script = subprocess.run(
+        [sys.executable, "-m", "snarelab.cli", "completion", "bash"], capture_output=True, text=True
+    )
+    (tmp_path / "complete").write_text(script.stdout, encoding="utf-8")
+    ask = (
+        'source "$1"; COMP_WORDS=(snarelab dia); COMP_CWORD=1; '
+        '_shtab_snarelab snarelab dia snarelab 2>/dev/null; echo "${COMPREPLY[@]}"'
+    )
+    ran = subprocess.run(["bash", "-c", ask, "bash", str(tmp_path / "complete")], capture_output=True, text=True)
+    assert ran.stdout.split() == ["diagnose"], ran.stderr

@@ -95,7 +95,9 @@ def test_loop_in_c_gives_the_same_bits(files, scheme, hold):
             runs.append(master.run(0.2505))
             assert (master._loop is False) != compiled
     assert runs[0].recording.equals(runs[1].recording)
-    assert (runs[0].steps, runs[0].evaluations) == (runs[1].steps, runs[1].evaluations) == (251, 251)
+    assert (runs[0].steps, runs[0].evaluations) == (runs[1].steps, runs[1].evaluations)
+    assert runs[0].steps == 251
+    assert runs[0].evaluations - 251 in (range(1, 5) if hold == "quadratic" else [0])  # its start is iterated
 
 
 def test_loop_in_c_is_left_to_what_it_can_do(files):
@@ -266,7 +268,7 @@ def test_units_follow_the_base_unit(name, base_unit, target, factor):
     assert conversion(pint_unit(name, base_unit), target) == pytest.approx((factor, 0.0), rel=1e-9, abs=1e-12)
 
 
-def test_arrays_are_scalars_with_indices_and_text_inputs_are_refused():
+def test_arrays_are_scalars_with_indices_and_text_inputs_are_left_alone():
     def variable(name, kind, causality, dimensions=(), reference=0, start=None):
         return SimpleNamespace(
             name=name, valueReference=reference, type=kind, causality=causality, start=start, unit=None,
@@ -285,6 +287,45 @@ def test_arrays_are_scalars_with_indices_and_text_inputs_are_refused():
     assert [v.name for v in found.variables] == ["flow[1,1]", "flow[1,2]", "flow[2,1]", "flow[2,2]", "sum"]
     assert [v.start for v in found.variables[:4]] == [1, 2, 3, 4]
     assert found.variables[4].depends == ("flow[1,1]", "flow[1,2]", "flow[2,1]", "flow[2,2]")
+    assert not found.unread
     description.modelVariables.append(variable("mode", "String", "input", (), 3))
-    with pytest.raises(InputError, match="'mode' holds String"):
-        read_interface(description, "x.fmu")
+    found = read_interface(description, "x.fmu")
+    assert found.unread == {"mode": "String"}
+    assert "mode" not in {v.name for v in found.variables}
+
+
+def described(variables, outputs=()):
+    """A description of FMI 3.0, as FMPy reads it."""
+    return SimpleNamespace(unitDefinitions=[], modelVariables=list(variables), outputs=list(outputs))
+
+
+def array(name, reference, *lengths, causality="output"):
+    return SimpleNamespace(
+        name=name, valueReference=reference, type="Float64", causality=causality, start=None, unit=None,
+        declaredType=None, description=None, min=None, max=None, variability="continuous",
+        dimensions=[SimpleNamespace(start=n, valueReference=None) for n in lengths],
+    )  # fmt: skip
+
+
+def test_arrays_have_a_bound_together_that_is_met_before_anything_is_made():
+    """2000 of 100 000 elements took a minute and 1.3 GB; each for itself could be read."""
+    began = time.monotonic()
+    with pytest.raises(InputError, match=r"x\.fmu: arrays down to 'a1' have 200000 elements together; 100000 can be"):
+        read_interface(described(array(f"a{k}", k, 100_000) for k in range(2000)), "x.fmu")
+    inputs = [array("u", 0, 50_000, causality="input")]
+    sums = [array(f"y{k}", k + 1) for k in range(200)]
+    unknown = [SimpleNamespace(variable=y, dependencies=inputs) for y in sums]
+    with pytest.raises(InputError, match="outputs depend on inputs 5050000 times; 5000000 can be read"):
+        read_interface(described([*inputs, *sums], unknown), "x.fmu")
+    assert len(read_interface(described([array("y", 0, 100_000)]), "x.fmu").variables) == 100_000
+    assert time.monotonic() - began < 10.0
+
+
+def test_a_text_input_cannot_be_connected_and_needs_not_to_be(files):
+    """As Feedthrough of the Reference-FMUs has one."""
+    left = Fmu(files["left", 3])
+    left.unread = {"note": "String"}
+    parts = {"left": left, "right": Fmu(files["right", 3])}
+    System(parts, CONNECTIONS)
+    with pytest.raises(InputError, match=r"'left\.note' holds String, not a number; nothing can be connected to it"):
+        System(parts, [*CONNECTIONS, ("right.x", "left.note")])

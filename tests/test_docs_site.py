@@ -97,10 +97,16 @@ def test_broken_links_fail_the_build(tmp_path):
     assert ran.stderr.count("[myst.xref_missing]") == len(broken), ran.stderr
 
 
+EXTRAS = "snare", "fmu", "cluster", "formats"
+
+
 def requirements(group):
+    """Packages that are asked for to run, extras among them, or to develop."""
     given = tomllib.loads(read(ROOT / "pyproject.toml"))["project"]
-    listed = given["dependencies"] if group == "run" else given["optional-dependencies"]["dev"]
-    return {re.split(r"[<>=\[; ]", line)[0] for line in listed}
+    more = given["optional-dependencies"]
+    listed = [*given["dependencies"], *(line for extra in EXTRAS for line in more[extra])]
+    names = {re.split(r"[<>=\[; ]", line)[0] for line in (listed if group == "run" else more["dev"])}
+    return names - {"snarelab"}
 
 
 def test_every_dependency_has_its_reason():
@@ -114,7 +120,8 @@ def test_every_dependency_has_its_reason():
 
 
 def test_every_dependency_to_run_is_imported():
-    code = "\n".join(read(path) for folder in PACKAGE for path in (ROOT / folder).rglob("*.py"))
+    files = [*ROOT.glob("*.py"), *(path for folder in PACKAGE for path in (ROOT / folder).rglob("*.py"))]
+    code = "\n".join(map(read, files))
     imported = set(re.findall(r"^\s*(?:import|from) (\w+)", code, re.MULTILINE))
     imported |= {"distributed"} if "from dask.distributed import" in code else set()
     unused = {name for name in requirements("run") if IMPORTED_AS.get(name, name.replace("-", "_")) not in imported}

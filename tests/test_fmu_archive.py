@@ -2,6 +2,7 @@
 
 import re
 import struct
+import warnings
 import zipfile
 import zlib
 
@@ -138,6 +139,22 @@ def test_an_entity_bomb(good, tmp_path):
 
     path = rewritten(good[0], tmp_path / "bad.fmu", change)
     assert "document type" in refused(path, tmp_path / "x")
+
+
+def test_what_the_model_keeps_for_itself_is_its_own(good, tmp_path):
+    """XML with a document type, a table of zeros, and entries that are there twice."""
+    path = rewritten(good[0], tmp_path / "sound.fmu", lambda n, d: d)
+    with zipfile.ZipFile(path, "a", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("resources/settings.xml", '<!DOCTYPE settings SYSTEM "settings.dtd"><settings/>')
+        archive.writestr("documentation/page.xml", "no XML at all")
+        archive.writestr("resources/table.bin", bytes(20 << 20))
+        for text in ("old", "new"):
+            with warnings.catch_warnings(action="ignore"):
+                archive.writestr("resources/note.txt", text)
+                archive.writestr("modelDescription.xml", archive.read("modelDescription.xml"))
+    open_fmu(path, tmp_path / "x")
+    assert (tmp_path / "x" / "resources" / "note.txt").read_text() == "new"  # the last one, as in any ZIP archive
+    assert (tmp_path / "x" / "resources" / "table.bin").stat().st_size == 20 << 20
 
 
 @pytest.mark.parametrize(

@@ -219,8 +219,21 @@ def test_time_left_is_extrapolated_from_the_share_done(monkeypatch):
         show("case 1 of 5")
         show("case 2 of 5")  # one in 10 s: three more to go
         show("now at 0.5 s", 0.5)
-    assert "[10 s, 30 s left] case 2 of 5" in terminal.getvalue()
-    assert "[40 s] now at 0.5 s" in terminal.getvalue()
+    assert "[10 s, 0.1/s, 30 s left] ━━━━────── case 2 of 5" in terminal.getvalue()
+    assert "[40 s] ━━━━━───── now at 0.5 s" in terminal.getvalue()
+
+
+def test_no_time_left_is_not_said_again_and_again(monkeypatch):
+    terminal, clock = Terminal(), iter([0.0, 0.0, 10.0, 40.0])
+    monkeypatch.setattr(sys, "stderr", terminal)
+    monkeypatch.setattr(time, "monotonic", lambda: next(clock))
+    with Progress() as show:
+        show("case 1 of 3")
+        show("case 2 of 3")
+        show("case 3 of 3")
+    assert "[10 s, 0.1/s, 10 s left]" in terminal.getvalue()
+    assert "[40 s, 3/min] ━━━━━━━━━━ case 3 of 3" in terminal.getvalue()
+    assert "0 s left]" not in terminal.getvalue().replace("10 s left]", "")
 
 
 def test_a_line_of_progress_does_not_wrap(monkeypatch):

@@ -66,14 +66,14 @@ def test_a_misfit_is_relative_to_the_link_encoders_own_reading():
              finding("sensor_delay", "q.joint3", 0.002)],
             [channel("x", 2e-3, 1e-3, "rad"), channel("y", 5e-3, 4e-3, "m"), channel("z", 9e-3, 9e-3, "m")],
             "Link and motor encoders differ by sensor delay of 12.3, 2 ms at q_link.joint1, q.joint3; joint elasticity "
-            "at joint2. With that added, the difference left on y, on the recording that the fit never saw, falls from "
+            "at joint2. With that added, the difference left on y, on the held-out recording, falls from "
             "5 mm to 4 mm.",
         ),
         (
             [finding("sensor_bias"), finding("sensor_gain")],
             [channel("x", 2e-3, 3e-3, "rad"), channel("y", 1e-3, 1e-3, "rad")],  # none became better: the worst
             "Link and motor encoders differ by sensor bias at q_link.joint1; sensor gain at q_link.joint1. With that "
-            "added, the difference left on x, on the recording that the fit never saw, falls from 2 mrad to 3 mrad.",
+            "added, the difference left on x, on the held-out recording, falls from 2 mrad to 3 mrad.",
         ),
         ([finding("sensor_bias")], [], "Link and motor encoders differ by sensor bias at q_link.joint1."),
     ],

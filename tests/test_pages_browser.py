@@ -6,7 +6,7 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from browser import opened, playing
 from diagnoses import VERDICTS, unbroken
-from playwright.sync_api import Browser
+from playwright.sync_api import Browser, Page
 from proof_answers import several
 from study_pages import QUANTITIES, moving, picture
 from tolerance_toy import toy_results, toy_study
@@ -27,6 +27,16 @@ AXE = {"resultTypes": ["violations"], "iframes": False}  # between frames of a f
 # Everything that can be used, and is to be seen; a frame counts by what is in it.
 CONTROLS = """() => [...document.querySelectorAll("a[href],button,input,select,summary,[tabindex='0']")]
     .filter(x => x.checkVisibility({visibilityProperty: true}) && !x.disabled).map((x, i) => x.dataset.seen = `${i}`)"""
+
+# What was opened has its size two frames later, and what scrolls can then be reached by key.
+LAID_OUT = "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
+
+
+def drawn(page: Page) -> None:
+    """On a narrow window a plot that comes into sight is drawn anew and hides its picture; let all be drawn."""
+    for plate in page.locator(".plate:has(.zoom-button):visible").all():
+        plate.scroll_into_view_if_needed()
+        plate.locator(".drawn[data-ready]").wait_for()
 
 
 @pytest.fixture(scope="module")
@@ -60,6 +70,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 def test_axe_finds_nothing_serious(browser: Browser, pages: dict[str, Path], kind: str, scheme, width: int) -> None:
     with opened(browser, pages[kind], scheme, (width, 900)) as page:
         page.evaluate("document.querySelectorAll('details').forEach(x => x.open = true)")
+        page.evaluate(LAID_OUT)
         frames = [page.main_frame, playing(page)] if kind == "study" else [page.main_frame]
         for frame in frames:
             found = Axe().run(frame, options=AXE).response
@@ -73,6 +84,8 @@ def test_axe_finds_nothing_serious(browser: Browser, pages: dict[str, Path], kin
 )
 def test_tab_reaches_every_control(browser: Browser, pages: dict[str, Path], kind: str, width: int) -> None:
     with opened(browser, pages[kind], size=(width, 900)) as page:
+        if width < 640:
+            drawn(page)
         frames = [page.main_frame, playing(page)] if kind == "study" else [page.main_frame]
         wanted = [{*frame.evaluate(CONTROLS)} for frame in frames]
         assert all(len(controls) >= 3 for controls in wanted)
@@ -96,7 +109,7 @@ def test_paper_hides_and_cuts_nothing(browser: Browser, pages: dict[str, Path], 
         assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
         assert not page.locator(".cursor:visible,.times:visible,nav:visible,iframe:visible").count()
         hidden = page.evaluate("""() => [...document.querySelectorAll("body *")]
-            .filter(x => !x.closest("nav,script,style,noscript,.on-screen,.cursor,.times,.bar"))
+            .filter(x => !x.closest("nav,script,style,noscript,.on-screen,.zoom-button,.cursor,.times,.bar"))
             .filter(x => !x.getBoundingClientRect().height || !x.checkVisibility({contentVisibilityAuto: true}))
             .map(x => x.outerHTML.slice(0, 80))""")
         assert [element for element in hidden if not element.startswith(("<col", "<br"))] == []

@@ -6,14 +6,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from axe_playwright_python.sync_playwright import Axe
 from browser import opened, pixels
 from diagnoses import VERDICTS, unbroken
 from pages import pictures, read
 from playwright.sync_api import Browser
 
 from snarelab.identification.report.page import write_report
+from snarelab.report.provenance import provenance
 
-SECTIONS = ["missing", "where", "unseen", "steps", "shape", "candidates", "parameters", "notes"]
+BUNDLED = Path(__file__).resolve().parents[1] / "studies" / "bundled"
+
+SECTIONS = ["answer", "missing", "where", "unseen", "steps", "shape", "candidates", "parameters", "notes"]
 
 
 @pytest.fixture(scope="module")
@@ -21,7 +25,8 @@ def reports(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("reports")
     begin = time.process_time()
     for verdict, make in VERDICTS.items():
-        write_report(make(), folder / f"{verdict}.html")
+        origin = provenance("snarelab diagnose arm3.toml a.csv", [("Model", BUNDLED / "arm3.toml"), ("Bag", BUNDLED)])
+        write_report(make(), folder / f"{verdict}.html", origin)
     assert time.process_time() - begin < 30  # About 2 s each on one free core; only against a slip by an order.
     return {verdict: folder / f"{verdict}.html" for verdict in VERDICTS}
 
@@ -38,7 +43,14 @@ def test_all_sections_stand_in_order(reports: dict[str, Path], verdict: str) -> 
     diagnosis = VERDICTS[verdict]()
     assert [section["id"] for section in page.all("section")] == SECTIONS
     assert page.all("html") == [{"lang": "en"}]
-    places = [page.text.index(part) for part in (unbroken(diagnosis.sentence), "pick_and_place.csv", "Where")]
+    parts = (
+        unbroken(diagnosis.sentence),
+        "pick_and_place.csv",
+        "What to do next",
+        "What this stands on",
+        "sha256:",
+    )
+    places = [page.text.index(part) for part in parts]
     assert places == sorted(places)
     assert all(note in page.text for note in diagnosis.notes)
     assert all(image["alt"] for image in page.all("img"))
@@ -50,7 +62,9 @@ def test_all_sections_stand_in_order(reports: dict[str, Path], verdict: str) -> 
 @pytest.mark.parametrize("verdict", VERDICTS)
 def test_needs_nothing_from_elsewhere(reports: dict[str, Path], verdict: str) -> None:
     page = read(reports[verdict])
-    assert page.all("script") == [{}]  # the page's own, which stands in it
+    kinds = [script.get("class") or script.get("id") for script in page.all("script")]
+    assert kinds[-2:] == ["plotting", None]  # Bokeh's, packed, and the page's own; both stand in it
+    assert {*kinds[:-2]} == {"zoom"}
     assert page.loaded() == []
     for picture in pictures(page):
         assert set(re.findall(r'href="(.)', picture)) <= {"#", "d"}
@@ -70,6 +84,9 @@ def test_findings_are_told_in_words(reports: dict[str, Path]) -> None:
         # Cells of one row, one after the other.
         "joint58\u202f%these recordings cannot tell them apartrepeat the slow part of the motion with 5 kg",
         "joint53\u202f%these recordings tell them apart–",
+        "Stribeck friction at joint5, or load dependent friction at joint5",
+        "Repeat the slow part of the motion with 5 kg.",
+        "Coulomb friction at joint2level 7.01 ± 0.04 N·mover 99\u202f%41.0\u202f%",
         "tau.joint2\u00a0[N·m]" + "7.36" + "0.381" + "7.36" + "0.381" + "0.343" + "25.3\u202f%" + "1.31\u202f%",
         "and 4 more",
         "3 more channels",
@@ -101,4 +118,43 @@ def test_opens_in_a_browser(browser: Browser, reports: dict[str, Path], verdict:
     assert (shown[5, 5].max() < 40) if scheme == "dark" else (shown[5, 5].min() > 240)
     colour = (0xD5, 0x5E, 0x00) if verdict == "missing_physics" else (0x00, 0x72, 0xB2)
     assert np.sum(np.all(shown == colour, axis=-1)) > 500  # The lines of the figures: the pictures did load.
-    assert np.mean(np.all(shown == 255, axis=-1)) > 0.15  # Their white plates, on dark paper too.
+    assert (np.mean(np.all(shown == 255, axis=-1)) < 0.01) == (scheme == "dark")  # Plates are as dark as the page.
+
+
+def test_the_plot_zooms_and_takes_others_of_its_recording_along(browser: Browser, reports: dict[str, Path]) -> None:
+    """Drawn by Bokeh where a reader asks; all plots of a recording show the same stretch; the picture comes back."""
+    with opened(browser, reports["missing_physics"], "dark", (1400, 1000)) as page:
+        buttons = page.locator(".zoom-button:visible")
+        whole = page.evaluate("document.documentElement.scrollWidth")
+        for k in (0, 2):  # the answer's, and another of the same held-out recording
+            buttons.nth(k).click()
+            page.locator("[data-ready]").nth(k // 2).wait_for()
+        ranges = "[...Bokeh.documents].map(d => [...d.roots()[0].references()].find(m => m.tags?.[0] === 'time'))"
+        assert page.evaluate(f"{ranges}.map(r => r.tags[1])") == ["pick_and_place.csv"] * 2
+        page.evaluate(f"{ranges}[0].setv({{start: 10, end: 12}})")
+        assert page.evaluate(f"{ranges}.map(r => [r.start, r.end])") == [[10, 12]] * 2
+        paper = page.evaluate(
+            "[...Bokeh.documents[0].roots()[0].references()].find(m => m.tags?.[0] === 'zoom').background_fill_color"
+        )
+        assert paper == "#14181c"
+        assert page.evaluate("document.documentElement.scrollWidth") == whole
+        found = Axe().run(page, options={"resultTypes": ["violations"]}).response["violations"]
+        assert [x["id"] for x in found if x["impact"] in ("serious", "critical")] == []
+        buttons.nth(0).click()
+        assert page.locator(".plot img").first.is_visible()
+
+
+def test_on_a_phone_plots_are_whole(browser: Browser, reports: dict[str, Path]) -> None:
+    with opened(browser, reports["missing_physics"], size=(390, 844)) as page:
+        page.locator(".plate").first.scroll_into_view_if_needed()
+        page.locator("[data-ready]").first.wait_for()
+        cut = "[...document.querySelectorAll('.plate')].filter(x => x.scrollWidth > x.clientWidth + 1).length"
+        assert page.evaluate(cut) == 0
+        assert page.evaluate("document.documentElement.scrollWidth") == 390
+
+
+def test_the_answer_is_the_first_printed_sheet(browser: Browser, reports: dict[str, Path]) -> None:
+    """A4 less its margins at 96 dots an inch: what stands up to the end of the answer fits on it."""
+    with opened(browser, reports["missing_physics"], size=(680, 1010)) as page:
+        page.emulate_media(media="print")
+        assert page.evaluate("document.querySelector('#answer').getBoundingClientRect().bottom + scrollY") < 1010

@@ -21,7 +21,9 @@ def test_text_from_outside_stays_text(tmp_path: Path) -> None:
     path = tmp_path / "report.html"
     write_report(spelt(HOSTILE), path)
     page = read(path)
-    assert page.all("script") == [{}]  # the page's own
+    kinds = [script.get("class") or script.get("id") for script in page.all("script")]
+    assert {*kinds[:-2]} == {"zoom"}
+    assert kinds[-2:] == ["plotting", None]  # the page's own
     # Effects, parameters and rivals are put in words, which takes the underscore out.
     assert page.text.count(HOSTILE) + page.text.count(HOSTILE.replace("_", " ")) > 25
     assert len(pictures(page)) == 5
@@ -50,7 +52,7 @@ def test_draws_what_little_there_is(tmp_path: Path) -> None:
     write_report(bare, tmp_path / "report.html")
     page = read(tmp_path / "report.html")
     assert len(page.all("img")) == 2
-    assert len(page.all("section")) == 8
+    assert len(page.all("section")) == 9
     assert "No channel has a position or speed to draw against" in page.text
     assert "nan" not in page.text
 

@@ -9,7 +9,7 @@ from diagnoses import missing_physics, spelt
 from snarelab.identification.diagnosis import Trace
 from snarelab.identification.report.curves import binned
 from snarelab.identification.report.findings import missing
-from snarelab.identification.report.fit import _changed
+from snarelab.identification.report.fit import changes
 from snarelab.identification.report.words import chance, number, percent, spans, unit_words, with_std, words
 from snarelab.report.drawing import thinned
 
@@ -73,6 +73,13 @@ def test_numbers_and_units_in_print() -> None:
     assert [percent(x) for x in (0.83, 0.0161, 0.00001)] == ["83.0\u202f%", "1.61\u202f%", "under 0.01\u202f%"]
     assert [chance(x) for x in (0.999, 0.87, 0.001)] == ["over 99\u202f%", "87\u202f%", "under 1\u202f%"]
     assert [unit_words(u) for u in ("N*m*s/rad", "kg*m**2", "s^-1")] == ["N·m·s/rad", "kg·m²", "s⁻¹"]
+    assert [unit_words(u) for u in ("N*m*s^2/rad", "N*s^2/m", "N/m**1.5", "1", "N * m")] == [
+        "kg·m²",
+        "kg",
+        "N/m¹·⁵",
+        "",
+        "N·m",
+    ]
     assert [words(n) for n in ("coulomb_friction", "joint_elasticity")] == ["Coulomb friction", "joint elasticity"]
     assert spans(((80.1, 96.44), (100.0, 101.0))) == "80.1–96.4, 100.0–101.0 s"
 
@@ -108,7 +115,7 @@ def test_edges_of_numbers_in_print() -> None:
 def test_what_has_no_name_stands_below_what_has() -> None:
     title, content = missing(spelt("a < b"))[1:]
     assert title == "What is missing"
-    assert content.index("at a &lt; b</h3>") < content.index("<h3>Without a name</h3>\n<p>a &lt; b</p>")
+    assert content.index("<h3>a &lt; b</h3>") < content.index("<h3>Without a name</h3>\n<p>a &lt; b</p>")
     assert "Without a name" not in missing(missing_physics())[2]
 
 
@@ -126,5 +133,5 @@ def test_a_model_is_drawn_twice_where_it_changed_by_over_a_hundredth_of_what_was
     left, carried = np.sin(2 * np.pi * t), 50 * np.cos(t)
     still = Trace("a.csv", "train", "tau.joint1", "N*m", t, t, t, carried + left, carried, carried)
     moved = Trace("a.csv", "train", "tau.joint2", "N*m", t, t, t, carried + left, carried, carried + share * left)
-    assert _changed([moved]) is twice
-    assert _changed([still, moved]) is twice  # one that changed is enough
+    assert changes([moved]) is twice
+    assert changes([still, moved]) is twice  # one that changed is enough

@@ -166,7 +166,7 @@ def test_each_step_has_two_bars_in_per_cent_and_its_number_beside_each():
         ("12.5\u202f%", (12.5, 0.81)),
         ("25.0\u202f%", (25.0, 0.19)),
     ]
-    assert [x.get_text() for x in figure.legends[0].get_texts()] == ["recordings fitted", "recording never seen"]
+    assert [x.get_text() for x in figure.legends[0].get_texts()] == ["training", "held-out"]
 
 
 def test_a_candidate_that_was_named_stands_out_of_those_that_were_not():

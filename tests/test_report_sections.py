@@ -96,7 +96,7 @@ def test_the_channels_that_changed_most_stand_first_and_each_in_the_recording_wh
         trace("c", 3.9, 0.1, "train"),
     )
     key, title, content = fit.unseen(diagnosis(traces=kept, effects=spelt("x").effects))
-    assert (key, title) == ("unseen", "Before and after, on data the fit never saw")
+    assert (key, title) == ("unseen", "Before and after, on held-out data")
     assert [(t.channel, t.recording, changed) for t, changed in asked] == [
         ("b", "c.csv", True),
         ("a", "b.csv", True),
@@ -104,10 +104,9 @@ def test_the_channels_that_changed_most_stand_first_and_each_in_the_recording_wh
         ("c", "b.csv", False),
     ]
     captions = re.findall(r"<figcaption>([^<]*)", content)
-    assert captions[0] == "b in c.csv (never seen by the fit). Right: where the two models differ most."
+    assert captions[0] == "b in c.csv (held-out). Right: where the two models differ most."
     assert captions[2] == (
-        "d in b.csv (never seen by the fit). The model before and after are alike here. "
-        "Right: where the model misses most."
+        "d in b.csv (held-out). The model before and after are alike here. Right: where the model misses most."
     )
     texts = re.findall(r'alt="([^"]*)', content)
     assert texts[0] == "b in c.csv: measured, model before and model after over time, and the residual below."
@@ -120,8 +119,8 @@ def test_the_channels_that_changed_most_stand_first_and_each_in_the_recording_wh
 def test_without_an_addition_nothing_is_said_of_before_and_after(asked):
     only = (trace("a", 2, 2, "train"),)
     _, title, content = fit.unseen(diagnosis(traces=only))
-    assert title == "Model and measurement, on data never fitted"
-    assert "a in b.csv (a recording the fit has seen). Right: where the model misses most." in content
+    assert title == "Model and measurement, on held-out data"
+    assert "a in b.csv (training). Right: where the model misses most." in content
     assert [changed for _, changed in asked] == [False]
 
 
@@ -158,13 +157,13 @@ def test_the_misfits_stand_in_one_row_a_channel():
     content = fit._misfits(diagnosis(fit=(MISFIT, replace(MISFIT, channel="<b>", unit="N"))), True)
     assert heads(content) == [
         "Channel",
-        "RMS, fitted, before",
-        "RMS, fitted, after",
-        "RMS, never seen, before",
-        "RMS, never seen, after",
+        "RMS, training, before",
+        "RMS, training, after",
+        "RMS, held-out, before",
+        "RMS, held-out, after",
         "Noise floor",
-        "Relative, never seen, before",
-        "Relative, never seen, after",
+        "Relative, held-out, before",
+        "Relative, held-out, after",
     ]
     cells = ["4.00", "3.00", "8.00", "2.00", "0.125", "80.0\u202f%", "20.0\u202f%"]
     assert rows(content) == [["a\u00a0[N·m]", *cells], ["<b>\u00a0[N]", *cells]]
@@ -174,7 +173,7 @@ def test_the_misfits_stand_in_one_row_a_channel():
 
 def test_without_an_addition_the_misfits_are_those_of_the_one_model():
     content = fit._misfits(diagnosis(fit=(MISFIT,)), False)
-    assert heads(content) == ["Channel", "RMS, fitted", "RMS, never seen", "Noise floor", "Relative, never seen"]
+    assert heads(content) == ["Channel", "RMS, training", "RMS, held-out", "Noise floor", "Relative, held-out"]
     assert rows(content) == [["a\u00a0[N·m]", "4.00", "8.00", "0.125", "80.0\u202f%"]]
 
 
@@ -185,7 +184,7 @@ def test_steps_are_drawn_from_the_second_on(asked):
     assert rows(content)[0] == ["as <given>", "50.0\u202f%", "25.0\u202f%"]
     assert rows(content)[2] == ["+ two", "6.25\u202f%", "10.0\u202f%"]
     assert re.findall(r'alt="([^"]*)', content) == [
-        "Relative misfit by step; on the recording never seen from 25.0\u202f% to 10.0\u202f%."
+        "Relative misfit by step; on the held-out recording from 25.0\u202f% to 10.0\u202f%."
     ]
     assert asked == [(two,)]
     assert "<figure>" not in fit.step_by_step(diagnosis(steps=two[:1]))[2]
@@ -203,8 +202,8 @@ def test_the_residuals_shape_is_drawn_channel_by_channel(asked):
         "a: residual against speed and position.",
     ]
     captions = re.findall(r"<figcaption>([^<]*)", content)
-    assert captions[0].startswith("b, never seen by the fit. Line: mean")
-    assert captions[1].startswith("a, never seen by the fit. The model before and after are alike here. Line")
+    assert captions[0].startswith("b, held-out. Line: mean")
+    assert captions[1].startswith("a, held-out. The model before and after are alike here. Line")
 
 
 def test_a_channel_without_position_or_speed_has_no_shape(monkeypatch):
@@ -285,14 +284,14 @@ def test_the_verdict_stands_on_recordings_that_are_named_once():
     content = findings.verdict(said, date(2024, 2, 29))
     assert re.findall(r"<dt>(.*?)</dt><dd>(.*?)</dd>", content) == [
         ("Model", "arm"),
-        ("Fitted on", "b.csv, a.csv"),
-        ("Never seen by the fit", "&lt;h&gt;.csv"),
+        ("Training", "b.csv, a.csv"),
+        ("Held-out", "&lt;h&gt;.csv"),
         ("Analysis band", "0 to 12.5 Hz"),
         ("Date", "2024-02-29"),
     ]
     assert content.startswith('<span class="status missing_physics">missing physics</span>\n<h1>x</h1>')
     alone = findings.verdict(replace(said, traces=tuple(kept)), date(2024, 2, 29))
-    assert "Never seen" not in alone  # what is empty is left out
+    assert "Held-out" not in alone  # what is empty is left out
 
 
 def test_where_draws_the_four_worst_channels_in_order_from_the_first_recording_fitted(asked):
@@ -311,28 +310,34 @@ def test_where_draws_the_four_worst_channels_in_order_from_the_first_recording_f
     assert findings.where(diagnosis())[2] == "<p>No channel, time or state stands out in the residual.</p>\n"
 
 
-def test_a_card_has_the_effects_name_probability_parameters_and_no_rivals_said():
+def test_a_place_has_one_table_with_evidence_and_rivals_folded():
     estimates = {"level": Estimate(7.0123, 0.0432, "N*m"), "shape_of_it": Estimate(2.0, 0.5, "", at_bound=True)}
-    content = findings._card(Finding("coulomb_friction", "joint<1>", 0.5, 0.87, estimates, "Seen.", ()))
-    assert "<h3>Coulomb friction at joint&lt;1&gt;</h3><span>probability 87\u202f%</span>" in content
+    first = Finding("coulomb_friction", "joint<1>", 0.5, 0.87, estimates, "Seen.", ())
+    bare = Finding("x", "tau.joint<1>", 0.5, 0.5, {}, "", (Rival("backlash", "j", 0.25, True, ""),))
+    content = findings._card("joint<1>", [first, bare])
+    assert "<h3>joint&lt;1&gt;</h3>" in content
+    assert heads(content)[:6] == ["Effect", "Probability", "Parameter", "Value", "Deviation", "Unit"]
     assert rows(content) == [
-        ["level", "7.01", "± 0.04", "N·m", ""],
-        ["shape of it", "2.0", "± 0.5", "–", "at its bound"],
+        ["Coulomb friction at joint<1>", "87\u202f%", "level", "7.01", "± 0.04", "N·m", ""],
+        ["", "", "shape of it", "2.0", "± 0.5", "–", "at its bound"],
+        ["X at tau.joint<1>", "50\u202f%", "", "–", "–", "–", ""],
+        ["backlash at j", "25\u202f%", "these recordings tell them apart", "–"],
+    ]
+    assert re.findall(r"<summary>(.*?)</summary>", content) == [
+        "Why Coulomb friction at joint&lt;1&gt;",
+        "Why x at tau.joint&lt;1&gt;",
     ]
     assert "<p>Seen.</p>\n" in content
     assert '<p class="quiet">No rival explanation is left.</p>' in content
-    assert re.findall('<t[hd][^>]*class="n"[^>]*>([^<]*)', content) == [
-        "Value",
-        "Std",
-        "7.01",
-        "± 0.04",
-        "2.0",
-        "± 0.5",
-    ]
-    bare = findings._card(Finding("x", "y", 0.5, 0.5, {}, "", (Rival("backlash", "j", 0.25, True, ""),)))
-    assert "Parameters" not in bare
-    assert "<h3>X at y</h3>" in bare
-    assert rows(bare) == [["backlash at j", "25\u202f%", "these recordings tell them apart", "–"]]
+
+
+def test_findings_stand_together_by_place_with_the_sensors_of_a_joint():
+    one = Finding("backlash", "a", 0.5, 0.5, {}, "", ())
+    kept = [one, replace(one, at="b"), replace(one, name="sensor_bias", at="tau.a"), replace(one, at="boom1.twist")]
+    groups = findings._by_place(kept)
+    assert {place: [f.at for f in group] for place, group in groups.items()} == {
+        "a": ["a", "tau.a"], "b": ["b"], "boom1.twist": ["boom1.twist"],
+    }  # fmt: skip
 
 
 def test_what_is_said_of_missing_physics_goes_with_the_verdict():
@@ -342,4 +347,4 @@ def test_what_is_said_of_missing_physics_goes_with_the_verdict():
     adequate = replace(said, verdict="adequate")
     assert findings.missing(adequate) == ("missing", "What would have been seen", findings.detection_limits(said))
     named = replace(said, verdict="missing_physics", description="")
-    assert findings.missing(named) == ("missing", "What is missing", findings._card(said.effects[0]))
+    assert findings.missing(named) == ("missing", "What is missing", findings._card("x", said.effects))

@@ -11,8 +11,10 @@ from diagnoses import spelt
 from pages import Page
 
 from snarelab import __version__
+from snarelab.errors import InputError
 from snarelab.identification import results
 from snarelab.identification.diagnosis import Step
+from snarelab.identification.report.words import chance
 from snarelab.identification.results import DiagnosisResult, IdentificationResult, ParameterEstimate
 
 MODEL: Any = SimpleNamespace(name="arm<6>")
@@ -33,10 +35,14 @@ def test_a_diagnosis_prints_its_sentence_and_a_line_a_step():
     one = DiagnosisResult(SAID, MODEL)
     first, *lines = str(one).split("\n")
     assert first == "It is so & so."
-    assert lines == [
-        "  as <given>" + " " * 51 + "fitted  12.35 %   held out  50.00 %",
-        "  + one" + " " * 56 + "fitted   1.25 %   held out 100.00 %",
+    assert lines[:2] == [
+        "  as <given>" + " " * 51 + "training  12.35 %   held-out  50.00 %",
+        "  + one" + " " * 56 + "training   1.25 %   held-out 100.00 %",
     ]
+    assert lines[2:4] == ["", f"  {'what was found':<44} probability   value"]
+    assert len(lines[4:]) >= len(SAID.effects)
+    for effect in SAID.effects:
+        assert any(f"at {effect.at}" in line and chance(effect.probability) in line for line in lines[4:])
     assert repr(one) == str(one)
 
 
@@ -59,18 +65,18 @@ def test_a_diagnosis_shows_verdict_steps_cards_and_notes():
     ]
     table = markup[: markup.index("</table>")]
     assert re.findall(r"<thead>.*</thead>", table) == [
-        '<thead><tr><th scope="col">Model</th><th scope="col" class="n">Fitted</th>'
-        '<th scope="col" class="n">Held out</th></tr></thead>'
+        '<thead><tr><th scope="col">Model</th><th scope="col" class="n">Training</th>'
+        '<th scope="col" class="n">Held-out</th></tr></thead>'
     ]
     assert '<div class="scroll"><table><caption>Relative misfit over all channels' in markup  # no wider than it must be
-    assert re.findall(r"<summary>(.*?)</summary>", markup) == ["What is missing", "Notes"]
+    assert re.findall(r"<summary>(.*?)</summary>", markup) == ["What is missing", "Why x at x", "Notes"]
     assert markup.index('<article class="card">') < markup.index("<summary>Notes")
     assert "<summary>Notes</summary>\n<p>first</p>\n<p>sec&lt;nd</p>\n</details>" in markup
 
 
 def test_without_notes_there_is_nothing_to_fold():
     quiet = DiagnosisResult(replace(SAID, notes=()), MODEL)._repr_html_()
-    assert re.findall(r"<summary>(.*?)</summary>", quiet) == ["What is missing"]
+    assert re.findall(r"<summary>(.*?)</summary>", quiet) == ["What is missing", "Why x at x"]
 
 
 KNOWN = ParameterEstimate("coulomb_friction", "joint1", "level", 1.23456789, 0.0123, "N*m", False, True)
@@ -99,13 +105,13 @@ def test_an_identification_prints_parameters_misfits_and_condition():
     lines = str(IDENTIFIED).split("\n")
     assert lines == [
         "effect                    at              parameter                      value        std  unit",
-        "coulomb_friction          joint1          level                         1.2346      0.012  N*m",
-        "coulomb_friction          j<2>            some_shape                    1.2346    unknown  N*m/rad**2"
+        "coulomb_friction          joint1          level                         1.2346      0.012  N·m",
+        "coulomb_friction          j<2>            some_shape                    1.2346    unknown  N·m/rad²"
         "  (at its bound)",
-        "coulomb_friction          joint1          level                         -12346        0.5  N*m",
-        "tau.joint1 train: RMS residual 2 N*m, 1.23 % of the measured",
-        "tau.joint1 holdout: RMS residual 0.1235 N*m, 50.00 % of the measured",
-        "tau.<2> train: RMS residual 1000 N, 100.00 % of the measured",
+        "coulomb_friction          joint1          level                         -12346        0.5  N·m",
+        "tau.joint1 training: RMS residual 2 N·m, 1.23 % of the measured",
+        "tau.joint1 held-out: RMS residual 0.1235 N·m, 50.00 % of the measured",
+        "tau.<2> training: RMS residual 1000 N, 100.00 % of the measured",
         "condition number 123",
     ]
     assert repr(IDENTIFIED) == str(IDENTIFIED)
@@ -123,9 +129,9 @@ def test_an_identification_shows_its_parameters_with_a_remark_where_they_are_not
         ["Coulomb friction", "joint1", "level", "−12345.7", "± 0.5", "N·m", "not carried by the recordings"],
     ]
     assert misfits == [
-        ["tau.joint1", "train", "2.00 N·m", "1.23\u202f%"],
-        ["tau.joint1", "holdout", "0.123 N·m", "50.0\u202f%"],
-        ["tau.<2>", "train", "1000 N", "100.0\u202f%"],
+        ["tau.joint1", "training", "2.00 N·m", "1.23\u202f%"],
+        ["tau.joint1", "held-out", "0.123 N·m", "50.0\u202f%"],
+        ["tau.<2>", "training", "1000 N", "100.0\u202f%"],
     ]
     assert re.findall(r'<th scope="col" class="n">(.*?)</th>', markup) == [
         "Value", "Std", "RMS residual", "Of the measured",
@@ -162,3 +168,18 @@ def test_a_result_cannot_be_changed(result, name):
         setattr(result, name, None)
     with pytest.raises(FrozenInstanceError):
         setattr(KNOWN, "value", 0.0)  # noqa: B010  what a type checker would refuse
+
+
+def test_results_are_tables_and_pictures_too():
+    found = DiagnosisResult(SAID, MODEL)
+    table = found.to_frame()
+    assert list(table.columns)[:4] == ["effect", "at", "probability", "parameter"]
+    assert len(table) == sum(len(effect.parameters) for effect in SAID.effects)
+    channel = SAID.traces[0].channel
+    assert found.plot().svg == found.plot(channel).svg
+    assert b"<svg" in found.plot().svg
+    with pytest.raises(InputError, match=f"channel 'tau.none' was not recorded; there are {channel}"):
+        found.plot("tau.none")
+    parameters = IDENTIFIED.to_frame()
+    assert parameters["at"].tolist() == ["joint1", "j<2>", "joint1"]
+    assert parameters["value"][0] == 1.23456789

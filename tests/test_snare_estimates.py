@@ -236,16 +236,15 @@ def test_a_finding_tells_the_channel_that_it_made_best_and_rivals_that_count(mon
 def test_one_name_and_several_are_listed_with_what_the_worst_channel_gains():
     fits = _fits(searched(simulated(0.2), simulated(0.36)), [OWN], [OWN])
     some: Any = [
-        SimpleNamespace(name=n, at=a) for n, a in (("contact_friction", "pin"), ("mass", "capture"), ("x", "y"))
+        SimpleNamespace(name=n, at=a, probability=0.99)
+        for n, a in (("contact_friction", "pin"), ("mass", "capture"), ("x", "y"))
     ]
     said = [_sentence(some[:k], fits, "") for k in (1, 2, 3)]
     assert said[0].startswith("The model leaves out contact friction at pin. With that added")
     assert "contact friction at pin and mass at capture." in said[1]
     assert "contact friction at pin, mass at capture and x at y." in said[2]
     # 0.2 m and 0.04 m in one of two numbers.
-    assert said[0].endswith(
-        "the error of pos.target.x on the capture that the fit never saw falls from 141 mm to 28.3 mm."
-    )
+    assert said[0].endswith("the error of pos.target.x on the held-out capture falls from 141 mm to 28.3 mm.")
 
 
 @pytest.mark.parametrize(

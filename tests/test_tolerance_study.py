@@ -5,12 +5,15 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
+from snarelab import tolerance
 from snarelab.errors import InputError
 from snarelab.tolerance.capture import Axis, Capture, Outcome
 from snarelab.tolerance.results import Results
 from snarelab.tolerance.study import Success, load_study
+from snarelab.tolerance.summary import proxy_beside
 
 GOOD = """
 capture = "own_capture:CAPTURE"
@@ -136,3 +139,25 @@ def test_margin_says_how_far_from_failure():
     assert success.margin(Outcome(True, 0.015, 1.0, 1.0, 100.0)) == pytest.approx(-0.5)
     assert success.margin(Outcome(False, 0.001, 1.0, 1.0, 100.0)) == -1
     assert success.margin(Outcome.failed("diverged")) == -1
+
+
+def test_success_may_be_the_latch_and_the_proxy_stands_beside_it():
+    """Four cases: both say yes, both no, the proxy too strict, the proxy too mild; and one without a result."""
+    study = load_study(Path(str(tolerance.__file__)).with_name("latched_inspection.toml"))
+    cases = [
+        Outcome(True, 0.004, 7.0, 20.0, 30.0, latched=0.6, state="LATCHED"),
+        Outcome(True, 0.012, 7.0, 20.0, 30.0, latched=-1.0, state="ABORTED"),
+        Outcome(True, 0.012, 7.0, 20.0, 30.0, latched=0.4, state="LATCHED"),
+        Outcome(True, 0.004, 7.0, 20.0, 30.0, latched=-1.0, state="STUCK"),
+        Outcome.failed("diverged"),
+    ]
+    margins = [study.success.margin(case) for case in cases]
+    assert margins == [0.6, -1.0, 0.4, -1.0, -1.0]
+    assert [study.success.proxy(case) > 0 for case in cases] == [True, False, False, True, False]
+    table = pd.DataFrame([{**vars(case), "margin": m} for case, m in zip(cases, margins, strict=True)])
+    found = proxy_beside(study, table)
+    assert found == {
+        "cases": 4, "disagree": 2, "latched_against": 1, "failed_against": 1, "ends": {"ABORTED": 1, "STUCK": 1},
+    }  # fmt: skip
+    assert study.identity()["success"]["latched"] is True
+    assert "docking_friction" in study.ranges

@@ -8,6 +8,7 @@ import pytest
 
 from snarelab.errors import InputError
 from snarelab.models.inertia import is_physical, to_central
+from snarelab.models.rigid_body import RigidBody
 from snarelab.models.tree import Joint, Link, Tree
 from snarelab.models.urdf import load_urdf
 
@@ -34,6 +35,8 @@ def load(folder, body, **options):
     return load_urdf(path, **options)
 
 
+TWO = link("base") + link("arm") + link("tip") + joint("a", "base", "arm", content='<axis xyz="0 1 0"/>{}')
+TWO += joint("b", "arm", "tip", content='<origin xyz="0 0 1"/><axis xyz="0 1 0"/>{}')
 ONE_JOINT = link("base") + link("arm") + joint("hinge", "base", "arm")
 
 
@@ -107,19 +110,24 @@ def test_a_massless_link_may_carry_a_mass(tmp_path):
 
 
 REFUSED = {
-    "massless end": (
-        link("base") + link("arm") + link("tip", "") + joint("a", "base", "arm") + joint("b", "arm", "tip"),
-        "joint 'b' moves no mass: link 'tip'",
+    "no mass at all": (
+        link("base") + link("arm", "") + joint("a", "base", "arm"),
+        "joint 'a' moves no mass: link 'arm'",
     ),
     "nothing moves": (link("base") + link("arm") + joint("a", "base", "arm", "fixed"), "no joint moves"),
     "floating": (link("base") + link("arm") + joint("a", "base", "arm", "floating"), "joint 'a' is of type 'floating'"),
     "planar": (link("base") + link("arm") + joint("a", "base", "arm", "planar"), "joint 'a' is of type 'planar'"),
     "ball": (link("base") + link("arm") + joint("a", "base", "arm", "ball"), "allowed are revolute, continuous"),
     "screw": (ONE_JOINT + '<drake:joint name="s" type="screw"/>', "<drake:joint> is not supported"),
-    "mimic": (
-        link("base") + link("arm") + joint("a", "base", "arm", content='<mimic joint="b"/>'),
-        "joint 'a' mimics another",
+    "mimic in a ring": (
+        TWO.format('<mimic joint="b"/>', '<mimic joint="a"/>'),
+        "joint 'a' mimics joints that mimic it in turn",
     ),
+    "a joint behind a mimic": (
+        TWO.format("", '<mimic joint="a"/>') + link("far") + joint("c", "tip", "far"),
+        "joint 'c' hangs behind 'b', which mimics 'a'",
+    ),
+    "mimic text": (TWO.format("", '<mimic joint="a" multiplier="x"/>'), "joint 'b': mimic multiplier is 'x'; give a"),
     "two roots": (ONE_JOINT + link("stray"), "root links are ['base', 'stray']"),
     "no links": ("", "root links are []"),
     "closed loop": (
@@ -147,7 +155,10 @@ REFUSED = {
     "mass missing": (ONE_JOINT.replace('<mass value="2"/>', ""), "link 'base': mass value is None"),
     "mass NaN": (ONE_JOINT.replace('value="2"', 'value="nan"'), "link 'base': mass value is 'nan'"),
     "mass negative": (ONE_JOINT.replace('value="2"', 'value="-2"'), "link 'base' has mass -2 kg"),
-    "inertia without mass": (ONE_JOINT.replace('value="2"', 'value="0"'), "link 'base' has mass 0 kg"),
+    "inertia without mass": (
+        TWO.format("", "").replace('value="2"', 'value="0"', 2),
+        "link 'arm' has mass 0 kg and an inertia",
+    ),
     "moment missing": (ONE_JOINT.replace('ixy="0" ', ""), "link 'base': ixy is None; give 1 finite number"),
     "macros": (ONE_JOINT + '<xacro:include filename="b"/>', "expand it first"),
 }
@@ -213,12 +224,73 @@ def test_an_impossible_inertia_is_refused_with_one_that_can_be_pasted(tmp_path):
     np.testing.assert_allclose(np.linalg.eigvalsh(mended, UPLO="U"), expected, rtol=1e-9)
 
 
-def test_inertia_of_a_welded_or_base_link_is_checked_too(tmp_path):
+def test_bodies_are_judged_as_they_move(tmp_path):
     bad = inertial(izz=0.3)
-    with pytest.raises(InputError, match="link 'base' has an inertia that no body can have"):
-        load(tmp_path, link("base", bad) + link("arm") + joint("a", "base", "arm"))
-    with pytest.raises(InputError, match="link 'tip' has an inertia that no body can have"):
-        load(tmp_path, ONE_JOINT + link("tip", bad) + joint("weld", "arm", "tip", "fixed"))
+    on_base = load(tmp_path, link("base", bad) + link("arm") + joint("a", "base", "arm"))
+    assert "the inertia of 'base' is one that no body can have; no joint feels it" in on_base.notes[0]
+    small = bad.replace('value="2"', 'value="0.1"')
+    welded = load(tmp_path, ONE_JOINT + link("tip", small) + joint("weld", "arm", "tip", "fixed"))
+    assert "the inertia of 'tip' is one" in welded.notes[0]  # 0.2, 0.2, 0.4: the sum is a disc
+    worse = inertial(izz=0.4)
+    worse = inertial(izz=0.4)
+    with pytest.raises(InputError, match=r'link .arm. has an inertia.*inertia_fix = "nearest"'):
+        load(tmp_path, ONE_JOINT + link("tip", worse) + joint("weld", "arm", "tip", "fixed"))
+    mended = load(tmp_path, ONE_JOINT + link("tip", worse) + joint("weld", "arm", "tip", "fixed"), fix="nearest")
+    assert is_physical(mended.links[0].phi)
+    assert mended.notes[0].startswith("inertia_fix: 'arm' had an inertia")
+
+
+def test_a_joint_that_moves_no_mass_is_held(tmp_path):
+    body = link("base") + link("arm") + link("tip", "") + joint("a", "base", "arm") + joint("b", "arm", "tip")
+    tree = load(tmp_path, body)
+    assert [j.name for j in tree.joints] == ["a"]
+    assert tree.weightless == ("b",)
+    assert "'b' moves no mass and is held" in tree.notes[0]
+
+
+def test_a_mimic_follows_its_leader(tmp_path):
+    """Two rods in one plane, the second turned by minus twice the first's angle plus 0.3: by hand."""
+    tree = load(tmp_path, TWO.format("", '<mimic joint="a" multiplier="-2" offset="0.3"/>'))
+    assert [j.name for j in tree.joints] == ["a"]
+    assert [f.joint.name for f in tree.followers] == ["b"]
+    assert tree.phi.shape == (20,)
+    q, qd, qdd = 0.4, 0.7, -1.1
+    body = RigidBody(tree)
+    # Each ball has 0.1 kg·m² and lies on its own joint; the second, of 2 kg, turns at qd - 2 qd on a 1 m arm.
+    inertia = 0.1 + 0.1 * (1 - 2) ** 2 + 2 * 1.0
+    expected = inertia * qdd - 2 * 9.81 * np.sin(q)
+    np.testing.assert_allclose(body.torque([[q]], [[qd]], [[qdd]]), [[expected]], rtol=1e-12)
+    np.testing.assert_allclose(body.regressor([[q]], [[qd]], [[qdd]])[0, 0] @ tree.phi, expected, rtol=1e-12)
+    np.testing.assert_allclose(body.mass_matrix([[q]]), [[[inertia]]], rtol=1e-12)
+
+
+def test_a_chain_of_mimics_and_one_whose_leader_is_not_there(tmp_path):
+    far = link("far") + joint("c", "tip", "far", content='<mimic joint="b" multiplier="3" offset="1"/>')
+    tree = load(tmp_path, TWO.format("", '<mimic joint="a" multiplier="2" offset="0.5"/>') + far)
+    assert [(f.joint.name, f.leader, f.multiplier, f.offset) for f in tree.followers] == [
+        ("b", 0, 2.0, 0.5),
+        ("c", 0, 6.0, 2.5),
+    ]
+    alone = load(tmp_path, TWO.format("", '<mimic joint="nobody"/>'))
+    assert [j.name for j in alone.joints] == ["a", "b"]
+    assert "joint 'b' mimics 'nobody', which is no joint that moves" in alone.notes[0]
+
+
+def test_held_joints_stand_where_they_are_said_to(tmp_path):
+    """Holding is the whole tree with that joint still, at other joints."""
+    text = TWO.format("", "") + link("far") + joint("c", "tip", "far", "prismatic", '<origin xyz="0 0.2 0.5"/>')
+    whole, held = load(tmp_path, text), load(tmp_path, text, held={"b": 0.7})
+    assert [j.name for j in held.joints] == ["a", "c"]
+    q, qd, qdd = np.random.default_rng(0).normal(size=(3, 1, 2))
+    full = [np.array([[x[0, 0], still, x[0, 1]]]) for x, still in ((q, 0.7), (qd, 0.0), (qdd, 0.0))]
+    theirs = RigidBody(whole).torque(*full)[:, [0, 2]]
+    np.testing.assert_allclose(RigidBody(held).torque(q, qd, qdd), theirs, rtol=1e-12)
+    only = load(tmp_path, text, moving=["c"])
+    assert [j.name for j in only.joints] == ["c"]
+    with pytest.raises(InputError, match=r"joint 'd' is not one that moves \(a, b, c\)"):
+        load(tmp_path, text, held={"d": 0.0})
+    with pytest.raises(InputError, match="all 3 joints are held"):
+        load(tmp_path, text, held={"a": 0.0, "b": 0.0, "c": 0.0})
 
 
 def test_a_negative_moment_is_named(tmp_path):

@@ -1,5 +1,6 @@
 """The words of a diagnosis: shares, lists, the experiment that is proposed, and the first sentence."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,6 +13,7 @@ from snarelab.identification.wording import (
     experiment_sentence,
     from_to,
     listed,
+    named,
     percent,
     verdict_sentence,
 )
@@ -80,10 +82,13 @@ FITS = [channel("tau.joint1", 0.30, 0.28), channel("tau.joint2", 0.25, 0.05)]
 
 
 def test_the_first_sentence_lists_places_by_effect_and_the_channel_that_gained_most():
-    some: Any = [SimpleNamespace(name=n, at=a) for n, a in (("backlash", "a"), ("sensor_gain", "b"), ("backlash", "c"))]
+    some: Any = [
+        SimpleNamespace(name=n, at=a, probability=0.9)
+        for n, a in (("backlash", "a"), ("sensor_gain", "b"), ("backlash", "c"))
+    ]
     assert verdict_sentence(some, FITS, " And more.") == (
         "The model leaves out backlash at a and c and sensor gain at b. With that added, the error of tau.joint2 on "
-        "the recording that the fit never saw falls from 25 % to 5 %. And more."
+        "the held-out recording falls from 25 % to 5 %. And more."
     )
 
 
@@ -92,8 +97,12 @@ def test_without_a_name_it_is_the_worst_channel_that_is_told():
         "Something is missing on tau.joint1 that no effect of the vocabulary explains. Torque."
     )
     assert verdict_sentence([], FITS, "") == (
-        "The model is adequate: nothing is left out that these recordings can show. "
-        "On the recording that the fit never saw, the error of tau.joint1 is 30 %."
+        "The model is adequate: nothing larger than the limits listed is left out. "
+        "What it leaves over on the held-out recording is 30 % of tau.joint1."
+    )
+    noisy = replace(FITS[1], noise_floor=0.8)
+    assert verdict_sentence([], [FITS[0], noisy], "").endswith(
+        "is 25 % of tau.joint2, 1.2 times that channel's noise floor."
     )
 
 
@@ -122,3 +131,18 @@ def test_reliability_is_linear_between_its_knots_and_level_beyond(margin, right,
 )
 def test_two_errors_have_the_digits_that_part_them(before, after, text):
     assert from_to(before, after) == text
+
+
+def test_what_is_less_likely_than_not_is_said_last_and_so():
+    def finding(name, at, probability) -> Any:
+        return SimpleNamespace(name=name, at=at, probability=probability)
+
+    some = [finding("backlash", "a", 0.25), finding("sensor_gain", "b", 0.9), finding("rotor_inertia", "c", 0.4)]
+    assert named(some) == "sensor gain at b, and perhaps rotor inertia at c (40\u202f%) and backlash at a (25\u202f%)"
+    assert named(some[:1]) == "something, perhaps backlash at a (25\u202f%)"
+
+
+def test_nothing_explains_more_than_all():
+    assert "it explains all of what the model so far left over on a;" in evidence_sentence(
+        placed("joint1", ""), 1.18, ["a"], 0.031, 0.26
+    )

@@ -15,10 +15,14 @@ from typing import Any
 
 import numpy as np
 from scipy.stats import norm, qmc
-from sklearn.exceptions import ConvergenceWarning
-from sklearn.gaussian_process import GaussianProcessRegressor
-from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
-from threadpoolctl import ThreadpoolController
+
+from ..extras import needed_for
+
+with needed_for("a study of tolerances"):
+    from sklearn.exceptions import ConvergenceWarning
+    from sklearn.gaussian_process import GaussianProcessRegressor
+    from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
+    from threadpoolctl import ThreadpoolController
 
 UNDECIDED = (0.05, 0.95)
 _REFERENCE = 4096

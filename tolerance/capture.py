@@ -52,6 +52,10 @@ class Outcome:
         Largest cable tension [N].
     reason : str
         Empty, or why the case has no result: a step that diverged, a worker that was lost.
+    latched : float
+        Where the capture goes on to the latch: signed margin of that, -1 to 1; NaN where it does not.
+    state : str
+        In which the control program ended.
     """
 
     enclosed: bool
@@ -60,11 +64,14 @@ class Outcome:
     peak_force: float
     peak_tension: float
     reason: str = ""
+    latched: float = float("nan")
+    state: str = ""
 
     @classmethod
     def failed(cls, reason: str) -> "Outcome":
         """A case without a result: a recorded outcome, and no success."""
-        return cls(False, float("nan"), float("nan"), float("nan"), float("nan"), reason)
+        unknown = float("nan")
+        return cls(False, unknown, unknown, unknown, unknown, reason)
 
 
 @dataclass(frozen=True)
@@ -112,7 +119,12 @@ def run_case(capture: Capture, values: Mapping[str, float]) -> Outcome:
     return found
 
 
-BUILT_IN = {name: f"snarelab.tolerance.{name}:CAPTURE" for name in ("ground", "inspection")}
+BUILT_IN = {name: f"snarelab.tolerance.{name}:CAPTURE" for name in ("ground", "inspection")} | {
+    "hover": "snarelab.tolerance.inspection:HOVER",
+    "latched-inspection": "snarelab.tolerance.latched:INSPECTION",
+    "latched-hover": "snarelab.tolerance.latched:HOVER",
+}
+"""Captures by the name that a study file calls them."""
 
 
 def source_version(*patterns: str) -> str:

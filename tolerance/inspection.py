@@ -7,12 +7,14 @@ chosen by its error: a fifth of the processor time of equal steps, and the pin's
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..cosim.orbit_capture import (
     SNARE,
+    CaseName,
     arrival,
     capture_of,
     co_simulate,
@@ -81,11 +83,11 @@ class Simulated:
         return rows, np.einsum("tcni,tij->tcnj", nodes, tip[:, 3:])
 
 
-def simulate(values: Mapping[str, float]) -> Simulated:
+def simulate(values: Mapping[str, float], case: CaseName = "inspection") -> Simulated:
     """The capture itself; raises InputError for a pin that starts inside a cable, StepError if a step breaks down."""
     turn = Rotation.from_euler("xyz", [values["roll"], values["pitch"], values["yaw"]])
     foot = [AHEAD + values["axial"], values["radial_y"], values["radial_z"]]
-    start = arrival("inspection", foot, turn, values["speed"])
+    start = arrival(case, foot, turn, values["speed"])
     snare = SNARE.with_values(friction=values["friction"])
     frames: list[tuple[float, np.ndarray]] = []
     tensions: list[float] = []
@@ -99,16 +101,18 @@ def simulate(values: Mapping[str, float]) -> Simulated:
         frames=frames,
         tensions=tensions,
     )
-    motion = capture_of(done, "inspection")
-    return Simulated(motion, snare, frames, tensions, columns(done.recording, "snare.impulse.pin"))
+    motion = capture_of(done, case)
+    # What a floating target gets is, but for the cables' own momentum, what the end effector does not.
+    on_pin = columns(done.recording, "snare.impulse.pin") if case == "inspection" else -motion.impulse
+    return Simulated(motion, snare, frames, tensions, on_pin)
 
 
-def run(values: Mapping[str, float]) -> Outcome:
+def run(values: Mapping[str, float], case: CaseName = "inspection") -> Outcome:
     """One case; see `simulate`.
 
     Where the pin's foot gets into the mouth, the target would have met the ring, which is not modelled: no result.
     """
-    done = simulate(values)
+    done = simulate(values, case)
     motion = done.motion
     deepest = float(motion.relative[:, 0].min()) - done.snare.ring_distance
     if deepest < 0:
@@ -131,11 +135,11 @@ def _encloses(done: Simulated) -> bool:
     return runs_through(cables[0], cables[-1], done.motion.relative[last], axis, done.snare)
 
 
-def film(values: Mapping[str, float]) -> str:
+def film(values: Mapping[str, float], case: CaseName = "inspection") -> str:
     """A page that plays the capture, as seen from the end effector."""
     from ..report.snare_scene import Seen, snare_scene
 
-    done = simulate(values)
+    done = simulate(values, case)
     rows, cables = done.seen()
     tip, pin = done.motion.tip[rows, 3:], done.motion.pin[rows, 3:]
     turned = Rotation.from_matrix(tip.transpose(0, 2, 1) @ pin).as_quat(canonical=True)
@@ -160,3 +164,5 @@ SOURCES = (
 """What the outcome of a case follows from."""
 
 CAPTURE = Capture("inspection", AXES, run, source_version(*SOURCES), film)
+HOVER = Capture("hover", AXES, partial(run, case="hover"), source_version(*SOURCES), partial(film, case="hover"))
+"""Li et al., case 2: the same arrival at a target of 10 t that floats by itself."""

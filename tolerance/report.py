@@ -15,7 +15,7 @@ from .rays import ANGLES, RADIAL, STAGE, Ray, ends, envelope, shortest
 from .results import Results
 from .run import space_boundary
 from .study import LARGEST, Study
-from .summary import Interval, sensitivities, success_probability
+from .summary import Interval, proxy_beside, sensitivities, success_probability
 
 _OTHERS = ("box", STAGE)
 """Cases that the maps are fitted to beside those over the whole range; those along single axes choose no others."""
@@ -52,6 +52,8 @@ def summarise(study: Study, results: Results) -> dict[str, Any]:
         box = results.table("box")
         content["probability_box"] = vars(success_probability(box))
         content["box"] = f"{where_the_box_stands_out(study, found)} {why_the_box_fails(study, box)}".strip()
+    if study.success.latched:
+        content["proxy"] = proxy_beside(study, results.table())
     content["sentence"] = _sentence(study, content)
     misses = play_misses(study, results)
     content["misses"] = [vars(m) for m in misses]
@@ -79,6 +81,12 @@ def _sentence(study: Study, content: dict[str, Any]) -> str:
                 words.append(f"{what} may be {low:.1f} {unit} at least")
             else:
                 words.append(f"{what} may be {low:.1f} to {high:.1f} {unit} in the worst direction tried")
+    if "proxy" in content:
+        p = content["proxy"]
+        limit = f"{1e3 * study.success.radial_error:g} mm"
+        words.append(f"the proxy of {limit} says otherwise in {p['disagree']} of {p['cases']}")
+        if p["ends"]:
+            words.append("failures end in " + ", ".join(f"{state} ({n})" for state, n in p["ends"].items()))
     first, *others = sorted(content["sensitivity"], key=lambda s: -s["total"])
     most = [first["axis"], *(s["axis"] for s in others if s["total_high"] > first["total_low"])]
     words.append(f"{', '.join(most)} matter{'s' if len(most) == 1 else ''} most")

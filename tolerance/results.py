@@ -7,7 +7,7 @@ moment leaves whole files only, and a row that stands twice is the same row.
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, fields
+from dataclasses import MISSING, asdict, fields
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,8 @@ from .study import Study
 
 _SAFE = "finished cases are safe; make room and run again"
 _OUTCOME = tuple(f.name for f in fields(Outcome))
+_ABSENT = {f.name: f.default for f in fields(Outcome) if f.default is not MISSING}
+"""What a row that was written before a column was there has in it."""
 
 
 class Results:
@@ -112,7 +114,9 @@ class Results:
             try:
                 with bounded_memory(path):
                     for row in pd.read_parquet(path).to_dict("records"):
-                        rows[str(row["stage"]), int(row["case"])] = {name: row[name] for name in self._columns}
+                        rows[str(row["stage"]), int(row["case"])] = {
+                            name: (_ABSENT | row)[name] for name in self._columns
+                        }
             except (InputError, MemoryError):
                 raise
             except Exception as error:  # a damaged file makes pyarrow raise anything

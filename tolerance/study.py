@@ -29,7 +29,7 @@ _KEYS = (
     "box",
     "envelope",
 )
-_SUCCESS = ("radial_error", "strength")
+_SUCCESS = ("radial_error", "strength", "latched")
 
 
 @dataclass(frozen=True)
@@ -42,16 +42,26 @@ class Success:
         What the rigid docking mechanism takes [m].
     strength : float
         Breaking load of a cable [N].
+    latched : bool
+        Success is the latch, and its margin the capture's own; the two numbers then make the proxy beside it.
     """
 
     radial_error: float
     strength: float
+    latched: bool = False
 
     def margin(self, outcome: Outcome) -> float:
         """Signed distance from failure as a share of the limit, in -1 to 1; above zero is a success.
 
-        The smallest of 1 - radial_error/limit and 1 - tension/strength; -1 where the pin is not enclosed.
+        The smallest of 1 - radial_error/limit and 1 - tension/strength; -1 where the pin is not enclosed. Where success
+        is the latch, the capture's own margin of that.
         """
+        if not self.latched:
+            return self.proxy(outcome)
+        return -1.0 if outcome.reason or not np.isfinite(outcome.latched) else float(outcome.latched)
+
+    def proxy(self, outcome: Outcome) -> float:
+        """The margin by radial error and strength alone, whatever comes after the soft capture."""
         if outcome.reason or not outcome.enclosed:
             return -1.0
         worst = min(1.0 - outcome.radial_error / self.radial_error, 1.0 - outcome.peak_tension / self.strength)
@@ -129,7 +139,7 @@ class Study:
             "batch": self.batch,
             "ranges": {k: list(v) for k, v in self.ranges.items()},
             "fixed": dict(self.fixed),
-            "success": vars(self.success),
+            "success": {k: v for k, v in vars(self.success).items() if k != "latched" or v},
             "box": {k: list(v) for k, v in self.box.items()},
             "box_ends": self.box_ends,
         }
@@ -192,11 +202,11 @@ def load_study(path: str | Path) -> Study:
 def _success(path: Path, raw: Mapping[str, Any]) -> Success:
     table = _table(path, raw, "success")
     _known(path, "success", table, _SUCCESS)
-    numbers = {k: _positive(path, f"[success] {k}", table[k]) for k in _SUCCESS if k in table}
-    for key in _SUCCESS:
+    numbers = {k: _positive(path, f"[success] {k}", table[k]) for k in _SUCCESS[:2] if k in table}
+    for key in _SUCCESS[:2]:
         if key not in numbers:
             raise InputError(f"{path}: [success] {key} is missing; say when a capture counts as one")
-    return Success(**numbers)
+    return Success(**numbers, latched=_flag(path, table.get("latched", False), "[success] latched"))
 
 
 def _ranges(path: Path, raw: Mapping[str, Any], key: str, capture: Capture) -> dict[str, tuple[float, float]]:

@@ -2,6 +2,7 @@
 
 import warnings
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -30,6 +31,26 @@ def success_probability(table: pd.DataFrame, confidence: float = 0.95) -> Interv
     won, total = int(np.sum(table["margin"].to_numpy(float) > 0)), len(table)
     interval = binomtest(won, total).proportion_ci(confidence, method="exact")
     return Interval(won / total, float(interval.low), float(interval.high))
+
+
+def proxy_beside(study: Study, table: pd.DataFrame) -> dict[str, Any]:
+    """Of a study whose success is the latch: how often the radial error at the soft capture's end says otherwise.
+
+    Keys: ``cases`` with a result, ``disagree`` of them, ``latched_against`` (it latched, and the proxy said no) and
+    ``failed_against``, and ``ends``, the states in which the failures ended with their numbers.
+    """
+    known = pd.DataFrame(table[table["reason"] == ""])
+    near = known["radial_error"].to_numpy(float) < study.success.radial_error
+    fine = near & known["enclosed"].to_numpy(bool) & (known["peak_tension"].to_numpy(float) < study.success.strength)
+    latched = known["margin"].to_numpy(float) > 0
+    ends = pd.Series(known["state"].to_numpy()[~latched], dtype=object).value_counts()
+    return {
+        "cases": len(known),
+        "disagree": int(np.sum(latched != fine)),
+        "latched_against": int(np.sum(latched & ~fine)),
+        "failed_against": int(np.sum(~latched & fine)),
+        "ends": {str(state): int(count) for state, count in ends.items()},
+    }
 
 
 def sensitivities(study: Study, boundary: Boundary, samples: int = 2048) -> pd.DataFrame:

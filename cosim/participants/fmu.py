@@ -2,7 +2,6 @@
 
 import ctypes
 import shutil
-import tempfile
 import weakref
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -10,9 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from ...fmu.archive import open_fmu
+from ...scratch import scratch_folder
 from ..fmi_calls import CompiledCalls, Instance, Vector, address
 from ..fmi_variables import Slot, read_interface
 from ..participant import Causality, Participant, StepError
+
+_START, _TOOL_START = 5.0, 60.0  # s to initialise however short a step may be, without and with a tool to start
 
 
 class Fmu(Participant):
@@ -40,7 +42,7 @@ class Fmu(Participant):
         """Unpack and read the model description; no code of the FMU runs yet."""
         self.path = Path(path)
         self.name = name or self.path.stem
-        self._folder = tempfile.mkdtemp(prefix="snarelab-fmu-")
+        self._folder = scratch_folder("fmu-")
         self._remove_folder = weakref.finalize(self, shutil.rmtree, self._folder, True)
         self._description = open_fmu(self.path, self._folder).description
         capable = self._description.coSimulation
@@ -48,6 +50,8 @@ class Fmu(Participant):
         self.variables, self._slots = interface.variables, interface.slots
         self.can_restore = bool(capable.canGetAndSetFMUstate)
         self.can_vary_step = bool(capable.canHandleVariableCommunicationStepSize)
+        self.start_limit = _TOOL_START if capable.needsExecutionTool else _START
+        self.unread = interface.unread
         continuous = all(slot.continuous and slot.type == "Real" for slot in self._slots["input"])
         self.input_order = 1 if capable.canInterpolateInputs and continuous else 0
         self._instance: Instance | None = None
@@ -141,22 +145,23 @@ class Fmu(Participant):
     def _vectors(self, action: str, causality: Causality) -> list[tuple[Vector, slice | np.ndarray]]:
         """One vector a type, with its places among the participant's variables of this causality."""
         assert self._instance is not None
-        slots, names = self._slots[causality], self.names(causality)
+        slots = self._slots[causality]
+        places = {name: place for place, name in enumerate(self.names(causality))}
         found: list[tuple[Vector, slice | np.ndarray]] = []
         for type_ in dict.fromkeys(slot.type for slot in slots):
             chosen = [slot for slot in slots if slot.type == type_]
-            where = np.array([names.index(name) for slot in chosen for name in slot.names])
+            where = np.array([places[name] for slot in chosen for name in slot.names])
             alone = len(chosen) == len(slots)
             found.append((self._instance.vector(action, type_, chosen), slice(None) if alone else where))
         return found
 
     def _set_parameters(self, values: Mapping[str, float]) -> None:
         assert self._instance is not None
+        starts = {v.name: v.start for v in self.variables}
         for slot in self._slots["parameter"]:
             given = [name for name in slot.names if name in values]
             if not given:
                 continue
-            starts = {v.name: v.start for v in self.variables}
             whole = [values.get(name, starts[name]) for name in slot.names]
             self._instance.vector("Set", slot.type, [slot]).set(np.array(whole))
 

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ...errors import InputError
+from ...models.snare.assembly import Drive
 from ...models.snare.drive import Pose
 from ...models.snare.model import Accuracy, SnareModel, SnareStepError
 from ...models.snare.parameters import SnareParameters
@@ -108,6 +109,7 @@ class SnareParticipant(Participant):
         self._first = self._inputs.copy()
         self._rates: np.ndarray | None = None
         self._model: SnareModel | None = None
+        self._drive: Drive | None = None  # the parameters' ramp
         self._built_at = self._first
         self._start = 0.0
 
@@ -175,7 +177,7 @@ class SnareParticipant(Participant):
                     velocity=x[7:10].tolist(),
                     angular_velocity=x[10:13].tolist(),
                 )
-            self._model = SnareModel(self._given, target, self._accuracy, effector, self._start)
+            self._model = SnareModel(self._given, target, self._accuracy, effector, self._start, self._drive)
             self._built_at = self._inputs.copy()
         return self._model
 

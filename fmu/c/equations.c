@@ -24,6 +24,18 @@ static int all_finite(const double *x, int n) {
 
 static Status backend_open(Instance *i, const char *resources) { return (void)i, (void)resources, STATUS_OK; }
 static void backend_close(Instance *i) { (void)i; }
+static Status backend_reset(Instance *i) { return (void)i, STATUS_OK; }
+
+/* Taken for solver.tolerance, within its range, where there is one; a value that was set there goes before it. */
+static void backend_tolerance(Instance *i, double tolerance) {
+#if STIFF
+  const int last = N_PARAMETERS - 1;
+  if (i->now.parameter[last] == START_PARAMETER[last])
+    i->now.parameter[last] = fmin(fmax(tolerance, LEAST_PARAMETER[last]), MOST_PARAMETER[last]);
+#else
+  (void)i, (void)tolerance; /* equal internal steps know no error */
+#endif
+}
 
 static Status backend_initialize(Instance *i) {
   const double elapsed = 0, *arguments[] = {&elapsed, i->now.input, i->now.parameter};

@@ -87,11 +87,7 @@ FMI2_Export fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2St
 
 FMI2_Export fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, fmi2Real tolerance,
                                            fmi2Real start, fmi2Boolean stop_defined, fmi2Real stop) {
-  (void)tolerance_defined, (void)tolerance, (void)stop_defined, (void)stop;
-  if (demand(HERE, "setting up the experiment", IN(INSTANTIATED))) return fmi2Error;
-  if (!isfinite(start)) return (fmi2Status)say(HERE, STATUS_ERROR, "the start time is %g; give a finite one", start);
-  HERE->now.time = start;
-  return fmi2OK;
+  return (fmi2Status)instance_experiment(HERE, tolerance_defined ? &tolerance : NULL, start, stop_defined ? &stop : NULL);
 }
 FMI2_Export fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
   return (fmi2Status)instance_enter_initialization(HERE, HERE->now.time);

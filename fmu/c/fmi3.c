@@ -69,8 +69,8 @@ FMI3_Export fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3
 
 FMI3_Export fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean tolerance_defined, fmi3Float64 tolerance,
                                                    fmi3Float64 start, fmi3Boolean stop_defined, fmi3Float64 stop) {
-  (void)tolerance_defined, (void)tolerance, (void)stop_defined, (void)stop;
-  return (fmi3Status)instance_enter_initialization(HERE, start);
+  Status status = instance_experiment(HERE, tolerance_defined ? &tolerance : NULL, start, stop_defined ? &stop : NULL);
+  return (fmi3Status)(status ? status : instance_enter_initialization(HERE, start));
 }
 
 static fmi3Status matched(fmi3Instance c, size_t n_references, size_t n_values) {

@@ -4,6 +4,7 @@
    of one that is not OK says why. */
 #include <errno.h>
 #include <fcntl.h>
+#include <poll.h>
 #include <signal.h>
 #include <spawn.h>
 #include <sys/socket.h>
@@ -45,7 +46,7 @@ static void bury(Instance *i, char *words, size_t size) {
   const struct timespec moment = {0, 2000000};
   snprintf(words, size, "it had to be stopped");
   if (i->backend.process <= 0) return;
-  for (int n = 0; n < 1000; ++n) {
+  for (int n = 0; n < 5000; ++n) { /* its warden gives the model a second, and ends what it has left */
     pid_t ended = waitpid(i->backend.process, &how, WNOHANG);
     if (ended != 0) {
       if (ended > 0 && WIFSIGNALED(how)) snprintf(words, size, "it was ended by signal %d", WTERMSIG(how));
@@ -115,30 +116,69 @@ static int interpreter(Instance *i, const char *resources, char *python, size_t 
   return 1;
 }
 
-static Status backend_open(Instance *i, const char *resources) {
-  char python[4096], script[4200], **environment = environ;
-  size_t length = strlen(resources);
+/* An importer may run without descriptors 0 to 2, as daemons do. A socket must not take one of them: the child would find
+   this end of it among its standard streams, and wait for itself to hang up. */
+static int above_standard(int descriptor) {
+  if (descriptor > 2) return descriptor;
+  const int moved = fcntl(descriptor, F_DUPFD_CLOEXEC, 3);
+  close(descriptor);
+  return moved;
+}
+
+/* A session of its own, so that Ctrl-C is the importer's alone; no signal blocked or ignored that its warden needs. */
+static void detach(posix_spawnattr_t *attributes) {
+  sigset_t none, children;
+  short flags = POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF;
+  sigemptyset(&none);
+  sigemptyset(&children);
+  sigaddset(&children, SIGCHLD);
+#ifdef POSIX_SPAWN_SETSID
+  flags |= POSIX_SPAWN_SETSID;
+#else
+  flags |= POSIX_SPAWN_SETPGROUP;
+#endif
+  posix_spawnattr_init(attributes);
+  posix_spawnattr_setsigmask(attributes, &none);
+  posix_spawnattr_setsigdefault(attributes, &children);
+  posix_spawnattr_setflags(attributes, flags);
+}
+
+/* What the model prints goes to the importer's standard error: its output is its own. */
+static void connect_streams(posix_spawn_file_actions_t *actions, int socket) {
+  posix_spawn_file_actions_init(actions);
+  posix_spawn_file_actions_adddup2(actions, socket, 0);
+  if (fcntl(2, F_GETFD) < 0) posix_spawn_file_actions_addopen(actions, 2, "/dev/null", O_WRONLY, 0);
+  posix_spawn_file_actions_adddup2(actions, 2, 1);
+}
+
+static Status start_process(Instance *i) {
+  char python[4096], script[4200], importer[24], **environment = environ;
+  const char *folder = i->backend.resources;
   int pair[2], n = 0, kept = 0;
-  i->backend.socket = -1;
-  while (length > 1 && resources[length - 1] == '/') --length;
-  char folder[4096];
-  snprintf(folder, sizeof folder, "%.*s", (int)length, resources);
   if (!interpreter(i, folder, python, sizeof python)) return STATUS_ERROR;
   snprintf(script, sizeof script, "%s/host.py", folder);
+  snprintf(importer, sizeof importer, "%ld", (long)getpid());
   if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair))
     return say(i, STATUS_ERROR, "no socket for the Python process: %s", strerror(errno));
+  for (int k = 0; k < 2; ++k) pair[k] = above_standard(pair[k]);
+  if (pair[0] < 0 || pair[1] < 0) {
+    for (int k = 0; k < 2; ++k)
+      if (pair[k] >= 0) close(pair[k]);
+    return say(i, STATUS_ERROR, "no descriptor left for the Python process: %s", strerror(errno));
+  }
   while (environment && environment[n]) ++n;
   char **clean = calloc((size_t)n + 2, sizeof *clean); /* another Python's settings would mislead this one */
   for (int k = 0; clean && k < n; ++k)
     if (strncmp(environment[k], "PYTHON", 6) && strncmp(environment[k], "OMP_NUM_THREADS=", 16)) clean[kept++] = environment[k];
   if (clean) clean[kept] = "OMP_NUM_THREADS=1";
   posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_adddup2(&actions, pair[1], 0);
-  posix_spawn_file_actions_adddup2(&actions, 2, 1); /* what a model prints must not mix with the importer's output */
-  char *arguments[] = {python, "-u", script, NULL};
-  int failed = clean ? posix_spawn(&i->backend.process, python, &actions, NULL, arguments, clean) : ENOMEM;
+  posix_spawnattr_t attributes;
+  connect_streams(&actions, pair[1]);
+  detach(&attributes);
+  char *arguments[] = {python, "-u", script, importer, NULL};
+  int failed = clean ? posix_spawn(&i->backend.process, python, &actions, &attributes, arguments, clean) : ENOMEM;
   posix_spawn_file_actions_destroy(&actions);
+  posix_spawnattr_destroy(&attributes);
   free(clean);
   close(pair[1]);
   i->backend.socket = pair[0];
@@ -156,12 +196,30 @@ static Status backend_open(Instance *i, const char *resources) {
   return status;
 }
 
+static Status backend_open(Instance *i, const char *resources) {
+  size_t length = strlen(resources);
+  i->backend.socket = -1;
+  while (length > 1 && resources[length - 1] == '/') --length;
+  snprintf(i->backend.resources, sizeof i->backend.resources, "%.*s", (int)length, resources);
+  return start_process(i);
+}
+
 static void backend_close(Instance *i) {
   char words[64];
   if (i->backend.socket >= 0) close(i->backend.socket);
   i->backend.socket = -1;
   bury(i, words, sizeof words);
 }
+
+/* A new process where the last one has died. */
+static Status backend_reset(Instance *i) {
+  struct pollfd hung = {i->backend.socket, 0, 0};
+  if (i->backend.socket >= 0 && poll(&hung, 1, 0) == 0) return STATUS_OK;
+  backend_close(i);
+  return start_process(i);
+}
+
+static void backend_tolerance(Instance *i, double tolerance) { (void)i, (void)tolerance; } /* a participant has none */
 
 /* Ask, and take the answer for the outputs. */
 static Status ask_outputs(Instance *i, uint32_t code, const void *const *part, const size_t *size, int n) {

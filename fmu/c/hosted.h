@@ -11,6 +11,7 @@ typedef struct {
 typedef struct {
   int socket;
   pid_t process;
+  char resources[4096];
 } Backend;
 
 #endif

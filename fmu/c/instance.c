@@ -25,6 +25,7 @@ static void set_defaults(Instance *i) {
   memset(&i->now, 0, sizeof i->now);
   memcpy(i->now.input, START_INPUT, sizeof START_INPUT);
   memcpy(i->now.parameter, START_PARAMETER, sizeof START_PARAMETER);
+  i->now.stop = INFINITY;
   i->fresh = 0;
 }
 
@@ -60,9 +61,21 @@ static Status demand(Instance *i, const char *what, unsigned modes) {
 }
 #define IN(mode) (1u << (mode))
 
+/* NULL: not defined by the importer. */
+static Status instance_experiment(Instance *i, const double *tolerance, double start, const double *stop) {
+  if (demand(i, "setting up the experiment", IN(INSTANTIATED))) return STATUS_ERROR;
+  if (!isfinite(start)) return say(i, STATUS_ERROR, "the start time is %g; give a finite one", start);
+  if (stop && !(*stop >= start)) return say(i, STATUS_ERROR, "the stop time %g is before the start time %g", *stop, start);
+  if (tolerance && !(isfinite(*tolerance) && *tolerance > 0))
+    return say(i, STATUS_ERROR, "the tolerance is %g; give a finite one above zero", *tolerance);
+  i->now.time = start;
+  i->now.stop = stop ? *stop : INFINITY;
+  if (tolerance) backend_tolerance(i, *tolerance);
+  return STATUS_OK;
+}
+
 static Status instance_enter_initialization(Instance *i, double start) {
   if (demand(i, "entering initialization mode", IN(INSTANTIATED))) return STATUS_ERROR;
-  if (!isfinite(start)) return say(i, STATUS_ERROR, "the start time is %g; give a finite one", start);
   i->now.start = i->now.time = start;
   i->now.mode = INITIALIZING;
   return STATUS_OK;
@@ -91,18 +104,36 @@ static Status instance_terminate(Instance *i) {
 }
 
 static Status instance_reset(Instance *i) {
-  set_defaults(i);
+  Status status = backend_reset(i);
+  if (!status) set_defaults(i);
+  return status;
+}
+
+/* Whether a variable may take a value. Inputs may leave their range, as solvers and extrapolations do; a parameter that did
+   would make another model (FMI 3.0, 2.2.6.3: discard, and the state is as before). */
+static Status settable(Instance *i, unsigned r, double value) {
+  if (r == 0 || r >= FIRST_OUTPUT)
+    return say(i, STATUS_ERROR, "variable %s (value reference %u) cannot be set", r < N_VARIABLES ? VARIABLE_NAME[r] : "(none)",
+               r);
+  if (!isfinite(value)) return say(i, STATUS_ERROR, "%s was set to %g; give a finite number", VARIABLE_NAME[r], value);
+  if (r < FIRST_PARAMETER) return STATUS_OK;
+  const unsigned p = r - FIRST_PARAMETER;
+  if (value < LEAST_PARAMETER[p] || value > MOST_PARAMETER[p])
+    return say(i, STATUS_DISCARD, "%s was set to %g; give a value from %g to %g", VARIABLE_NAME[r], value, LEAST_PARAMETER[p],
+               MOST_PARAMETER[p]);
+  if (FIXED_PARAMETER[p] && i->now.mode == STEPPING && value != i->now.parameter[p])
+    return say(i, STATUS_ERROR, "%s is fixed once initialization has ended; set it before", VARIABLE_NAME[r]);
   return STATUS_OK;
 }
 
 static Status instance_set(Instance *i, const unsigned *reference, size_t n, const double *value) {
   if (demand(i, "setting a variable", IN(INSTANTIATED) | IN(INITIALIZING) | IN(STEPPING))) return STATUS_ERROR;
   for (size_t k = 0; k < n; ++k) {
+    Status status = settable(i, reference[k], value[k]);
+    if (status) return status;
+  }
+  for (size_t k = 0; k < n; ++k) {
     unsigned r = reference[k];
-    if (r == 0 || r >= FIRST_OUTPUT)
-      return say(i, STATUS_ERROR, "variable %s (value reference %u) cannot be set",
-                 r < N_VARIABLES ? VARIABLE_NAME[r] : "(none)", r);
-    if (!isfinite(value[k])) return say(i, STATUS_ERROR, "%s was set to %g; give a finite number", VARIABLE_NAME[r], value[k]);
     if (r < FIRST_PARAMETER) {
       if (i->now.input[r - 1] == value[k]) continue;
       i->now.input[r - 1] = value[k];
@@ -110,8 +141,6 @@ static Status instance_set(Instance *i, const unsigned *reference, size_t n, con
     } else {
       unsigned p = r - FIRST_PARAMETER;
       if (i->now.parameter[p] == value[k]) continue;
-      if (FIXED_PARAMETER[p] && i->now.mode == STEPPING)
-        return say(i, STATUS_ERROR, "%s is fixed once initialization has ended; set it before", VARIABLE_NAME[r]);
       i->now.parameter[p] = value[k];
       if (i->now.mode != STEPPING) i->now.ready = 0;
     }
@@ -163,6 +192,9 @@ static Status instance_step(Instance *i, double time, double size) {
     return say(i, STATUS_ERROR, "a step of %g s was asked for; give a finite one above zero", size);
   if (!(fabs(time - i->now.time) <= 1e-6 * size + 1e-9 * fabs(i->now.time)))
     return say(i, STATUS_ERROR, "a step from %.17g s was asked for, but this instance stands at %.17g s", time, i->now.time);
+  if (time + size > i->now.stop + 1e-6 * size + 1e-9 * fabs(i->now.stop))
+    return say(i, STATUS_ERROR, "a step from %.17g s by %.17g s was asked for, but the stop time is %.17g s", time, size,
+               i->now.stop);
   if (size == 0) return STATUS_OK;
   i->fresh = 0; /* unless the step itself gives the outputs */
   Status status = backend_step(i, size);

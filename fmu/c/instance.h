@@ -1,7 +1,7 @@
 /* One simulation of a model: what fmi2.c and fmi3.c have in common.
 
-   model.h is written at export. It gives the counts N_*, the tables START_INPUT, START_PARAMETER, FIXED_PARAMETER and
-   VARIABLE_NAME, and MODEL_TOKEN. Value references: 0 is time, then inputs, parameters, outputs, in one row.
+   model.h is written at export. It gives the counts N_*, the tables START_INPUT, START_PARAMETER, LEAST_PARAMETER,
+   MOST_PARAMETER, FIXED_PARAMETER and VARIABLE_NAME, and MODEL_TOKEN. Value references: 0 is time, then inputs, parameters, outputs, in one row.
 
    Everything is static and is compiled as one file: only FMI's own functions can be seen from outside, so that models
    in one process never share a symbol. There are no global variables. */
@@ -27,7 +27,7 @@ typedef void (*Report)(void *host, Status status, const char *message);
 /* All numbers that decide the future. Saving is a copy of this, and of the bytes that a hosted model adds. */
 typedef struct {
   int64_t mode, ready;
-  double start, time;
+  double start, time, stop;
   double input[N_INPUTS + 1], slope[N_INPUTS + 1], parameter[N_PARAMETERS + 1];
   Memory memory;
 } Numbers;
@@ -50,6 +50,8 @@ typedef struct {
 /* What a kind of model does; each returns STATUS_OK or says why not through say(). */
 static Status backend_open(Instance *i, const char *resources);
 static void backend_close(Instance *i);
+static Status backend_reset(Instance *i);
+static void backend_tolerance(Instance *i, double tolerance); /* what the importer asks for, relative */
 static Status backend_initialize(Instance *i);
 static Status backend_step(Instance *i, double size);
 static Status backend_outputs(Instance *i);

@@ -1,6 +1,6 @@
 """Base inertial parameters: the combinations of links' inertial parameters that joint torque depends on.
 
-Torque is linear in the standard parameters phi (10 * J,), but its regressor W has dependent columns: a mass on a
+Torque is linear in the standard parameters phi (10 * L,), but its regressor W has dependent columns: a mass on a
 revolute axis may as well belong to the link before. Columns are taken in turn, links from the base to the tip, and in a
 link mass, first moments, inertias; one is kept where it is independent of those kept before (Gautier 1991). With
 ``W = W[:, kept] @ B`` the torque is ``W[:, kept] @ beta``, ``beta = B @ phi``. What can be regrouped thus moves towards
@@ -38,7 +38,7 @@ class BaseParameters:
     ----------
     columns : array (n_base,) of int
         Kept columns, ascending: torque is ``regressor[:, :, columns] @ beta``.
-    matrix : array (n_base, 10 * J)
+    matrix : array (n_base, 10 * L)
         B, with ``beta = B @ phi``; the identity in ``columns``.
     names : tuple of (link, parameter, combination)
         The kept parameter (``mass``, first moments ``mx my mz``, inertias ``Ixx`` to ``Izz`` about the link's frame),
@@ -65,7 +65,7 @@ def base_parameters(body: RigidBody, seed: int = 0) -> BaseParameters:
     """
     tree = body.tree
     length = _length(tree)
-    size = np.tile(np.repeat([1.0, length, length**2], [1, 3, 6]), tree.n_joints)
+    size = np.tile(np.repeat([1.0, length, length**2], [1, 3, 6]), len(tree.links))
     regressor = _regressor(body, length, np.random.default_rng(seed)) * size
     columns = _independent(regressor)
     matrix = np.linalg.lstsq(regressor[:, columns], regressor, rcond=None)[0]
@@ -92,7 +92,7 @@ def _length(tree: Tree) -> float:
 
 
 def _regressor(body: RigidBody, length: float, rng: np.random.Generator) -> Array:
-    """Regressor (n * J, 10 * J) on random motion as vivid as gravity is, forces times length as moments are."""
+    """Regressor (n * J, 10 * L) on random motion as vivid as gravity is, forces times length as moments are."""
     joints = body.tree.joints
     reach = np.array([np.pi if joint.kind == "revolute" else length for joint in joints])
     unit = np.array([1.0 if joint.kind == "revolute" else length for joint in joints])
@@ -105,7 +105,7 @@ def _regressor(body: RigidBody, length: float, rng: np.random.Generator) -> Arra
     q[:, :carriers] = 0.0
     regressor = body.regressor(q, qd, qdd) * (length / unit)[:, None]
     regressor[:, :, : 10 * max(carriers - 1, 0)] = 0.0  # a floating base's carriers have no bodies
-    return regressor.reshape(-1, 10 * len(joints)) / np.sqrt(len(q))
+    return regressor.reshape(-1, regressor.shape[-1]) / np.sqrt(len(q))
 
 
 def _independent(regressor: Array) -> NDArray[np.int_]:

@@ -63,7 +63,7 @@ class ConsistentInertia:
 
     Parameters
     ----------
-    phi : array (10 * J,)
+    phi : array (10 * L,)
         Of all links, every pseudo-inertia positive definite.
     beta_consistent : array (n_base,)
         ``B @ phi``.
@@ -98,7 +98,7 @@ def consistent_inertia(
         Identified base parameters.
     information : array (n_base, n_base)
         Inverse of their covariance; zero in directions that the data do not show.
-    phi_nominal : array (10 * J,)
+    phi_nominal : array (10 * L,)
         What the links are believed to be. Where they are no bodies, others stand for them: a link without mass gets a
         thousandth of all links' mass and a tenth of their radius of gyration (1 kg and 1 m if none has mass), one
         without thickness a hundredth of that radius, one that breaks the triangle inequality the nearest inertia that
@@ -130,7 +130,7 @@ class _Search:
         self._inverse_nominal = np.linalg.inv(_pseudo_inertias(nominal))
 
     def exact(self) -> Array | None:
-        """Phi (10 * J,) that meets the target, nearest to the nominal; None where no body does.
+        """Phi (10 * L,) that meets the target, nearest to the nominal; None where no body does.
 
         Misfit counts here as what it takes to move the nominal links by it, so that no direction lags behind.
         """
@@ -145,7 +145,7 @@ class _Search:
         return None
 
     def nearest(self) -> Array:
-        """Phi (10 * J,) of least misfit."""
+        """Phi (10 * L,) of least misfit."""
         return list(self._path(np.eye(len(self._target))))[-1]
 
     def _path(self, cost: Array) -> Iterator[Array]:
@@ -191,7 +191,7 @@ class _Search:
 
 
 def _least_step(measured: Array, right: Array, weight: float) -> Array:
-    """Step v (10 * J,) of least ``|right - measured v|² + weight / 2 |v|²``; at weight 0, the least to meet right."""
+    """Step v (10 * L,) of least ``|right - measured v|² + weight / 2 |v|²``; at weight 0, the least to meet right."""
     n_rows, n_steps = measured.shape
     orthogonal, triangle = np.linalg.qr(np.concatenate([measured.T, np.sqrt(0.5 * weight) * np.eye(n_rows)]))
     return orthogonal[:n_steps] @ solve_triangular(triangle, right, trans=1)
@@ -213,7 +213,7 @@ def _share(stretch: Array, curvature: float) -> float:
 
 
 def _moved(by_phi: Array, step: Array) -> Array:
-    """Change of phi (10 * J,) with a step (10 * J,)."""
+    """Change of phi (10 * L,) with a step (10 * L,)."""
     return np.einsum("lk,lkp->lp", step.reshape(-1, 10), by_phi).ravel()
 
 

@@ -132,6 +132,11 @@ class Experiment:
         return total
 
     @cached_property
+    def modelled(self) -> Array:
+        """Torque of the rigid body as the model has it, without any effect (n, J) [N·m or N]."""
+        return self.body.torque(self.motion.q, self.motion.qd, self.motion.qdd) - self.carried
+
+    @cached_property
     def measured(self) -> Array:
         """Measured torque in the analysis band (n_band, J)."""
         return self.all_to_band(self.motion.tau)
@@ -163,7 +168,13 @@ class Scales:
 
 
 def load_experiments(
-    model: Model, paths: Sequence[str | Path], body: RigidBody, band: float | None = None, *, torque: bool = True
+    model: Model,
+    paths: Sequence[str | Path],
+    body: RigidBody,
+    band: float | None = None,
+    *,
+    torque: bool = True,
+    datasets: Sequence[xr.Dataset] = (),
 ) -> list[Experiment]:
     """Read and condition recordings for a model; all in one analysis band, the narrowest that any of them carries.
 
@@ -178,6 +189,8 @@ def load_experiments(
         Edge of the analysis band [Hz].
     torque : bool
         Whether recorded torque counts; a motion needs none.
+    datasets : sequence of xarray.Dataset
+        The recordings, where they were read before; none: they are read here.
 
     Raises
     ------
@@ -188,7 +201,7 @@ def load_experiments(
         raise InputError("recordings: none is given; give one or more")
     kinds: dict[str, JointKind] = {j.name: j.kind for j in model.tree.joints}
     if torque:
-        datasets = [read_recording(path, model.signals, kinds) for path in paths]
+        datasets = datasets or [model.cuts(read_recording(path, model.signals, kinds)) for path in paths]
     else:
         datasets = [without_torque(read_recording(path, motion_signals(model), kinds), model) for path in paths]
     measured = [_tensions(d, model) for d in datasets]
@@ -198,6 +211,9 @@ def load_experiments(
     datasets = [_without_gaps_in(t, d) for t, d in zip(measured, datasets, strict=True)]
     wanted = band or model.bandwidth
     motions = [condition(d, model.joints, wanted, fitted=torque) for d in datasets]
+    free = tuple(
+        c for c, j in enumerate(model.joints) if f"tau.{j}" in model.signals and model.signals[f"tau.{j}"].nothing
+    )
     narrowest = min(m.band for m in motions)
     if any(m.band > 1.01 * narrowest for m in motions):
         motions = [condition(d, model.joints, narrowest, fitted=torque) for d in datasets]
@@ -211,7 +227,9 @@ def load_experiments(
             for m, d in zip(motions, datasets, strict=True)
         ]
     return [
-        Experiment(m, body, {name: np.interp(m.time, d["time"].values, x) for name, x in t.items()})
+        Experiment(
+            replace(m, undriven=free), body, {name: np.interp(m.time, d["time"].values, x) for name, x in t.items()}
+        )
         for m, d, t in zip(motions, datasets, measured, strict=True)
     ]
 
@@ -282,7 +300,8 @@ def with_silence(experiments: Sequence[Experiment]) -> list[Experiment]:
     made = []
     for e in experiments:
         peak = np.max(np.abs(e.motion.tau), axis=0)
-        silent = np.flatnonzero(peak <= NOTHING * np.max(peak))
+        known = np.isin(np.arange(len(peak)), e.motion.undriven)
+        silent = np.flatnonzero((peak <= NOTHING * np.max(peak)) & ~known)
         if len(silent):
             modelled = np.max(np.abs(e.body.torque(e.motion.q, e.motion.qd, e.motion.qdd) - e.carried), axis=0)
             for c in silent[silent >= n_carriers(e.body.tree)]:
@@ -301,10 +320,17 @@ def with_silence(experiments: Sequence[Experiment]) -> list[Experiment]:
 
 
 def scales(experiments: Sequence[Experiment]) -> Mapping[str, Scales]:
-    """Peak speed, travel and peak torque of every joint over all recordings; never zero."""
+    """Peak speed, travel and peak torque of every joint over all recordings; never zero.
+
+    Of a joint that nothing drives, the rigid body's peak torque stands for its own.
+    """
     found = {}
+    undriven = experiments[0].motion.undriven
+    modelled = [e.modelled for e in experiments] if undriven else []
     for k, joint in enumerate(experiments[0].motion.joints):
         q, qd, tau = (np.concatenate([getattr(e.motion, s)[:, k] for e in experiments]) for s in ("q", "qd", "tau"))
+        if k in undriven:
+            tau = np.concatenate([m[:, k] for m in modelled])
         found[joint] = Scales(
             max(float(np.max(np.abs(qd))), 1e-9), max(float(np.ptp(q)), 1e-9), max(float(np.max(np.abs(tau))), 1e-9)
         )

@@ -106,10 +106,15 @@ def fit(
 def channel_rms(assembly: Assembly, experiments: Sequence[Experiment], theta: Array) -> tuple[Array, Array]:
     """RMS residual and RMS measurement of every channel in the analysis band, each (J,), over samples that count.
 
-    Of a channel that is silent in all, the largest measurement of the others stands for its own.
+    Of a channel that is silent in all, the largest measurement of the others stands for its own; of one that nothing
+    drives, the rigid body's torque.
     """
     residuals = np.concatenate([e.measured - e.all_to_band(assembly.torque(e, theta)) for e in experiments])
     measured = np.concatenate([e.measured for e in experiments])
+    undriven = list(experiments[0].motion.undriven)
+    if undriven:
+        modelled = np.concatenate([e.all_to_band(e.modelled) for e in experiments])
+        measured[:, undriven] = modelled[:, undriven]
     counted = np.maximum(np.sum([e.counted for e in experiments], axis=0), 1)
     size = np.sqrt(np.sum(measured**2, axis=0) / counted)
     size[sorted(set.intersection(*(set(e.motion.silent) for e in experiments)))] = size.max()

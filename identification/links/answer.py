@@ -125,7 +125,7 @@ def _sentence(findings: Sequence[Finding], fits: Sequence[ChannelFit]) -> str:
     worst = max(changed or fits, key=lambda f: f.holdout.rms_before)
     before, after = (length(x, worst.unit) for x in (worst.holdout.rms_before, worst.holdout.rms_after))
     return (
-        f"{said} With that added, the difference left on {worst.channel}, on the recording that the fit never saw, "
+        f"{said} With that added, the difference left on {worst.channel}, on the held-out recording, "
         f"falls from {before} to {after}."
     )
 

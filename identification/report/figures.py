@@ -78,14 +78,14 @@ def before_and_after(trace: Trace, changed: bool) -> bytes:
 
 
 def steps(rows: Sequence[Step]) -> bytes:
-    """Relative misfit of each step, on the recordings fitted and on the one never seen."""
+    """Relative misfit of each step, on the training recordings and the held-out one."""
     with drawing():
         labels = [row.label for row in rows]
         figure, axes = _bars(labels, 0.42, 8.0)
         places = np.arange(len(rows))
         for offset, colour, label, values in (
-            (-0.19, GREY, "recordings fitted", [100 * row.train for row in rows]),
-            (0.19, AFTER, "recording never seen", [100 * row.holdout for row in rows]),
+            (-0.19, GREY, "training", [100 * row.train for row in rows]),
+            (0.19, AFTER, "held-out", [100 * row.holdout for row in rows]),
         ):
             axes.barh(places + offset, values, 0.36, color=colour, label=label)
             _numbers(axes, places + offset, values)

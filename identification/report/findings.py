@@ -4,13 +4,21 @@ from collections.abc import Sequence
 from datetime import date
 from html import escape
 
-from ...report.html import bar, figure, flag, headline, paragraph, table
-from ..diagnosis import Diagnosis, Finding, Limit, Rival, Trace
+from ...report.drawing import BEFORE
+from ...report.html import bar, figure, flag, folded, headline, paragraph, table
+from ...report.zoom import Curve, Strip, zoomable
+from ..diagnosis import Diagnosis, Finding, Limit, Location, Rival, Trace
 from .figures import residual_over_time
 from .words import chance, number, percent, spans, unit_words, with_std, words
 
-STATUS = {"missing_physics": "missing physics", "adequate": "adequate", "unknown_effect": "unknown effect"}
+STATUS = {
+    "data_fault": "fault in the data",
+    "missing_physics": "missing physics",
+    "adequate": "adequate",
+    "unknown_effect": "unknown effect",
+}
 _WORST = 4
+_CHANNELS = ("tau.", "q.", "qd.", "q_link.")
 
 
 def verdict(diagnosis: Diagnosis, day: date) -> str:
@@ -21,8 +29,8 @@ def verdict(diagnosis: Diagnosis, day: date) -> str:
     }
     facts = [
         ("Model", diagnosis.model),
-        ("Fitted on", ", ".join(recordings["train"])),
-        ("Never seen by the fit", ", ".join(recordings["holdout"])),
+        ("Training", ", ".join(recordings["train"])),
+        ("Held-out", ", ".join(recordings["holdout"])),
         ("Analysis band", f"0 to {diagnosis.band:g} Hz"),
         ("Date", day.isoformat()),
     ]
@@ -34,16 +42,32 @@ def verdict(diagnosis: Diagnosis, day: date) -> str:
 
 
 def missing(diagnosis: Diagnosis) -> tuple[str, str, str]:
-    """What is missing, one card an effect; the detection limits or the description where there is nothing to name."""
+    """What is missing, joint by joint; the detection limits or the description where there is nothing to name."""
     if diagnosis.verdict == "adequate":
         return "missing", "What would have been seen", detection_limits(diagnosis)
     text = paragraph(diagnosis.description)
     if diagnosis.verdict == "unknown_effect":
         return "missing", "What is known about it", f'<article class="card">{text}</article>\n'
-    cards = "".join(_card(finding) for finding in diagnosis.effects)
+    cards = "".join(_card(place, group) for place, group in _by_place(diagnosis.effects).items())
     if diagnosis.description:
         cards += f'<article class="card"><h3>Without a name</h3>\n{text}</article>\n'
     return "missing", "What is missing", cards
+
+
+def checked(diagnosis: Diagnosis) -> tuple[str, str, str]:
+    """What of the recordings and the model is not as it should be, with the lines that mend it."""
+    rows = [
+        [
+            escape(words(check.name)),
+            escape(check.at),
+            chance(check.probability),
+            escape(check.message),
+            "<br>".join(f"<code>{escape(line)}</code>" for line in check.mend.splitlines()),
+        ]
+        for check in diagnosis.checks
+    ]
+    heads = ["Check", "At", "Probability", "What", "Line that mends it"]
+    return "checks", "Is the data sound?", table("What is not as it should be", heads, rows, (2,))
 
 
 def where(diagnosis: Diagnosis) -> tuple[str, str, str]:
@@ -73,8 +97,22 @@ def where(diagnosis: Diagnosis) -> tuple[str, str, str]:
             "Residual before over time, with the table's windows shaded: "
             f"{', '.join(trace.channel for trace in first)}.",
             "Measurement minus the model as it was. Shaded: the time windows of the table.",
+            zoom=_zoomable(first, diagnosis.location),
         )
     return "where", "Where", content
+
+
+def _zoomable(traces: Sequence[Trace], places: Sequence[Location]) -> str:
+    strips = [
+        Strip(
+            f"{trace.channel}, {trace.recording}",
+            unit_words(trace.unit),
+            [Curve("", trace.time, trace.measured - trace.before, BEFORE)],
+            [window for place in places if place.channel == trace.channel for window in place.time_windows],
+        )
+        for trace in traces
+    ]
+    return zoomable(strips, traces[0].recording, "residual before over time")
 
 
 def detection_limits(diagnosis: Diagnosis) -> str:
@@ -93,26 +131,34 @@ def detection_limits(diagnosis: Diagnosis) -> str:
     return paragraph(text) + table("Limits of detection", ["Effect", "Parameter", "Best seen", "Worst seen"], rows)
 
 
-def _card(finding: Finding) -> str:
-    name = words(finding.name)
-    rows = []
-    for parameter, estimate in finding.parameters.items():
-        value, std = with_std(estimate.value, estimate.std)
-        rows.append(
-            [
-                escape(words(parameter)),
-                value,
-                f"± {std}",
-                escape(unit_words(estimate.unit)) or "–",
-                flag("at its bound") if estimate.at_bound else "",
-            ]
-        )
-    parameters = table("Parameters", ["Name", "Value", "Std", "Unit", ""], rows, (1, 2), False) if rows else ""
-    return (
-        f'<article class="card"><header><h3>{escape(name[:1].upper() + name[1:])} at {escape(finding.at)}</h3>'
-        f"<span>probability {chance(finding.probability)}</span></header>\n"
-        f"{paragraph(finding.evidence)}{parameters}{_rivals(finding.rivals)}</article>\n"
-    )
+def _by_place(findings: Sequence[Finding]) -> dict[str, list[Finding]]:
+    """Findings by the joint, link or sling they stand at; a sensor's with those of its joint."""
+    groups: dict[str, list[Finding]] = {}
+    for finding in findings:
+        place = finding.at.partition(".")[2] if finding.at.startswith(_CHANNELS) else finding.at
+        groups.setdefault(place, []).append(finding)
+    return groups
+
+
+def _card(place: str, findings: Sequence[Finding]) -> str:
+    """All that was found at one place: a table of names and values, with evidence and rivals folded away."""
+    rows, details = [], ""
+    for finding in findings:
+        name = words(finding.name)
+        title = f"{name[:1].upper() + name[1:]} at {finding.at}"
+        cells = [escape(title), chance(finding.probability)]
+        for parameter, estimate in finding.parameters.items():
+            value, std = with_std(estimate.value, estimate.std)
+            unit = escape(unit_words(estimate.unit)) or "–"
+            mark = flag("at its bound") if estimate.at_bound else ""
+            rows.append([*cells, escape(words(parameter)), value, f"± {std}", unit, mark])
+            cells = ["", ""]
+        if not finding.parameters:
+            rows.append([*cells, "", "–", "–", "–", ""])
+        details += folded(f"Why {name} at {finding.at}", paragraph(finding.evidence) + _rivals(finding.rivals))
+    heads = ["Effect", "Probability", "Parameter", "Value", "Deviation", "Unit", ""]
+    found = table(f"Found at {place}", heads, rows, (1, 3, 4), False)
+    return f'<article class="card"><h3>{escape(place)}</h3>\n{found}{details}</article>\n'
 
 
 def _rivals(rivals: Sequence[Rival]) -> str:

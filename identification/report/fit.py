@@ -1,11 +1,13 @@
-"""The report's later parts: the fit on unseen data, the steps, the residual's shape, candidates, parameters, notes."""
+"""The report's later parts: held-out data, the steps, the residual's shape, candidates, parameters, notes."""
 
 from collections.abc import Sequence
 from html import escape
 
 import numpy as np
 
+from ...report.drawing import AFTER, BEFORE
 from ...report.html import figure, flag, folded, paragraph, table
+from ...report.zoom import Curve, Strip, zoomable
 from ..diagnosis import Array, Diagnosis, Trace
 from .curves import residual_curves
 from .figures import before_and_after, candidates, steps
@@ -17,35 +19,43 @@ _TOP = 15
 _MOVED = 2.0
 
 
-def unseen(diagnosis: Diagnosis) -> tuple[str, str, str]:
-    """Measurement and model on data that the fit never saw, most changed channels first, and the table of RMS."""
-    pictures = []
-    for channel in _channels(diagnosis):
-        trace = max(_shown(diagnosis, channel), key=_change)
-        changed = _changed([trace])
-        models = "model before and model after" if changed else "model"
-        picture = figure(
-            before_and_after(trace, changed),
-            f"{trace.channel} in {trace.recording}: measured, {models} over time, and the residual below.",
-            f"{trace.channel} in {trace.recording} ({_ROLE[trace.role]}). {_alike(diagnosis, changed)}Right: where the "
-            + ("two models differ most." if changed else "model misses most."),
-        )
-        pictures.append((changed, picture))
+def most_changed(diagnosis: Diagnosis) -> list[Trace]:
+    """One trace a channel, held-out where there is one; the channel that changed most first."""
+    return [max(_shown(diagnosis, channel), key=_change) for channel in _channels(diagnosis)]
+
+
+def comparison(diagnosis: Diagnosis, trace: Trace) -> tuple[bool, str]:
+    """Whether the model changed on a channel, and its picture: measurement and model above, residual below."""
+    changed = changes([trace])
+    models = "model before and model after" if changed else "model"
+    text = f"{trace.channel} in {trace.recording}: measured, {models} over time, and the residual below."
+    return changed, figure(
+        before_and_after(trace, changed),
+        text,
+        f"{trace.channel} in {trace.recording} ({_ROLE[trace.role]}). {_alike(diagnosis, changed)}Right: where the "
+        + ("two models differ most." if changed else "model misses most."),
+        zoom=zoomable(_strips(trace, changed), trace.recording, text),
+    )
+
+
+def unseen(diagnosis: Diagnosis, skip: int = 0) -> tuple[str, str, str]:
+    """Measurement and model on held-out data, most changed channels first but for ``skip``, and the table of RMS."""
+    pictures = [comparison(diagnosis, trace) for trace in most_changed(diagnosis)[skip:]]
     added = bool(diagnosis.effects)
-    title = "Before and after, on data the fit never saw" if added else "Model and measurement, on data never fitted"
+    title = "Before and after, on held-out data" if added else "Model and measurement, on held-out data"
     return "unseen", title, _open_and_folded(pictures) + _misfits(diagnosis, added)
 
 
 def step_by_step(diagnosis: Diagnosis) -> tuple[str, str, str]:
     """The model step by step, with its misfit on both sets."""
     rows = [[escape(step.label), percent(step.train), percent(step.holdout)] for step in diagnosis.steps]
-    heads = ["Model", "Recordings fitted", "Recording never seen"]
+    heads = ["Model", "Training", "Held-out"]
     content = table("Relative misfit over all channels", heads, rows, numeric=(1, 2), wide=False)
     if len(diagnosis.steps) > 1:
         first, last = diagnosis.steps[0], diagnosis.steps[-1]
         content += figure(
             steps(diagnosis.steps),
-            f"Relative misfit by step; on the recording never seen from {percent(first.holdout)} to "
+            f"Relative misfit by step; on the held-out recording from {percent(first.holdout)} to "
             f"{percent(last.holdout)}.",
             "Each step keeps the effects above it and fits everything again.",
             small=True,
@@ -58,7 +68,7 @@ def shape(diagnosis: Diagnosis) -> tuple[str, str, str]:
     pictures = []
     for channel in _channels(diagnosis):
         traces = _shown(diagnosis, channel)
-        changed = _changed(traces)
+        changed = changes(traces)
         drawn = residual_curves(traces, changed)
         if drawn is None:
             continue
@@ -140,11 +150,22 @@ def notes(diagnosis: Diagnosis) -> tuple[str, str, str]:
     return "notes", "Notes", content or paragraph("Nothing to remark on the conditioning or excitation.")
 
 
-_ROLE = {"train": "a recording the fit has seen", "holdout": "never seen by the fit"}
+_ROLE = {"train": "training", "holdout": "held-out"}
+
+
+def _strips(trace: Trace, changed: bool) -> list[Strip]:
+    models = [("model before", trace.before, BEFORE), ("model after", trace.after, AFTER)]
+    if not changed:
+        models = [("model", trace.before, AFTER)]
+    unit = unit_words(trace.unit)
+    measured = Curve("measured", trace.time, trace.measured, "ink")
+    lines = [Curve(label, trace.time, values, colour) for label, values, colour in models]
+    left = [Curve("", trace.time, trace.measured - values, colour) for _, values, colour in models]
+    return [Strip(f"{trace.channel}, {trace.recording}", unit, [measured, *lines]), Strip("residual", unit, left)]
 
 
 def _shown(diagnosis: Diagnosis, channel: str) -> list[Trace]:
-    """A channel's traces on data never seen, or on the data fitted where no other was kept."""
+    """A channel's held-out traces, or those of training where no other was kept."""
     traces = [trace for trace in diagnosis.traces if trace.channel == channel]
     return [trace for trace in traces if trace.role == "holdout"] or traces
 
@@ -162,7 +183,7 @@ def _change(trace: Trace) -> tuple[float, float]:
     return (before - after) / scale, before / scale
 
 
-def _changed(traces: Sequence[Trace]) -> bool:
+def changes(traces: Sequence[Trace]) -> bool:
     """Whether the model's change is worth drawing twice: over a hundredth of the residual's RMS."""
     return any(_rms(t.after - t.before) > 0.01 * _rms(t.measured - t.before) for t in traces)
 
@@ -188,14 +209,14 @@ def _open_and_folded(pictures: Sequence[tuple[bool, str]]) -> str:
 
 def _misfits(diagnosis: Diagnosis, added: bool) -> str:
     columns: list[tuple[str, list[str]]] = []
-    for name, said in (("train", "fitted"), ("holdout", "never seen")):
+    for name, said in (("train", "training"), ("holdout", "held-out")):
         misfits = [getattr(fit, name) for fit in diagnosis.fit]
         columns.append((f"RMS, {said}" + ", before" * added, [number(m.rms_before) for m in misfits]))
         columns += [(f"RMS, {said}, after", [number(m.rms_after) for m in misfits])] * added
     columns.append(("Noise floor", [number(fit.noise_floor) for fit in diagnosis.fit]))
     unseen = [fit.holdout for fit in diagnosis.fit]
-    columns.append(("Relative, never seen" + ", before" * added, [percent(m.relative_before) for m in unseen]))
-    columns += [("Relative, never seen, after", [percent(m.relative_after) for m in unseen])] * added
+    columns.append(("Relative, held-out" + ", before" * added, [percent(m.relative_before) for m in unseen]))
+    columns += [("Relative, held-out, after", [percent(m.relative_after) for m in unseen])] * added
     names = [f"{escape(fit.channel)}\u00a0[{escape(unit_words(fit.unit))}]" for fit in diagnosis.fit]
     heads = ["Channel", *(head for head, _ in columns)]
     rows = list(zip(names, *(cells for _, cells in columns), strict=True))

@@ -3,7 +3,9 @@
 import math
 import re
 
-_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_SUPERSCRIPT = str.maketrans("-0123456789.", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹·")
+_WRITTEN = {"1": "", "N*m*s^2/rad": "kg·m²", "N*s^2/m": "kg"}
+"""Products that have a shorter form: torque over acceleration is an inertia, force over acceleration a mass."""
 _MISSING = "–"
 _PEOPLE = re.compile(r"\b(coulomb|stribeck|makkar)\b")
 
@@ -14,9 +16,10 @@ def words(name: str) -> str:
 
 
 def unit_words(unit: str) -> str:
-    """A unit as printed: ``N*m/rad**2`` is "N·m/rad²"."""
-    raised = re.sub(r"(?:\*\*|\^)\s*(-?\d+)", lambda match: match[1].translate(_SUPERSCRIPT), unit)
-    return re.sub(r"\s*\*\s*", "·", raised)
+    """A unit as engineers write it: ``N*m/rad**2`` is "N·m/rad²", ``N*m*s^2/rad`` "kg·m²", ``1`` is nothing."""
+    plain = re.sub(r"\s+", "", unit).replace("**", "^")
+    raised = re.sub(r"\^(-?\d+(?:\.\d+)?)", lambda match: match[1].translate(_SUPERSCRIPT), plain)
+    return _WRITTEN.get(plain, raised.replace("*", "·"))
 
 
 def number(value: float, digits: int = 3) -> str:

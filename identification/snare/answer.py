@@ -23,8 +23,7 @@ from ..diagnosis import (
     Trace,
 )
 from ..reliability import probability as reliability
-from ..report.words import words
-from ..wording import experiment_sentence, percent
+from ..wording import experiment_sentence, named, percent
 from .channels import channel_errors, channels, modelled
 from .comparison import QUARTER, SLOW, variances
 from .fit import Fit, spread
@@ -179,19 +178,17 @@ def _unexplained(fits: Sequence[ChannelFit]) -> str:
 def _sentence(findings: Sequence[Finding], fits: Sequence[ChannelFit], description: str) -> str:
     worst = max(fits, key=lambda f: f.holdout.relative_before - f.holdout.relative_after)
     if findings:
-        named = [f"{words(f.name)} at {f.at}" for f in findings]
-        listed = named[0] if len(named) == 1 else f"{', '.join(named[:-1])} and {named[-1]}"
         return (
-            f"The model leaves out {listed}. With that added, the error of {worst.channel} on the capture that the fit "
-            f"never saw falls from {_size(worst.holdout.rms_before, worst.unit)} to "
+            f"The model leaves out {named(findings)}. With that added, the error of {worst.channel} on the held-out "
+            f"capture falls from {_size(worst.holdout.rms_before, worst.unit)} to "
             f"{_size(worst.holdout.rms_after, worst.unit)}."
         )
     if description:
         return f"Something is missing that no effect of the vocabulary explains: {description}."
     worst = max((f for f in fits if f.unit == "m"), key=lambda f: f.holdout.rms_before)
     return (
-        "The model is adequate: nothing is left out that these captures can show. On the capture that the fit never "
-        f"saw, the error of {worst.channel} is {_size(worst.holdout.rms_before, worst.unit)}."
+        "The model is adequate: nothing is left out that these captures can show. On the held-out capture, "
+        f"the error of {worst.channel} is {_size(worst.holdout.rms_before, worst.unit)}."
     )
 
 

@@ -59,6 +59,13 @@ class FloatingArm:
     def __post_init__(self) -> None:
         """Refuse what would fall, or what no body is."""
         name, gravity = self.tree.name, self.tree.gravity
+        if self.tree.followers:
+            follower = self.tree.followers[0]
+            leader = self.tree.joints[follower.leader].name
+            raise InputError(
+                f"{name}: joint '{follower.joint.name}' mimics '{leader}', and neither a floating arm nor an export "
+                "has equations for that; make both fixed in a copy of the URDF"
+            )
         if not 0 <= self.tip_link < self.n_joints:
             raise InputError(f"{name}: tip_link is {self.tip_link}; give 0 to {self.n_joints - 1}")
         if self.floating and np.any(gravity):
@@ -131,6 +138,8 @@ def load_arm(path: str | Path, tip: str, floating: bool = True, gravity: ArrayLi
     """
     path = Path(path)
     tree = urdf.load_urdf(path, gravity)
+    if tree.weightless:
+        raise InputError(f"{path}: joint '{tree.weightless[0]}' moves no mass; give a link beyond it an <inertial>")
     robot = urdf.read_robot(path)
     root = urdf.checked_root(path, robot)
     parameters = {link.get("name", ""): urdf.link_parameters(path, link) for link in robot.findall("link")}

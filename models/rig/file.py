@@ -49,7 +49,7 @@ def read_slings(path: Path, table: Any, tree: Tree) -> Rig:
         for key in set(entry) - set(_KEYS):
             raise InputError(f"{path}: [slings] {name} has {key!r}; allowed are {', '.join(_KEYS)}")
         entries[name] = entry
-    bare = Rig(tree.name, tree.joints, tree.links, tree.gravity)
+    bare = Rig(tree.name, tree.joints, tree.links, tree.gravity, followers=tree.followers, notes=tree.notes)
     slings = []
     for name, entry in entries.items():
         link = bodies.index(entry["body"])

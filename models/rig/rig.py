@@ -67,6 +67,11 @@ class Rig(Tree):
     def __post_init__(self) -> None:
         """Refuse what no rig can be."""
         super().__post_init__()
+        if self.followers:
+            raise InputError(
+                f"{self.name}: joint '{self.followers[0].joint.name}' mimics another, which no rig has equations for; "
+                "make both fixed in a copy of the URDF"
+            )
         if self.gravity[0] or self.gravity[1] or not self.gravity[2] < 0:
             raise InputError(
                 f"{self.name}: gravity is {self.gravity.tolist()}; slings hang along z, so a rig needs [0.0, 0.0, -g] "

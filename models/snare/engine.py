@@ -8,9 +8,11 @@ import contextlib
 import io
 import sys
 
+from ...extras import needed_for
+
 if "exudyn" not in sys.modules:
     sys.exudynFast = True  # pyright: ignore[reportAttributeAccessIssue]
-    with contextlib.redirect_stdout(io.StringIO()):
+    with contextlib.redirect_stdout(io.StringIO()), needed_for("the snare"):
         import exudyn
 else:
     import exudyn

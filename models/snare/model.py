@@ -44,11 +44,15 @@ class Accuracy:
         Per cable.
     cold_step : float
         Time step during the first 0.1 s [s].
+    deepest : float
+        Overlap of cable and pin, the element's own deflection included, above which a step counts as failed [m]; 0: as
+        deep as a soft capture goes, half the cable's radius.
     """
 
     step: float
     n_elements: int
     cold_step: float
+    deepest: float = 0.0
 
 
 ACCURACIES = {"default": Accuracy(1e-3, 10, 5e-4), "fine": Accuracy(5e-4, 20, 1e-4)}
@@ -210,6 +214,8 @@ class SnareModel:
     def _deepest(self) -> float:
         """Deepest overlap of a step that went well [m]: half the cable's radius; all of it on a soft pin, which gives
         way so far under pushes that strain a cable by less than a hundredth."""
+        if self.accuracy.deepest > 0:
+            return self.accuracy.deepest
         p, half = self.parameters, self.parameters.cable_radius / 2
         return half if p.hertz_stiffness * half**1.5 > 0.01 * p.axial_stiffness else 2 * half
 
@@ -240,6 +246,11 @@ class SnareModel:
             self.step(duration / n_steps)
             self._recorder.record(self.time)
         return self._recorder.history()
+
+    @property
+    def n_contacts(self) -> int:
+        """Contacts of cables and pin now."""
+        return len(self._recorder.touching)
 
     def wrenches(self) -> tuple[np.ndarray, np.ndarray]:
         """Force and moment [N, N·m] on the pin about its foot, and on the end effector about its origin; each (6,)."""

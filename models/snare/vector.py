@@ -6,7 +6,10 @@ called, not of the files it calls: remove the folder after editing one of them b
 
 from math import sqrt
 
-import numba
+from ...extras import needed_for
+
+with needed_for("the snare"):
+    import numba
 
 compiled = numba.njit(cache=True, error_model="numpy")
 """Decorator of every compiled function: one source, with or without a C compiler on the machine."""

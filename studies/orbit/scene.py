@@ -12,6 +12,7 @@ from ...models.inertia import Array
 from ...models.snare.parameters import SnareParameters
 from ...report.playback import Playback
 from ...report.snare_scene import CABLES, KNOB, PIN, RINGS
+from .docked import Docked
 from .setting import TARGET_SIDE, Capture, Setting
 
 _ARM, _BASE, _TARGET = "#0072B2", "#9AA3AB", "#C9B37A"
@@ -57,6 +58,33 @@ def orbit_scene(
     side = tip[0, 3:] @ np.array([-0.35, 0.45, 0.45])
     scene.camera(tip[0, 0] + side, tip[0, 0] + 0.06 * tip[0, 3:, 0])
     return scene
+
+
+PHASES = {
+    "CLOSE": "blue", "SETTLE": "sky blue", "SNUG": "grey", "SLIDE": "green", "PULL": "yellow", "SEAT": "orange",
+    "BACK_OFF": "brown", "PRELOAD": "vermilion", "LATCH": "purple", "LATCHED": "black",
+}  # fmt: skip
+"""Colour of the ball that shows the program's state; any other state is red."""
+_COLOURS = {
+    "blue": "#0072B2", "sky blue": "#56B4E9", "grey": "#9AA3AB", "green": "#009E73", "yellow": "#F0E442",
+    "orange": "#E69F00", "brown": "#8C564B", "vermilion": "#D55E00", "purple": "#CC79A7", "black": "#000000",
+    "red": "#CC1111",
+}  # fmt: skip
+
+
+def add_phases(scene: Playback, docked: Docked) -> None:
+    """Show the program's state as a ball above the carriage, one colour a state."""
+    capture = docked.capture
+    times = np.arange(0.0, capture.times[-1], 1 / _PER_SECOND)
+    rows = np.searchsorted(capture.times, times)
+    place = capture.tip[rows, 0] + 0.28 * capture.tip[rows, 5]
+    begins = np.array([begin for _, begin, _ in docked.whole.phases])
+    now = np.searchsorted(begins, times, side="right") - 1
+    names = np.array([PHASES.get(state, "red") for state, _, _ in docked.whole.phases])[now]
+    for colour in dict.fromkeys(names.tolist()):
+        scene.body(f"state/{colour}", Sphere(0.02), _COLOURS[colour])
+        scene.move(f"state/{colour}", times, place)
+        scene.show(f"state/{colour}", times, names == colour)
 
 
 def _quaternions(frames: Array, turned: Rotation | None = None) -> Array:

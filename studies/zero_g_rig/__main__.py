@@ -24,10 +24,13 @@ from ..outcome import FOLDER, Quantity, table, write_json, write_result
 from ..page import Clock, Section, write_page
 from . import figures
 from .explain import alike_in_words, remedy, suspected_boom, tell_apart
+from .flight import TORQUE_LIMIT, Flight, flight_arm
+from .motion import TRAIN
 from .recordings import make_recordings, open_answer
 from .scene import FASTER, rig_scene
 from .score import Score, score, true_curves
 from .study import MODEL, Friction, friction_study
+from .unloading import printed_law, registered_law, unit_forces, unloading_ratio
 
 Array = NDArray[np.float64]
 
@@ -47,6 +50,8 @@ def main() -> int:
     train, holdout = folder / "train.parquet", folder / "holdout.parquet"
     model = load_model(MODEL)
     friction = friction_study(model, train, holdout, stages(say))
+    say("A flight arm without sensors, on the same rig ...")
+    flown = flight_arm(model, friction, folder, CONCEALED)
     say(f"{error_table(friction)}\nDiagnosing what is left, with {holdout.name} locked away ...")
     answer = diagnose(model, [train], holdout, progress=stages(say))
     found = answer.diagnosis
@@ -55,7 +60,7 @@ def main() -> int:
     words = alike_in_words(pairs)
     truth = open_answer(folder, digest)
     result = score(truth, found, friction.curves)
-    quantities = numbers(friction, found, result)
+    quantities = [*numbers(friction, found, result), *leftovers(friction, flown)]
     sentence = f"{found.sentence} {remedy(pairs, boom)}"
     save_model(answer.model, folder / "model.toml", sentence)
     write_json(folder / "diagnosis.json", found.to_json())
@@ -65,7 +70,7 @@ def main() -> int:
         "Zero-gravity rig: friction, and what it does not explain",
         sentence,
         quantities,
-        sections(friction, found, words, truth),
+        [*sections(friction, found, words, truth), *paper_sections(friction, flown)],
         rig_scene(built_in_rig(), friction.train.time, friction.train.q).html(),
         f"The fitted recording, {FASTER:g} times as fast: arm, joints, slings and the carriages above them. Drag to "
         "turn, scroll to come closer, right button to shift.",
@@ -79,6 +84,7 @@ def main() -> int:
             "sealed": digest,
             "concealed": truth["effect"],
             "score": vars(result),
+            "hang_units": unit_forces(built_in_rig()),
             "told_apart": [vars(p) for p in pairs],
             "curves": [{"joint": c.joint, "carried": c.carried, "not_carried": c.not_carried} for c in friction.curves],
         },
@@ -123,6 +129,52 @@ def numbers(friction: Friction, found: Diagnosis, result: Score) -> list[Quantit
         Quantity("named_rightly", "1", float(result.placed), "reference"),
         Quantity("named_wrongly", "1", float(result.wrong), "reference"),
         Quantity("friction_band_coverage", "1", result.coverage, "reference"),
+    ]
+
+
+def leftovers(friction: Friction, flown: Flight) -> list[Quantity]:
+    """Unloading ratio of each joint, the printed law against the vocabulary's, and what a flight arm may expect."""
+    t, speed = friction.train, np.linspace(-1.0, 1.0, 2001)
+    ratio = unloading_ratio(built_in_rig(), t.q, t.measured, t.rigid)
+    nearest = int(np.argmax(flown.loads))
+    return [
+        *(Quantity(f"unloading_ratio.joint{k + 1}", "1", float(x), "reference") for k, x in enumerate(ratio)),
+        Quantity(
+            "printed_law_deviation", "1", float(np.abs(registered_law(speed) - printed_law(speed)["f"]).max()),
+            "predicted", 0.0,
+        ),
+        *(Quantity(f"flight_coverage.joint{k + 1}", "1", float(x), "reference") for k, x in enumerate(flown.coverage)),
+        Quantity("flight_nearest_limit", "", f"joint{nearest + 1}", "reference"),
+        Quantity("flight_nearest_limit_share", "1", float(flown.loads[nearest]), "reference"),
+    ]  # fmt: skip
+
+
+def paper_sections(friction: Friction, flown: Flight) -> list[Section]:
+    """The paper's figures 5 and 6, the forces of its hang units, and the flight arm."""
+    t, speed = friction.train, np.linspace(-0.3, 0.3, 1201)
+    starts = {f"joint {k}": next(m.start for m in TRAIN if m.joint == k) for k in (3, 1)}
+    nearest = int(np.argmax(flown.loads))
+    units = [
+        f"{name}: " + ", ".join(f"{key} {value:.0f} N" for key, value in forces.items())
+        for name, forces in unit_forces(built_in_rig()).items()
+    ]
+    return [
+        Section("The printed friction law", [], [figures.printed(speed, printed_law(speed))]),
+        Section("Joint 1 while joint 3 starts", [], [figures.joint_1_while_3_starts(t.time, t.q, t.measured, starts)]),
+        Section(
+            "Forces in the hang units (equation 12)",
+            ["The paper gives sums of two; each alone is for a plate and a slide that share evenly.", *units],
+        ),
+        Section(
+            "A flight arm without sensors",
+            [
+                "Unloading ratio: of the moment that a joint would bear from the weight beyond it without the rig, "
+                "the share that its torque does not show. The same friction predicts a flight arm of the same size "
+                f"and mass. Nearest to the limit of {TORQUE_LIMIT:g} N·m (chosen) comes joint {nearest + 1}, with "
+                f"{100 * flown.loads[nearest]:.0f} % of it, the band included.",
+            ],
+            [figures.flight(flown.time, flown.measured, flown.predicted, flown.band)],
+        ),
     ]
 
 

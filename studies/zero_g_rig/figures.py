@@ -43,6 +43,63 @@ def torques(time: Array, measured: Array, models: Mapping[str, Array], caption: 
     return Picture(picture, f"Torque of joints 1 to 7, measured and {', '.join(models)}, over time.", caption)
 
 
+def printed(speed: Array, parts: Mapping[str, Array]) -> Picture:
+    """The friction law with the paper's printed parameters, and its three parts, like the paper's figure 5."""
+    with drawing():
+        figure = Figure(figsize=(9.0, 3.0), layout="constrained")
+        axes = figure.subplots()
+        for (name, values), colour in zip(parts.items(), (MEASURED, BEFORE, AFTER, GREY), strict=True):
+            line(axes, speed, values, colour, 1.4 if name == "f" else 1.0, name)
+        axes.set(xlabel="joint speed [rad/s]", ylabel="f [printed unit]")
+        axes.legend(ncols=4, loc="lower right")
+        picture = svg(figure)
+    text = "The law of equation 11 with its printed parameters, like the paper's figure 5: f = f1 + f2 + f3."
+    return Picture(picture, "Friction over speed: the printed law and its three parts.", text)
+
+
+def joint_1_while_3_starts(time: Array, q: Array, measured: Array, starts: Mapping[str, float]) -> Picture:
+    """Torque of joint 1, and the angles of joints 1 and 3, where either starts, like the paper's figure 6."""
+    first, last = min(starts.values()) - 8.0, max(starts.values()) + 20.0
+    here = (time >= first) & (time <= last)
+    with drawing():
+        figure = Figure(figsize=(9.0, 3.4), layout="constrained")
+        axes, angles = figure.subplots(2, 1, sharex=True)
+        line(axes, time[here], measured[here, 0], MEASURED, 0.9, "joint 1, measured")
+        for k, colour in ((0, AFTER), (2, BEFORE)):
+            line(angles, time[here], q[here, k], colour, 1.2, f"joint {k + 1}")
+        for name, begin in starts.items():
+            for panel in (axes, angles):
+                panel.axvline(begin, color=GREY, linestyle=":", linewidth=0.9)
+            axes.text(begin, 1.0, f" {name} starts", transform=axes.get_xaxis_transform(), va="top", fontsize=7.5)
+        axes.set(ylabel="torque [N·m]")
+        angles.set(xlabel="time [s]", ylabel="angle [rad]")
+        angles.legend(loc="upper left")
+        picture = svg(figure)
+    text = "Joint 1 bears the friction of joint 3's slide as joint 3 starts, and then its own: the paper's figure 6."
+    return Picture(picture, "Torque of joint 1 and angles of joints 1 and 3 over time.", text)
+
+
+def flight(time: Array, measured: Array, predicted: Array, band: Array) -> Picture:
+    """A flight arm's torques: predicted with their band, and the simulated arm's; arrays (n, 7), band (7,)."""
+    with drawing():
+        figure = Figure(figsize=(9.0, 9.5), layout="constrained")
+        axes = figure.subplots(7, 1, sharex=True)
+        for k, at in enumerate(axes):
+            at.fill_between(
+                time, predicted[:, k] - band[k], predicted[:, k] + band[k], color=SHADE, alpha=0.5, linewidth=0
+            )
+            line(at, time, measured[:, k], MEASURED, 0.7, "flight arm" if k == 0 else "")
+            line(at, time, predicted[:, k], AFTER, 1.0, "predicted" if k == 0 else "")
+            at.set_ylabel(f"joint {k + 1}\n[N·m]")
+        axes[-1].set_xlabel("time [s]")
+        figure.legend(ncols=2, loc="outside upper center")
+        picture = svg(figure)
+    text = (
+        "A flight arm without sensors on the same rig: predicted torque with its band, and what a simulated one bears."
+    )
+    return Picture(picture, "Predicted and simulated torque of a flight arm's joints over time.", text)
+
+
 def errors(joints: Sequence[str], steps: Mapping[str, Array], caption: str) -> Picture:
     """Mean torque error of every joint, one bar a model, like the paper's figure 11; each array (7,)."""
     with drawing():

@@ -10,14 +10,17 @@ servo drives each joint; recorded are the encoders' and the torque sensors' read
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-import exudyn as exu
 import numpy as np
-from exudyn.itemInterface import NodeGenericODE2, ObjectKinematicTree, SensorKinematicTree
 from numpy.typing import NDArray
 
+from ...extras import needed_for
 from .arm import GRAVITY, Arm, Boom, Link, shift
 from .slide import Slide
 from .suspension import Slings, Suspension
+
+with needed_for("the rig's plant"):
+    import exudyn as exu
+    from exudyn.itemInterface import NodeGenericODE2, ObjectKinematicTree, SensorKinematicTree
 
 Array = NDArray[np.float64]
 Motion = Callable[[Array], tuple[Array, Array]]

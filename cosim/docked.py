@@ -1,0 +1,196 @@
+"""A whole run read: frames, forces, and whether it latched as an engineer means it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from ..models.docking.closed_forms import seated_share
+from ..models.docking.parameters import PRELOAD_WINDOW, RESIDUAL, RESIDUAL_ANGLE, DockingParameters
+from ..models.inertia import Array
+from .orbit_capture import Capture, column, columns
+from .whole_capture import WholeRun
+
+CABLE_STRENGTH = 8000.0
+"""Of a cable [N]: the limit of the tolerance study."""
+LEAST_SHARE = 0.5
+"""Of a ball's third of the preload that counts as seated."""
+
+
+@dataclass(frozen=True)
+class Docked:
+    """A whole run, n times.
+
+    Parameters
+    ----------
+    whole : WholeRun
+    capture : Capture
+        Its frames; ``tip`` is the carriage's, on which the rings are, ``pin`` the pin's foot.
+    travel, motor, tension : array (n,)
+        Of the carriage [m], its motor's force [N], and the largest force of a cable on its ring [N].
+    off : array (n, 3, 2)
+        Of each ball from its seat, axial and lateral [m].
+    normal : array (n, 6)
+        Of the flanks [N].
+    wrist : array (n, 3)
+        Force on the end effector, docking and cables, in its axes [N].
+    seat : array (n, 6, 3)
+        The end effector's frame.
+    """
+
+    whole: WholeRun
+    capture: Capture
+    travel: Array
+    motor: Array
+    tension: Array
+    off: Array
+    normal: Array
+    wrist: Array
+    seat: Array
+
+    @property
+    def times(self) -> Array:
+        """[s]"""
+        return self.capture.times
+
+    def rows_in(self, *states: str) -> NDArray[np.bool_]:
+        """Which rows are in these states of the program (n,)."""
+        numbers = column(self.whole.run.recording, "program.state")
+        return np.isin(numbers, [self.whole.states.index(state) for state in states])
+
+
+def docked_of(whole: WholeRun) -> Docked:
+    """Read a run's recording."""
+    table = whole.run.recording
+
+    def frames(body: str) -> Array:
+        result = np.empty((table.sizes["time"], 6, 3))
+        for row, kind in enumerate(("pos", "vel", "omega")):
+            result[:, row] = columns(table, f"{kind}.{body}")
+        result[:, 3:] = Rotation.from_quat(columns(table, f"quat.{body}", "xyzw")).as_matrix()
+        return result
+
+    touching = np.flatnonzero(column(table, "snare.touching") > 0)
+    times = table["time"].to_numpy()
+    joints = range(1, 8)
+    capture = Capture(
+        times, frames("carriage"), frames("pin"), frames("base"),
+        np.column_stack([column(table, f"q.joint{i}") for i in joints]),
+        np.column_stack([column(table, f"qd.joint{i}") for i in joints]),
+        columns(table, "snare.impulse.effector"), columns(table, "snare.angular_impulse.effector"),
+        float(times[touching[0]]) if len(touching) else None,
+    )  # fmt: skip
+    off = np.column_stack([column(table, f"effector.off.{i}.{way}") for i in (1, 2, 3) for way in ("axial", "lateral")])
+    return Docked(
+        whole, capture, column(table, "effector.travel"), column(table, "effector.force.motor"),
+        column(table, "snare.tension"), off.reshape(-1, 3, 2),
+        np.column_stack([column(table, f"effector.normal.{i}") for i in range(1, 7)]),
+        columns(table, "force.wrist"), frames("tip"),
+    )  # fmt: skip
+
+
+def residual(d: Docked) -> tuple[float, float]:
+    """How far target and end effector are from seated at the end: radial [m], and the angle between them [rad]."""
+    seat, pin = d.seat[-1], d.capture.pin[-1]
+    relative = seat[3:].T @ (pin[0] - seat[0])
+    turn = Rotation.from_matrix(seat[3:].T @ pin[3:]).magnitude()
+    return float(np.hypot(relative[1], relative[2])), float(turn)
+
+
+def ball_shares(d: Docked, p: DockingParameters, preload: float) -> Array:
+    """Each ball's normal forces over its two even shares of the preload, at the end (3,)."""
+    return d.normal[-1].reshape(3, 2).sum(axis=1) / (2 * seated_share(preload, p.flank))
+
+
+def is_latched(d: Docked, p: DockingParameters) -> tuple[bool, str]:
+    """Whether it latched as an engineer means it, and if not, why: the state that it ended in, or the bar missed."""
+    if d.whole.fault:
+        return False, f"{d.whole.final}: not computed to the end"
+    if d.whole.final != "LATCHED":
+        return False, d.whole.final
+    force = preload(d)
+    radial, angle = residual(d)
+    for wrong, why in (
+        (ball_shares(d, p, force).min() < LEAST_SHARE, "a ball bears less than half its share"),
+        (radial > RESIDUAL or angle > RESIDUAL_ANGLE, "residual"),
+        (not PRELOAD_WINDOW[0] <= force <= PRELOAD_WINDOW[1], "preload"),
+        (d.tension.max() > CABLE_STRENGTH, "cable"),
+    ):
+        if wrong:
+            return False, why
+    return True, "LATCHED"
+
+
+def margin(d: Docked, p: DockingParameters) -> float:
+    """Signed distance from failure of `is_latched`, as a share of the nearest limit, in -1 to 1."""
+    if d.whole.fault or d.whole.final != "LATCHED":
+        return -1.0
+    force, (radial, angle) = preload(d), residual(d)
+    low, high = PRELOAD_WINDOW
+    found = min(
+        ball_shares(d, p, force).min() / LEAST_SHARE - 1,
+        1 - radial / RESIDUAL,
+        1 - angle / RESIDUAL_ANGLE,
+        min(force - low, high - force) / (0.5 * (high - low)),
+        1 - d.tension.max() / CABLE_STRENGTH,
+    )
+    return float(np.clip(found, -1.0, 1.0))
+
+
+def preload(d: Docked) -> float:
+    """Largest force of the carriage's motor while it preloads and the latches close [N]."""
+    rows = d.rows_in("PRELOAD", "LATCH")
+    return float(d.motor[rows].max()) if rows.any() else 0.0
+
+
+def mean_wrist(d: Docked, window: float = 0.01) -> tuple[Array, Array]:
+    """Middles of windows [s] and the size of the mean force on the end effector in each (k,) [N]."""
+    times = d.times
+    summed = np.vstack([np.zeros(3), np.cumsum(0.5 * (d.wrist[1:] + d.wrist[:-1]) * np.diff(times)[:, None], axis=0)])
+    edges = np.arange(times[0], times[-1], window)
+    at = np.column_stack([np.interp(edges, times, x) for x in summed.T])
+    return edges[:-1] + window / 2, np.linalg.norm(np.diff(at, axis=0), axis=1) / window
+
+
+def momentum_drift(d: Docked) -> float:
+    """Largest change of the linear momentum of all together over the largest impulse on the carriage."""
+    table = d.whole.run.recording
+    total = sum(
+        columns(table, f"{who}.linear") for who in ("effector.momentum", "effector.momentum.target", "snare.momentum")
+    )
+    change = np.linalg.norm(np.asarray(total) - np.asarray(total)[0], axis=1).max()
+    return float(change / max(np.linalg.norm(d.capture.impulse, axis=1).max(), 1e-300))
+
+
+def energies(d: Docked) -> dict[str, Array]:
+    """Energies (n,) since the start [J]: what both motors have put in, and where it is; ``residual`` is the rest."""
+    table, c = d.whole.run.recording, d.capture
+
+    def own(name: str) -> Array:
+        values = column(table, f"effector.energy.{name}")
+        return values - values[0]
+
+    def snare(name: str) -> Array:
+        values = column(table, f"snare.energy.{name}")
+        return values - values[0]
+
+    def worked(impulse: Array, rate: Array) -> Array:
+        middle = 0.5 * (rate[1:] + rate[:-1])
+        return np.concatenate([[0.0], np.cumsum(np.einsum("ni,ni->n", np.diff(impulse, axis=0), middle))])
+
+    ring = snare("ring_work") + worked(c.impulse, c.tip[:, 1]) + worked(c.angular_impulse, c.tip[:, 2])
+    ledger = {
+        "motors": ring + own("motor"),
+        "cables, strain": snare("strain"),
+        "cables' motion and contacts": snare("kinetic") + snare("overlap"),
+        "bodies' motion": own("kinetic"),
+        "docking's contacts": own("stored"),
+        "latches": own("latches"),
+        "brake and stops": own("brake"),
+        "lost in screw and carriage": own("carriage_lost"),
+        "lost in cables": snare("damped") + snare("friction"),
+        "lost in docking": own("contact_lost"),
+        "lost in joints": own("joints"),
+    }
+    return ledger | {"residual": ledger["motors"] - sum(ledger[name] for name in ledger if name != "motors")}

@@ -1,0 +1,36 @@
+"""The verdict that no physics can be named, because recordings and model contradict each other."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..checks.finding import Finding
+from ..models.model import Model
+from .diagnosis import Diagnosis
+from .fitting.experiment import Experiment
+from .report.words import words
+from .wording import listed
+
+_MEND = "Mend that first, with the lines under checks, or go on with --anyway."
+
+
+def contradict(checks: Sequence[Finding]) -> bool:
+    """Whether one of the findings is that recordings and model contradict each other."""
+    return any(check.fault for check in checks)
+
+
+def data_fault(model: Model, checks: Sequence[Finding], experiments: Sequence[Experiment] = ()) -> Diagnosis:
+    """A diagnosis that names no physics: what is not as it should be, and the lines that mend it."""
+    faults = [check for check in checks if check.fault]
+    said = list(dict.fromkeys(check.message for check in faults))
+    places = listed([check.at for check in faults if check.message == said[0]])
+    more = f" Besides: {'; '.join(said[1:])}." if len(said) > 1 else ""
+    sentence = (
+        f"The recordings and the model contradict each other, and no physics explains it "
+        f"({words(faults[0].name)} at {places}): {said[0]}.{more} {_MEND}"
+    )
+    notes = [*model.tree.notes]
+    notes += [f"{Path(e.motion.path).name}: {note}" for e in experiments for note in e.motion.notes]
+    band = experiments[0].motion.band if experiments else 0.0
+    return Diagnosis(
+        "data_fault", sentence, "", model.name, (), (), (), (), (), (), (), (), tuple(notes), band, tuple(checks)
+    )

@@ -1,0 +1,241 @@
+"""The cases: which there are, how each is drawn, and what is written of it. All follows from seed and number."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .concealed import Made, TooMuch
+from .laws import Friction
+from .loop import TICK
+from .motions import KINDS, STILL, disturbance, motion, scale
+from .nameless import NAMELESS, lawless
+from .places import joint
+from .plant import Planned, Plant, recorded, rms
+from .robots import Rng, believed, random_robot
+from .springs import NAMES, SPRINGS, makers
+
+CLEAN, SINGLE, PAIR, LAWLESS = "clean", "single", "pair", "nameless"
+GROUPS = (CLEAN, SINGLE, PAIR, LAWLESS)
+DECK = (*[CLEAN] * 25, *[SINGLE] * 15, *[PAIR] * 4, *[LAWLESS] * 6)
+"""Fifty cases: 50, 30, 8 and 12 %."""
+
+SIZES = (0.5, 1.0, 2.0, 4.0)
+RECORDINGS = {"train": 20.0, "hold": 12.0, "third": 12.0}  # s
+RATES = (100.0, 125.0, 200.0, 250.0, 500.0)  # Hz
+BITS = (13, 21)
+MOST_ASTRAY = 0.3
+"""An arm that strays further from its motion [rad] has lost its servo: another case is drawn."""
+
+ATTEMPTS = 1000
+BACKGROUND = ("inertia_error", "com_offset", "payload_mass")
+"""Names that are true of a case besides: links whose numbers are 1 to 3 % off. Bristles, where the model has none."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A case before it is drawn: its group, the kind of its disturbance, and (name, size) of what it conceals."""
+
+    group: str
+    disturbance: str
+    concealed: tuple[tuple[str, float], ...]
+
+
+def planned(seed: int, count: int) -> list[Plan]:
+    """The first ``count`` cases of a seed, the same however many follow."""
+    singles = _cycle(seed, 1, [(name, size) for name in NAMES for size in SIZES])
+    lawless = _cycle(seed, 2, [(name, size) for name in NAMELESS for size in (2.0, 4.0)])
+    kinds = {group: _cycle(seed, 3 + k, KINDS) for k, group in enumerate(GROUPS)}
+    pairs = np.random.default_rng([seed, 0, 9])
+    plans: list[Plan] = []
+    while len(plans) < count:
+        rng = np.random.default_rng([seed, 0, 10 + len(plans)])
+        for group in [DECK[k] for k in rng.permutation(len(DECK))]:
+            concealed: tuple = ()
+            if group == SINGLE:
+                concealed = (next(singles),)
+            elif group == LAWLESS:
+                concealed = (next(lawless),)
+            elif group == PAIR:
+                names = pairs.choice(NAMES, 2, replace=False).tolist()
+                while set(names) <= set(SPRINGS):  # each would be sized by both
+                    names = pairs.choice(NAMES, 2, replace=False).tolist()
+                concealed = tuple((name, float(pairs.choice((1.0, 2.0, 4.0)))) for name in names)
+            plans.append(Plan(group, next(kinds[group]), concealed))
+    return plans[:count]
+
+
+def _cycle(seed: int, stream: int, items: Sequence):
+    """All items in a random order, then again in another."""
+    rng = np.random.default_rng([seed, 1, stream])
+    while True:
+        for k in rng.permutation(len(items)):
+            yield items[int(k)]
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A case that was drawn: recordings by name, each column by name; model and URDF as text; and the answer."""
+
+    recordings: Mapping[str, Mapping[str, NDArray]]
+    model: str
+    urdf: str
+    truth: Mapping[str, Any]
+
+    def write(self, folder: Path) -> None:
+        """All files; ``truth.json`` last, so that a folder with one is whole."""
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "arm.urdf").write_text(self.urdf, encoding="utf-8")
+        (folder / "arm.toml").write_text(self.model, encoding="utf-8")
+        for name, columns in self.recordings.items():
+            table = np.column_stack(list(columns.values()))
+            np.savetxt(folder / f"{name}.csv", table, "%.9g", ",", header=",".join(columns), comments="")
+        part = folder / "truth.json.part"
+        part.write_text(json.dumps(self.truth, indent=1) + "\n", encoding="utf-8")
+        part.replace(folder / "truth.json")
+
+
+def draw(plan: Plan, seed: int, number: int) -> Case:
+    """The case of this plan and number, redrawn where hardware has no such effect, or the servo does not hold it."""
+    for attempt in range(ATTEMPTS):
+        try:
+            return _drawn(plan, seed, number, np.random.default_rng([seed, 2, number, attempt]))
+        except TooMuch:
+            continue
+    raise RuntimeError(f"case {number} ({plan}): no such case in {ATTEMPTS} attempts")
+
+
+def _drawn(plan: Plan, seed: int, number: int, rng: Rng) -> Case:
+    bare, motions = background(rng)
+    m = Planned.of(bare, motions["train"])
+    total = rms(m.torque)
+    # What no model explains: as large, against its joint's torque, as on machines (issue 32's second table).
+    level = total * np.exp(rng.uniform(np.log(0.015), np.log(0.05), len(total)))
+    joints = rng.permutation(len(total))
+    plant, concealed = bare, []
+    for k, (name, size) in enumerate(plan.concealed):
+        # The bodies as they are with what is concealed already.
+        along = Planned.of(plant, motions["train"]) if concealed else m
+        spot = int(joints[k])
+        if plan.group == LAWLESS:
+            made = lawless(motions["train"])[name](along, spot, float(size * level[spot]), rng)
+        else:
+            made = makers(motions["train"])[name](along, spot, size * level, rng)
+        if any(joint(made.at) == joint(other.at) for _, _, other in concealed):
+            raise TooMuch("two effects at one joint")
+        plant = made.plant
+        concealed.append((name, size, made))
+    return _recorded(plan, seed, number, plant, motions, level, concealed, rng)
+
+
+def background(rng: Rng) -> tuple[Plant, dict[str, tuple[NDArray, NDArray, NDArray]]]:
+    """An arm with nothing missing but bristles and the URDF's errors, and its asked motions by recording."""
+    robot = random_robot(rng)
+    n = len(robot.links)
+    nominal = believed(robot, rng)
+    travel, speed = (np.array([getattr(link, x) for link in robot.links]) for x in ("travel", "speed"))
+    motions = {name: motion(rng, length, travel, speed) for name, length in RECORDINGS.items()}
+    nothing = Friction(np.zeros(n, dtype=np.int64), *(np.full(n, x) for x in (0.0, 0.0, 1.0, 1.0)))
+    zero = np.zeros(n)
+    bare = Plant(robot, nominal, nothing, zero, 1.0, 0.0, zero, 1.0, 1.0)
+    m = Planned.of(bare, motions["train"])
+    weight = 9.81 * sum(link.mass for link in robot.links) * sum(link.length for link in robot.links)
+    peak = np.maximum(np.abs(m.load).max(axis=0), 3e-3 * weight)
+    own = np.maximum(np.ptp(m.load, axis=0), 3e-3 * weight) / np.maximum(np.ptp(m.qdd, axis=0), 1e-9)
+    rotor = rng.uniform(0.02, 0.3, n) * np.minimum(own, peak / np.abs(m.qdd).max(axis=0))
+    levels = peak * np.exp(rng.uniform(np.log(0.04), np.log(0.25), n))
+    friction = Friction(
+        rng.integers(0, 3, n),
+        levels,
+        levels * rng.uniform(0.2, 1.5, n) / speed,
+        travel * np.exp(rng.uniform(np.log(2e-4), np.log(1.5e-3), n)),
+        speed * rng.uniform(0.05, 0.3, n),
+    )
+    plant = Plant(
+        robot,
+        nominal,
+        friction,
+        rotor,
+        bandwidth=float(rng.uniform(2.5, 5.0)),
+        ahead=float(rng.choice([1.0, 1.0, -1.0])),
+        limit=(peak + 3.0 * levels) * rng.uniform(1.5, 2.5, n),
+        lag=float(np.exp(rng.uniform(np.log(5e-4), np.log(4e-3)))),
+        count=2.0 * np.pi / 2.0**23,
+    )
+    return plant, motions
+
+
+def _recorded(
+    plan: Plan,
+    seed: int,
+    number: int,
+    plant: Plant,
+    motions: Mapping[str, tuple[NDArray, NDArray, NDArray]],
+    level: NDArray,
+    concealed: Sequence[tuple[str, float, Made]],
+    rng: Rng,
+) -> Case:
+    rate, bits, n = float(rng.choice(RATES)), int(rng.integers(*BITS)), len(level)
+    memory = scale(rng, plan.disturbance)
+    noise = level * rng.uniform(0.05, 0.3)
+    speeds, step = bool(rng.random() < 0.25), 2.0 * np.pi / 2.0**bits
+    recordings, limited = {}, 0.0
+    for name, asked in motions.items():
+        pushes = level * disturbance(rng, plan.disturbance, memory, len(asked[0]), n)
+        true = plant.simulate(asked, pushes)
+        if not np.all(np.isfinite(true)) or np.abs(true[:, 0] - asked[0]).max() > MOST_ASTRAY:
+            raise TooMuch("the servo loses the arm")
+        limited = max(limited, float(np.mean(np.abs(true[:, 3]) > 0.98 * plant.limit)))
+        recordings[name] = recorded(true, plant.sensors, rate, step, noise, rng)
+        if speeds:
+            first, stride = round(STILL / TICK), round(1.0 / (rate * TICK))
+            qd = true[first::stride, 1]
+            qd = qd + 2e-3 * rms(qd) * rng.standard_normal(qd.shape)
+            recordings[name] |= {f"qd.joint{k + 1}": qd[:, k] for k in range(n)}
+    bristles = bool(rng.integers(2))
+    known = ["viscous_friction", "coulomb_friction", "rotor_inertia", *(["presliding_hysteresis"] if bristles else [])]
+    hidden = {(name, made.at) for _, _, made in concealed for name in made.hides}
+    joints = [f"joint{k + 1}" for k in range(n)]
+    listed = ", ".join(f'{{name = "{e}", at = "{j}"}}' for e in known for j in joints if (e, j) not in hidden)
+    values = {
+        name: dict(zip(joints, array.tolist(), strict=True))
+        for name, array in (
+            ("coulomb_friction.level", plant.friction.level),
+            ("viscous_friction.coefficient", plant.friction.viscous),
+            ("rotor_inertia.inertia", plant.rotor),
+        )
+    }
+    truth = {
+        "seed": seed,
+        "case": number,
+        "group": plan.group,
+        "disturbance": {"kind": plan.disturbance, "scale": memory if np.isfinite(memory) else None},
+        "disturbance_rms": dict(zip(joints, level.tolist(), strict=True)),
+        "noise_rms": dict(zip(joints, noise.tolist(), strict=True)),
+        "effects": [
+            {
+                "name": name if plan.group != LAWLESS else "",
+                "law": name,
+                "at": made.at,
+                "size": size,
+                "channel": f"tau.joint{made.channel + 1}",
+                "raw_rms": made.raw,
+                "values": dict(made.values),
+                "coordinates": made.note,
+            }
+            for name, size, made in concealed
+        ],
+        "background": [*BACKGROUND, *([] if bristles else ["presliding_hysteresis"])],
+        "known": values,
+        "joints": n,
+        "mass": sum(link.mass for link in plant.robot.links),
+        "rate": rate,
+        "bits": bits,
+        "limited": limited,
+    }
+    model = f'name = "arm"\nsystem = "arm"\nurdf = "arm.urdf"\neffects = [{listed}]\n'
+    return Case(recordings, model, plant.nominal.urdf(), truth)

@@ -1,0 +1,150 @@
+"""Judge what was said of a case against its truth.
+
+A told class is the name given and the rivals that the tool says cannot be told from it. It is right if one of its
+members is concealed in the case, at that joint (joint2, link2 and tau.joint2 are one place). A name that is true of
+every case's background (a URDF that is off, bristles that the model lacks) is neither right nor wrong.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from .places import joint
+
+Line = Mapping[str, Any]
+Place = tuple[str, str]
+
+
+@dataclass(frozen=True)
+class Told:
+    """A class that was told. ``first``: its own name is right at its place; ``member``: one of its class is.
+
+    ``background``: it is true of the background, and nothing else. ``probability``: of the whole class.
+    """
+
+    name: str
+    at: str
+    probability: float
+    first: bool
+    member: bool
+    background: bool
+
+
+@dataclass(frozen=True)
+class Found:
+    """One concealed effect. ``name``: told anywhere, as a name; ``placed``: at its joint; ``member``, ``anywhere``:
+    the same for a member of a class. ``deviations``: of its comparable values, (told - true) / std.
+    """
+
+    name: str
+    size: float
+    named: bool
+    placed: bool
+    member: bool
+    anywhere: bool
+    deviations: tuple[float, ...]
+
+    @property
+    def credit(self) -> float:
+        """1 for the name at its place, half for a member of a class there."""
+        return 1.0 if self.placed else 0.5 if self.member else 0.0
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A case: its classes, its concealed effects, and whether all was right and nothing else said."""
+
+    group: str
+    disturbance: str
+    size: float
+    verdict: str
+    told: tuple[Told, ...]
+    found: tuple[Found, ...]
+    unknown: bool
+    located: bool
+    known: tuple[float, ...]
+    seconds: float
+
+    @property
+    def wrong(self) -> list[Told]:
+        """Told, and neither right nor true of the background."""
+        return [t for t in self.told if not t.member and not t.background]
+
+    @property
+    def whole(self) -> bool:
+        """Every concealed effect in a class at its place, and nothing wrong."""
+        return bool(self.found) and all(f.member for f in self.found) and not self.wrong
+
+
+def judge(line: Line) -> Judged:
+    """Judge a line of `score`."""
+    truth = line["truth"]
+    named = [e for e in truth["effects"] if e["name"]]
+    right = {(e["name"], joint(e["at"])) for e in named}
+    told, classes = [], []
+    for effect in line["effects"]:
+        members = [(effect["name"], effect["at"])]
+        members += [(r["name"], r["at"]) for r in effect["rivals"] if not r["separable"]]
+        classes.append(members)
+        hits = [(name, joint(at)) in right for name, at in members]
+        shared = sum(r["probability"] for r in effect["rivals"] if not r["separable"])
+        told.append(
+            Told(
+                effect["name"],
+                effect["at"],
+                min(float(effect["probability"]) + shared, 1.0),
+                hits[0],
+                any(hits),
+                not any(hits) and effect["name"] in truth["background"],
+            )
+        )
+    lawless = [e for e in truth["effects"] if not e["name"]]
+    location = line.get("location", {})
+    loudest = max(location, key=lambda channel: location[channel], default="")
+    return Judged(
+        truth["group"],
+        truth["disturbance"]["kind"],
+        max((e["size"] for e in truth["effects"]), default=0.0),
+        line["verdict"],
+        tuple(told),
+        tuple(_found(e, line["effects"], classes) for e in named),
+        bool(lawless) and line["verdict"] == "unknown_effect",
+        bool(lawless) and loudest == lawless[0]["channel"],
+        tuple(_known(line)),
+        float(line["seconds"]),
+    )
+
+
+def _found(truth: Mapping[str, Any], effects: Sequence[Mapping[str, Any]], classes: Sequence[list[Place]]) -> Found:
+    name, where = truth["name"], joint(truth["at"])
+    own = [e for e in effects if e["name"] == name and joint(e["at"]) == where]
+    deviations = []
+    if own:
+        estimates = own[0]["parameters"]
+        for parameter, value in truth["values"].items():
+            estimate = estimates.get(parameter)
+            if estimate and estimate["std"] and not estimate.get("at_bound", False):
+                deviations.append((estimate["value"] - value) / estimate["std"])
+    return Found(
+        name,
+        truth["size"],
+        any(e["name"] == name for e in effects),
+        bool(own),
+        any((name, where) == (n, joint(at)) for members in classes for n, at in members),
+        any(name == n for members in classes for n, _ in members),
+        tuple(deviations),
+    )
+
+
+def _known(line: Line) -> list[float]:
+    """Deviations of friction and rotor inertia that the model has, where nothing is concealed."""
+    if line["truth"]["group"] != "clean":
+        return []
+    values = {
+        f"{effect}.{at}.{parameter}": value
+        for key, by_joint in line["truth"]["known"].items()
+        for effect, parameter in [key.split(".")]
+        for at, value in by_joint.items()
+    }
+    moved = [m for m in line.get("moved", []) if m["name"] in values and m["std"]]
+    return [(m["after"] - values[m["name"]]) / m["std"] for m in moved]

@@ -1,0 +1,114 @@
+"""Let the tool diagnose cases, one line a case: what it said, how long it took, and what is true."""
+
+import hashlib
+import json
+import signal
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import snarelab
+from snarelab.errors import InputError
+from snarelab.files import written_whole
+
+Said = dict[str, Any]
+Diagnose = Callable[[Path], Said]
+
+
+class OutOfTime(BaseException):
+    """No answer within the limit; not an Exception, so that nothing on the way takes it for a failure of its own."""
+
+
+def diagnose(folder: Path) -> Said:
+    """The tool on a case's model, fitted and held-out recording; the third is left alone."""
+    return snarelab.diagnose(folder / "arm.toml", folder / "train.csv", holdout=folder / "hold.csv").to_json()
+
+
+def score(
+    folders: Sequence[Path],
+    out: Path,
+    limit: float = 0.0,
+    tell: Callable[[str], None] = print,
+    run: Diagnose = diagnose,
+) -> list[dict[str, Any]]:
+    """A line for each case in ``out``; what these sources of the tool have answered is not asked again.
+
+    ``limit`` [s] a case, none where 0. Lines of other sources, or of other truths, are made anew.
+    """
+    version = sources()
+    out.parent.mkdir(parents=True, exist_ok=True)
+    lines = [json.loads(x) for x in out.read_text().splitlines()] if out.exists() else []
+    truths = {path.name: json.loads((path / "truth.json").read_text()) for path in folders}
+    kept = [x for x in lines if x["version"] == version and truths.get(x["case"], x["truth"]) == x["truth"]]
+    if len(kept) < len(lines):
+        tell(f"{out}: {len(lines) - len(kept)} lines of other sources or other cases are made anew")
+    with written_whole(out) as part:
+        part.write_text("".join(json.dumps(x) + "\n" for x in kept), encoding="utf-8")
+    done = {x["case"] for x in kept}
+    with out.open("a", encoding="utf-8") as file:
+        for k, path in enumerate(folders, 1):
+            if path.name in done:
+                continue
+            line = {"case": path.name, "version": version, **asked(path, limit, run), "truth": truths[path.name]}
+            kept.append(line)
+            file.write(json.dumps(line) + "\n")
+            file.flush()
+            names = ", ".join(f"{e['name']} at {e['at']} {e['probability']:.2f}" for e in line["effects"])
+            tell(f"{k}/{len(folders)} {path.name}: {line['verdict']} {names}; {line['seconds']:.0f} s")
+    return kept
+
+
+def asked(folder: Path, limit: float, run: Diagnose) -> dict[str, Any]:
+    """Verdict, names with their rivals and values, and seconds; ``failed`` or ``out of time`` where there is none."""
+    start = time.perf_counter()
+    try:
+        with within(limit):
+            found = run(folder)
+    except OutOfTime:
+        found = {"verdict": "out of time", "effects": []}
+    except InputError as error:
+        found = {"verdict": "failed", "effects": [], "notes": [str(error)]}
+    seconds = time.perf_counter() - start
+    effects = [{key: e[key] for key in ("name", "at", "probability", "parameters", "rivals")} for e in found["effects"]]
+    for effect in effects:
+        effect["rivals"] = [
+            {key: r[key] for key in ("name", "at", "probability", "separable")} for r in effect["rivals"]
+        ]
+    channels = {place["channel"]: place["share"] for place in found.get("location", [])}
+    fit = {
+        channel: [f[part][name] for part in ("train", "holdout") for name in ("rms_before", "rms_after")]
+        for channel, f in found.get("fit", {}).items()
+    }
+    said = {key: found[key] for key in ("description", "notes", "moved") if key in found}
+    return {"verdict": found["verdict"], "effects": effects, "location": channels, "fit": fit, **said} | {
+        "seconds": round(seconds, 2)
+    }
+
+
+@contextmanager
+def within(limit: float) -> Iterator[None]:
+    """Raise `OutOfTime` in the main thread after so many seconds; 0: never."""
+
+    def end(*_: object) -> None:
+        raise OutOfTime
+
+    before = signal.signal(signal.SIGALRM, end)
+    signal.setitimer(signal.ITIMER_REAL, limit)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def sources() -> str:
+    """SHA-256 over the sources that a diagnosis follows from."""
+    package = Path(next(iter(snarelab.__path__)))
+    total = hashlib.sha256()
+    for name in ("identification", "models", "recordings"):
+        for path in sorted((package / name).rglob("*")):
+            if path.suffix in (".py", ".json"):
+                total.update(path.read_bytes())
+    return total.hexdigest()
