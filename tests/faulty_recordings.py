@@ -4,6 +4,7 @@ Nothing here imports snarelab. Torque is Pinocchio's along a drawn motion, with 
 on top, so that no model that is given to the tool explains all of it.
 """
 
+# pyright: reportAttributeAccessIssue=false
 from dataclasses import dataclass, field, replace
 
 import numpy as np

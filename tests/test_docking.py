@@ -172,7 +172,7 @@ def test_the_gap_is_the_distance_to_a_rounded_wedge():
             return minimize_scalar(
                 lambda t: np.hypot(*(corner + t * np.array(way) - point)), bounds=(0, 0.2), method="bounded",
                 options={"xatol": 1e-12},
-            ).fun  # fmt: skip
+            ).fun  # pyright: ignore[reportAttributeAccessIssue]  # fmt: skip
 
         return min(along((c, -s)), along((0.0, 1.0))) - r
 

@@ -35,7 +35,7 @@ def test_a_spoilt_recording_ends_in_a_verdict_or_in_one_line(tmp_path, monkeypat
     out, error = capfd.readouterr()
     if status == 0:
         found = json.loads((tmp_path / "out.json").read_text())
-        assert found["verdict"] in ("missing_physics", "adequate", "unknown_effect")
+        assert found["verdict"] in ("data_fault", "missing_physics", "adequate", "unknown_effect")
         numbers = [x for e in found["fit"].values() for part in ("train", "holdout") for x in e[part].values()]
         assert np.isfinite([x for x in numbers if x is not None]).all()
     else:

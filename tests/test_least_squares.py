@@ -155,7 +155,7 @@ def test_a_parameter_pinned_between_equal_bounds_stays_there():
     found = minimise(objective, np.array([0.2, 0.0]), max_steps=200)
     assert all(theta[1] == 0.49 for theta in evaluate.seen)
     one = scipy.optimize.minimize_scalar(lambda x: np.sum(rosenbrock([x, 0.49]) ** 2), bounds=(0, 2), method="bounded")
-    assert found.theta[0] == pytest.approx(one.x, abs=1e-4)
+    assert found.theta[0] == pytest.approx(one.x, abs=1e-4)  # pyright: ignore[reportAttributeAccessIssue]
 
 
 def test_parameters_that_the_data_do_not_ask_for_do_no_harm():

@@ -190,7 +190,7 @@ step = 1e-3
 stop = 1000.0
 [participants.left]
 fmu = "left2.fmu"
-parameters = { fault = 2, fault_time = 1.0 }
+parameters = { fault = 2, fault_time = 20.0 }
 [participants.right]
 fmu = "right2.fmu"
 [connections]
@@ -202,7 +202,7 @@ fmu = "right2.fmu"
 
 @pytest.mark.parametrize("more", [[], ["--same-process"]])
 def test_a_killed_run_leaves_its_rows_and_nothing_else(halves, tmp_path, more):
-    """The FMU hangs at 1 s, the run is killed then."""
+    """The FMU hangs at 20 s, after the first report on any machine; the run is killed while it steps, or then."""
     (halves / "hanging.toml").write_text(RUN)
     (tmp_path / "tmp").mkdir()
     environment = {**os.environ, "TMPDIR": str(tmp_path / "tmp"), "SNARELAB_KILLS": f"run-{os.getpid()}-{len(more)}"}

@@ -1,5 +1,6 @@
 """Robots as they are published: every URDF of a package of examples, beside Pinocchio's torque."""
 
+# pyright: reportAttributeAccessIssue=false
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 

@@ -10,9 +10,9 @@ from snarelab.cli import main
 from snarelab.errors import InputError
 from snarelab.models.model_file import load_model
 from snarelab.models.model_write import save_model
-from snarelab.recordings import Signal, read_recording
+from snarelab.recordings import JointKind, Signal, read_recording
 
-KINDS = {"a": "revolute", "b": "revolute"}
+KINDS: dict[str, JointKind] = {"a": "revolute", "b": "revolute"}
 
 
 def csv(folder, text, name="run.csv"):

@@ -182,4 +182,4 @@ def test_results_are_tables_and_pictures_too():
         found.plot("tau.none")
     parameters = IDENTIFIED.to_frame()
     assert parameters["at"].tolist() == ["joint1", "j<2>", "joint1"]
-    assert parameters["value"][0] == 1.23456789
+    assert parameters["value"].tolist()[0] == 1.23456789

@@ -74,7 +74,7 @@ def test_broken_off_in_a_state_it_ends_a_second_free_of_contact(state):
     after, way_out = (9.0, "OPEN") if state == "CLOSE" else (2.0, "UNLOAD")
     early = dataclasses.replace(table.states[state], leave=(), after=after, timeout=way_out)
     d = docked_of(
-        co_simulate_whole(setting("hover"), table=dataclasses.replace(table, states=table.states | {state: early}))
+        co_simulate_whole(setting("hover"), table=dataclasses.replace(table, states={**table.states, state: early}))
     )
     assert d.whole.fault == ""
     assert d.whole.final == "ABORTED"
