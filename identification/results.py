@@ -235,8 +235,9 @@ class IdentificationResult:
 
     def __str__(self) -> str:
         """What the command prints."""
-        parameters = [vars(p) for p in self.parameters]
-        return parameter_table({**self.published, "parameters": parameters, "fit": self.fit})
+        checks = self.published.get("checks", ())
+        shown = {"parameters": [vars(p) for p in self.parameters], "fit": self.fit, "condition": self.condition}
+        return parameter_table({**shown, "checks": checks})
 
     __repr__ = __str__
 

@@ -235,7 +235,9 @@ def test_all_recordings_get_the_narrowest_band_of_them(monkeypatch, bands, again
 
     def conditioned(dataset: Any, _joints: Any, band: Any, *, fitted: bool) -> Any:
         asked.append((band, fitted))
-        return Made(band=dataset.attrs["band"] if band is None else band, time=dataset["time"].values)
+        still = np.zeros((dataset.sizes["time"], 1))
+        motion = exact(("joint1",), 0.5, 1, (dataset["time"].values, still, still, still, still))
+        return replace(motion, band=dataset.attrs["band"] if band is None else band)
 
     def read(path: Any, _signals: Any, kinds: Any) -> Any:
         assert kinds == {"joint1": "prismatic"}
@@ -244,7 +246,7 @@ def test_all_recordings_get_the_narrowest_band_of_them(monkeypatch, bands, again
     monkeypatch.setattr(module, "condition", conditioned)
     monkeypatch.setattr(module, "read_recording", read)
     tree = Made(joints=(Made(name="joint1", kind="prismatic"),))
-    model: Any = Made(tree=tree, signals={}, joints=("joint1",), bandwidth=None)
+    model: Any = Made(tree=tree, signals={}, joints=("joint1",), bandwidth=None, cuts=lambda read: read)
     body: Any = Made()
     found = load_experiments(model, bands, body)
     assert [e.motion.band for e in found] == (2 * [min(bands)] if again else list(bands))

@@ -1,6 +1,7 @@
 """Joints that move, joints that are held, and joints that nobody recorded: model files and recordings."""
 
 import json
+import tomllib
 
 import numpy as np
 import pandas as pd
@@ -69,7 +70,7 @@ def test_the_model_file_says_which_joints_move(folder, line):
     assert {p["at"]: round(p["value"], 3) for p in found["parameters"]} == {"shoulder": 3.0, "elbow": 2.0}
     assert not any("in no recording" in note for note in found["notes"])
     save_model(load_model(folder / "arm.toml"), folder / "again.toml", "written")
-    assert line.replace("finger", '"finger"') in (folder / "again.toml").read_text()
+    assert tomllib.loads(line).items() <= tomllib.loads((folder / "again.toml").read_text()).items()
     assert load_model(folder / "again.toml").joints == ("shoulder", "elbow")
 
 
