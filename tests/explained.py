@@ -40,9 +40,8 @@ class Explained:
                 b[:, numbers] = x
                 always.append(a)
                 pool.append(b)
-        return np.concatenate(residual), np.asarray(
-            block_diag(*noise), np.concatenate(always), np.concatenate(pool), float
-        )
+        k = np.asarray(block_diag(*noise), float)
+        return np.concatenate(residual), k, np.concatenate(always), np.concatenate(pool)
 
     def log_density(self, recordings: Sequence[int], taken=(), weight=None) -> float:
         """Of all samples of some recordings, given (number of the item, prior deviation of its amplitudes)."""
