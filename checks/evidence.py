@@ -165,6 +165,7 @@ def _joint_columns(samples: Samples, own: Array, inertia: Array) -> tuple[Array,
     """What joints and sensors of a sound machine may add (n, J, 7 J), one standard deviation each; lower bounds.
 
     Viscous, Coulomb and load-dependent friction (not negative), a rotor's inertia (neither), a spring, a bias, a gain.
+    Behind a gear a rotor is often all the inertia that a light joint feels, so that it may be all of the torque.
     """
     n, n_joints = own.shape
     rms = np.sqrt(np.mean(samples.tau**2, axis=0)) + 1e-300
@@ -179,7 +180,10 @@ def _joint_columns(samples: Samples, own: Array, inertia: Array) -> tuple[Array,
             (qd / fast * size, 0.0),
             (sign * size, 0.0),
             (np.abs(load) * sign * 0.3, 0.0),
-            (samples.qdd[:, j] * inertia[j] * 2.0, 0.0),
+            (
+                samples.qdd[:, j] * max(2.0 * inertia[j], size / (np.sqrt(np.mean(samples.qdd[:, j] ** 2)) + 1e-300)),
+                0.0,
+            ),
             (place / (np.sqrt(np.mean(place**2)) + 1e-300) * 0.3 * size, -np.inf),
             (np.full(n, 0.3 * size), -np.inf),
             (own[:, j] * 0.2, -2.5),

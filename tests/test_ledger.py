@@ -93,7 +93,6 @@ def test_keys_are_distinct():
     assert len(entries(12, True)) == len(entries(12, False)) + 24
 
 
-@pytest.mark.skipif(not KEPT.is_file(), reason="bench/ledger.json is not there; make ledger writes it")
 def test_kept_ledger_is_whole():
     kept = json.loads(KEPT.read_text(encoding="utf-8"))["entries"]
     assert list(kept) == [e.key for e in entries(12, False)]

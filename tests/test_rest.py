@@ -7,7 +7,7 @@ from scipy.signal import lfilter
 
 from snarelab.identification.fitting.experiment import Bridge, load_experiments, scales
 from snarelab.identification.fitting.fit import channel_rms, fit
-from snarelab.identification.search.forward import _refitted, assemble
+from snarelab.identification.search.forward import assemble, refitted
 from snarelab.identification.search.noise import Whitener
 from snarelab.identification.search.rest import fitted, without
 from snarelab.models.effects import get_effect
@@ -99,6 +99,6 @@ def test_what_is_added_leaves_no_more_from_a_bad_start(tmp_path):
     start = {f"{more.key}.level": 1e7, f"{more.key}.travel": 1e-6}
     wider = assemble(model.with_effects([more], start), None, known)
     samples = fitted(wider, experiments)
-    found = _refitted(before, wider, samples, False, 0)
+    found = refitted(before, wider, samples, False, 0)
     left, was = (channel_rms(f.assembly, samples, f.theta)[0][0] for f in (found, before))
     assert left <= 1.001 * was

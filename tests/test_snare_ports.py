@@ -29,7 +29,7 @@ class Told:
     ring_angle = 0.7
     fault: Exception | None = None
 
-    def __init__(self, parameters, target, accuracy, effector, start):
+    def __init__(self, parameters, target, accuracy, effector, start, drive=None):
         self.made = parameters, target, accuracy, effector, start
         self.calls, self.restored = [], []
 

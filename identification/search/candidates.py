@@ -132,6 +132,14 @@ def variants(assembly: Assembly, placed: Placed) -> list[Variant]:
     return found
 
 
+def reduced(variant: Variant, subset: NDArray[np.int_]) -> Variant:
+    """A variant with only some of its amplitudes, by their positions."""
+    if not len(variant.amplitudes):
+        return variant
+    some = variant.amplitudes[subset]
+    return replace(variant, amplitudes=some, low=variant.low[subset], high=variant.high[subset])
+
+
 def _with_zeros(parameters: Array, where: list[int]) -> Array:
     changed = parameters.copy()
     changed[where] = 0.0

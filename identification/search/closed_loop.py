@@ -35,7 +35,12 @@ SHORTEST = 16
 
 
 def planned(
-    found: Fit, experiments: Sequence[Experiment], before: Sequence[Experiment] | None = None
+    found: Fit,
+    experiments: Sequence[Experiment],
+    before: Sequence[Experiment] | None = None,
+    *,
+    others: Sequence[Experiment] = (),
+    driven: float = DRIVEN,
 ) -> list[Experiment]:
     """The experiments with every joint's motion low-passed to what was asked of it; torques stay as they are.
 
@@ -48,24 +53,28 @@ def planned(
         Training recordings.
     before : sequence of Experiment, optional
         An earlier answer; given back where the bands have hardly changed, since its columns are worked out already.
+    others : sequence of Experiment
+        Recordings that are low-passed alike and say nothing of the bands; they follow the training recordings.
+    driven : float
+        Largest share of a joint's snap that the unexplained torque may account for.
 
     Returns
     -------
     list of Experiment
         The same objects where no joint needs a filter.
     """
-    bands = _bands(found, experiments)
+    bands = _bands(found, experiments, driven)
     edge = experiments[0].motion.band
     if before is not None:
         old = before[0].store.get("bands", np.full(len(bands), np.inf))
         if np.all(np.abs(np.log(np.minimum(bands, edge) / np.minimum(old, edge))) < 0.25):
             return list(before)
     if all(b >= edge for b in bands):
-        return list(experiments)
-    return [_low_passed(e, bands) for e in experiments]
+        return [*experiments, *others]
+    return [_low_passed(e, bands) for e in (*experiments, *others)]
 
 
-def _bands(found: Fit, experiments: Sequence[Experiment]) -> Array:
+def _bands(found: Fit, experiments: Sequence[Experiment], share: float = DRIVEN) -> Array:
     """Edge of the band kept [Hz] for every joint."""
     assembly, n_joints = found.assembly, experiments[0].measured.shape[1]
     edge = experiments[0].motion.band
@@ -92,7 +101,7 @@ def _bands(found: Fit, experiments: Sequence[Experiment]) -> Array:
             _, energy = welch(speed[:, c], rate, nperseg=length)
             most = np.searchsorted(np.cumsum(energy), 0.9 * energy.sum())
             least = max(LEAST * f[most], LEAST * f[1])
-            bad = np.flatnonzero((driven > DRIVEN * np.cumsum(total * f**4)) & (f > least))
+            bad = np.flatnonzero((driven > share * np.cumsum(total * f**4)) & (f > least))
             kept = max(least, f[bad[0]]) if len(bad) else np.inf
             bands[c] = min(bands[c], kept if kept < 0.9 * edge else np.inf)
     return bands

@@ -114,13 +114,13 @@ def search(
         assembly = assemble(model, base, scales)
         # What rings has a local optimum at many a frequency; the screening's columns leave its damping where it is.
         rings = any(j.placed.effect.at == "base" and j.placed.effect.states for j in chosen)
-        found = _refitted(found, assembly, fitted(assembly, experiments), rings, seed)
+        found = refitted(found, assembly, fitted(assembly, experiments), rings, seed)
         instruments = planned(found, experiments, instruments)
         result = screen(model, found, experiments, instruments, opening.noise, seed, _in_round(number, progress))
     return Found(first, model, found, tuple(taken), opening, result, tuple(instruments))
 
 
-def _refitted(before: Fit, assembly: Assembly, samples: Sequence[Experiment], everywhere: bool, seed: int) -> Fit:
+def refitted(before: Fit, assembly: Assembly, samples: Sequence[Experiment], everywhere: bool, seed: int) -> Fit:
     """The fit of a model that has something more; from many starts if it was to be, or if one ended badly.
 
     What it had before is a special case of it, so that it leaves no more, unless it ended in a bad optimum.

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...models.effect import Effect
-from .candidates import Variant, free_parameters
+from .candidates import Variant, free_parameters, reduced
 from .encoder_noise import UNEVEN
 from .grounds import NULLS, Grounds, Reading, Readings
 from .judged import Case, Judged, Parts, Samples
@@ -137,7 +137,7 @@ class _Judge:
         middle = len(options) // 2
         cases = sorted(enumerate(samples.cases(options)), key=lambda numbered: abs(numbered[0] - middle))
         for subset in options[0][0].subsets():
-            price = self._price(_with(options[0][0], subset))
+            price = self._price(reduced(options[0][0], subset))
             for number, whole in cases:
                 case = whole.only(subset)
                 gain = case.gain()
@@ -150,7 +150,7 @@ class _Judge:
         if best is None:
             return None
         score, price, number, subset, amplitudes, case = best
-        variant = _with(options[number][0], subset)
+        variant = reduced(options[number][0], subset)
         own = {c: [x[:, subset] for x in parts] for c, parts in options[number][1].items()}
         columns = {c: self._ground.noise.whiten(c, parts) for c, parts in own.items()}
         explained = samples.explained(variant, own)
@@ -198,10 +198,3 @@ def _tuned(best: Judged | None, judge: Callable[[Sequence[Variant]], Judged | No
         if other is not None and other.score > best.score:
             best = other
     return best
-
-
-def _with(variant: Variant, subset: NDArray[np.int_]) -> Variant:
-    """A variant reduced to some of its amplitudes."""
-    if not len(variant.amplitudes):
-        return variant
-    return replace(variant, amplitudes=variant.amplitudes[subset], low=variant.low[subset], high=variant.high[subset])

@@ -1,0 +1,215 @@
+"""The evidence of recordings of an arm: residuals along the motion as measured, columns along the motion asked for."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...models.floating.tree import n_carriers
+from ...models.model import Model, Placed
+from ...models.rig.rig import Rig
+from ..deciding import LEAST_LEVEL
+from ..fitting.assembly import Assembly
+from ..fitting.experiment import Experiment, Scales
+from ..fitting.fit import Fit
+from ..nuisance.curve import SMALL
+from ..nuisance.encoder import encoder_noise
+from ..nuisance.noise import Noise, Run, learn
+from ..nuisance.rest import SETTLES, STICKS, share
+from .beside import Beside, beside, regressor_columns
+from .evidence import Channel, Evidence
+from .hypotheses import Along, Curves, curves, names, pool
+from .pool import Columns, Hypothesis, Item
+
+Array = NDArray[np.float64]
+
+QUIET = 0.01
+"""RMS torque of the loudest channel that stands for that of a channel which is as good as silent."""
+
+STILL = 0.03
+"""Share of the peak speed below which what is left over tells how much a joint holds."""
+
+STRONGEST = 40
+"""Directions of all that could explain a channel beside which its noise is learnt."""
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """Recordings under a fit, ready to be searched: the training recordings come first."""
+
+    evidence: Evidence
+    pool: tuple[Hypothesis, ...]
+    noises: tuple[Noise, ...]
+    beside: Beside
+    scale: Array
+    n_train: int
+    runs: list[list[Run]]
+    bare: Callable[[int], Noise]
+    """A channel's noise where nothing is missing."""
+
+    def with_noise(self, c: int, noise: Noise) -> "Weighed":
+        """The same with another noise of one channel."""
+        covariances = [noise.covariance(row[c]) for row in self.runs]
+        noises = tuple(noise if k == c else x for k, x in enumerate(self.noises))
+        return replace(self, evidence=self.evidence.with_covariances(c, covariances), noises=noises)
+
+
+def torque_scale(train: Sequence[Experiment]) -> Array:
+    """RMS torque of each channel (J,)."""
+    scale = np.sqrt(np.mean(np.concatenate([e.measured for e in train]) ** 2, axis=0))
+    return np.maximum(scale, QUIET * scale.max())
+
+
+def weigh(
+    model: Model,
+    found: Fit,
+    experiments: Sequence[Experiment],
+    instruments: Sequence[Experiment],
+    n_train: int,
+    scales: Mapping[str, Scales],
+    noises: Sequence[Noise] | None = None,
+    *,
+    runs: list[list[Run]] | None = None,
+    search: bool = True,
+) -> Weighed:
+    """Recordings under a fit.
+
+    Parameters
+    ----------
+    model : Model
+        With the effects of the fit.
+    found : Fit
+    experiments, instruments : sequence of Experiment
+        Recordings, and the same with the motion that was asked for; the first ``n_train`` are for training.
+    n_train : int
+    scales : mapping of str to Scales
+    noises : sequence of Noise or None
+        Of each channel; None learns them from the training recordings.
+    runs : lists of Run, optional
+        What the noise of every channel hangs on, as another fit has it: two models are compared under one noise.
+    search : bool
+        False leaves out all hypotheses: only the evidence of the fit itself is wanted.
+    """
+    assembly = found.assembly
+    states = [assembly.evaluate(e, found.theta) for e in instruments]
+    along = Along(model, assembly, instruments, states, n_train, torque_scale(experiments[:n_train]))
+    columns = Columns([len(e.measured) for e in experiments])
+    by_words = curves(along, scales, columns, small=not search)
+    named = names(along, by_words, columns) if search else {}
+    others = beside(along, found, by_words, columns)
+    residuals = [assembly.residual(e, found.theta)[0] for e in experiments]
+    if runs is None:
+        runs = _runs(model, found, experiments, residuals, n_train, along.scale)
+    J = len(along.scale)
+    if noises is None:
+        noises = [_noise(c, along, residuals, runs, others, by_words, named, columns) for c in range(J)]
+    channels = [
+        [Channel(r[:, c], noises[c].covariance(own[c]), *part[c]) for c in range(J)]
+        for r, own, part in zip(residuals, runs, others.parts, strict=True)
+    ]
+    if not search:
+        columns = Columns([len(e.measured) for e in experiments])
+    found_pool = tuple(pool(named, by_words)) if search else ()
+    items = [item for h in found_pool for item in h.items]
+
+    def bare(c: int) -> Noise:
+        return _noise(c, along, residuals, runs, others, by_words, {}, columns)
+
+    evidence = Evidence(channels, columns, items, others.count)
+    return Weighed(evidence, found_pool, tuple(noises), others, along.scale, n_train, runs, bare)
+
+
+def _runs(
+    model: Model,
+    found: Fit,
+    experiments: Sequence[Experiment],
+    residuals: Sequence[Array],
+    n_train: int,
+    scale: Array,
+) -> list[list[Run]]:
+    """What the noise of every channel of every recording hangs on."""
+    train, made = experiments[:n_train], []
+    peaks = np.max([np.abs(e.motion.qd).max(axis=0) for e in train], axis=0)
+    travels = np.max([np.ptp(e.motion.q, axis=0) for e in train], axis=0)
+    for e in experiments:
+        row = []
+        for c, (peak, travel) in enumerate(zip(peaks, travels, strict=True)):
+            m = e.motion
+            sticks = settles = np.zeros(len(e.measured))
+            level = 0.0
+            # On a suspension nothing hangs still, and nothing is asked of a floating base.
+            if not isinstance(model.tree, Rig) and c >= n_carriers(model.tree):
+                sticks, settles = (share(m, c, z, max(peak, 1e-12), travel) for z in (STICKS, SETTLES))
+                level = _level(found.assembly, found.theta, train, residuals, c, peak, scale[c])
+            row.append(Run(m.period * m.thinning, m.band_segments(), encoder_noise(e, c), sticks, settles, level))
+        made.append(row)
+    return made
+
+
+def _level(
+    assembly: Assembly,
+    theta: Array,
+    train: Sequence[Experiment],
+    residuals: Sequence[Array],
+    channel: int,
+    peak: float,
+    scale: float,
+) -> float:
+    """How much a joint may hold at rest [T]: its level of dry friction, or what is left over there."""
+    joint = assembly.tree.joints[channel].name
+    torque = {
+        assembly.unit(p, x) for p in assembly.placed if p.at == joint for x in p.effect.parameters if x.unit == "T"
+    }
+    known = [abs(float(v)) for s, v in zip(assembly.slots, theta, strict=True) if s.at == joint and s.unit in torque]
+    left = [
+        r[np.abs(e.motion.to_band(e.motion.qd)[:, channel]) < STILL * peak, channel]
+        for e, r in zip(train, residuals, strict=False)
+    ]
+    still = np.concatenate(left)
+    return max([*known, LEAST_LEVEL * scale, float(np.sqrt(np.mean(still**2))) if len(still) > 10 else 0.0])
+
+
+def _noise(
+    channel: int,
+    along: Along,
+    residuals: Sequence[Array],
+    runs: Sequence[Sequence[Run]],
+    others: Beside,
+    by_words: Curves,
+    named: Mapping[str, tuple[Placed, list[Item]]],
+    columns: Columns,
+) -> Noise:
+    """Scales of a channel's noise, beside the baseline, the masses, small curves and the middle of every law."""
+    laws: list[int] = []
+    for p, items in named.values():
+        middle = items[len(items) // 2]
+        # What shows near rest, or has a hidden state, follows noise as well as it follows the law.
+        if not (p.effect.at_rest or p.effect.exceeds_at_rest or p.effect.states):
+            laws += [
+                int(i) for i in middle.index[: max(len(middle.label.amplitudes), 1)] if columns.has(channel, int(i))
+            ]
+    small = [int(i) for (c, words), x in by_words.items() if c == channel and words in SMALL for i in x.index]
+    n = along.n_train
+
+    def beside_all(chosen: Sequence[int]) -> list[Array]:
+        parts = []
+        for i, e in enumerate(along.instruments[:n]):
+            own = [others.baseline[i][channel][1], columns.some(i, channel, np.array(chosen, int))]
+            if along.assembly.base is None:
+                own.append(regressor_columns(e, channel))
+            parts.append(np.concatenate(own, axis=1))
+        return _principal(parts)
+
+    own = [row[channel] for row in runs[:n]]
+    return learn([r[:, channel] for r in residuals[:n]], beside_all([*laws, *small]), own, freely=bool(named))
+
+
+def _principal(parts: Sequence[Array]) -> list[Array]:
+    """The strongest directions of columns of unit RMS, of unit RMS themselves."""
+    whole = np.concatenate(list(parts))
+    size = np.sqrt(np.mean(whole**2, axis=0))
+    use = size > 1e-9 * size.max(initial=1e-300)
+    u, d, _ = np.linalg.svd(whole[:, use] / size[use], full_matrices=False)
+    kept = u[:, (np.arange(len(d)) < STRONGEST) & (d > 1e-3 * d.max(initial=0.0))] * np.sqrt(len(u))
+    return np.split(kept, np.cumsum([len(p) for p in parts])[:-1])

@@ -1,0 +1,224 @@
+"""Confirm on the held-out recordings what a search named, by the same evidence.
+
+With an effect and without it the rest is fitted again, and both models foretell the held-out recordings: the log
+density of these given the training recordings (Dawid 1984), every nuisance integrated out anew.
+A name stays if that density falls without it by more than it scatters over blocks of time.
+"""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...models.model import Model
+from ..deciding import BLOCK, GATE
+from ..fitting.experiment import Experiment, Scales
+from ..fitting.fit import Fit, channel_rms, fit
+from ..search.forward import carry
+from ..search.rest import fitted
+from .arm import weigh
+from .evidence import Projected
+from .found import Found, Name, Remainder
+from .members import Members
+from .rounds import share_of_residual
+from .tolerant import searched
+
+Array = NDArray[np.float64]
+
+FEWEST_BLOCKS = 4
+
+
+@dataclass(frozen=True)
+class Foretold:
+    """Log density of the held-out recordings given the training ones, and what each block of time takes off it."""
+
+    density: float
+    blocks: Array
+
+
+@dataclass(frozen=True)
+class Missed:
+    """What the held-out recordings lose without an effect: log density, its scatter, relative errors with and without
+    on the channel that misses it most, and the fit without."""
+
+    gain: float
+    scatter: float
+    trial: tuple[float, float]
+    fit: Fit
+
+    @property
+    def sure(self) -> float:
+        """The gain in units of its scatter."""
+        return self.gain / max(self.scatter, 1e-12)
+
+
+@dataclass(frozen=True)
+class Confirmed:
+    """Names that the held-out recordings confirmed and did not, what they miss of each, and the fit of what is left."""
+
+    found: Found
+    names: tuple[Name, ...]
+    rejected: tuple[Name, ...]
+    weak: Mapping[str, Missed]
+    """What the held-out recordings miss of the rejected."""
+    missed: Mapping[str, Missed]
+    model: Model
+    fit: Fit
+    foretold: Foretold
+
+
+def confirm(
+    found: Found,
+    train: Sequence[Experiment],
+    held: Sequence[Experiment],
+    scales: Mapping[str, Scales],
+    progress: Callable[[str], None],
+) -> Confirmed:
+    """Take out the name that the held-out recordings miss least, all else fitted again, until they miss every one.
+
+    One at a time: of two that stand in for each other, one stays, and is missed more from then on. So the others are
+    tried again in the order of how much they were missed before, and only until one is to go.
+    """
+    progress("confirming on the held-out recordings")
+    model, final = found.model, found.fit
+    whole = foretold(model, final, found, train, held, scales)
+    left = {n.placed.key: n for n in found.names}
+    missed: dict[str, Missed] = {}
+    rejected: list[Name] = []
+    weak: dict[str, Missed] = {}
+    stale = set(left)
+    while stale:
+        # What was never tried, then what was missed least.
+        key = min(stale, key=lambda k: missed[k].sure if k in missed else -np.inf)
+        stale.remove(key)
+        missed[key] = _missed(left[key], model, final, whole, found, train, held, scales)
+        if any(k not in missed for k in left):
+            continue
+        weakest = min(left, key=lambda k: missed[k].sure)
+        if missed[weakest].sure <= GATE and weakest not in stale:
+            rejected.append(left.pop(weakest))
+            weak[weakest] = missed.pop(weakest)
+            final = weak[weakest].fit
+            model = _without(model, weakest)
+            whole = foretold(model, final, found, train, held, scales)
+            stale = set(left)
+            progress(f"confirming on the held-out recordings: {len(rejected)} not missed, {len(left)} left")
+    return Confirmed(found, tuple(left.values()), tuple(rejected), weak, missed, model, final, whole)
+
+
+def foretold(
+    model: Model,
+    own: Fit,
+    found: Found,
+    train: Sequence[Experiment],
+    held: Sequence[Experiment],
+    scales: Mapping[str, Scales],
+) -> Foretold:
+    """How well a fitted model foretells the held-out recordings."""
+    n = len(train)
+    noise = found.weighed
+    weighed = weigh(
+        model, own, [*train, *held], found.instruments, n, scales, noise.noises, runs=noise.runs, search=False
+    )
+    weight = weighed.beside.weight(found.tolerance)
+    fitted_by = Projected(weighed.evidence, range(n), weight)
+    known = fitted_by.posterior(len(own.theta))
+    on = Projected(weighed.evidence, range(n, n + len(held)), weight, known)
+    always = on.beside([])
+    parts = [weighed.evidence.left(n + i, always, []) for i in range(len(held))]
+    return Foretold(on.null, np.concatenate([blocks(x, e) for x, e in zip(parts, held, strict=True)]))
+
+
+def blocks(x: Array, e: Experiment) -> Array:
+    """Sums over blocks of time."""
+    return np.array(
+        [part.sum() for part in np.array_split(x, max(int(len(x) / (2 * e.motion.band) / BLOCK), FEWEST_BLOCKS))]
+    )
+
+
+def scatter(x: Array) -> float:
+    """Standard error of a sum over blocks."""
+    return float(np.std(x, ddof=1) * np.sqrt(len(x)))
+
+
+def _without(model: Model, key: str) -> Model:
+    return replace(model, effects=tuple(p for p in model.effects if p.key != key))
+
+
+def _missed(
+    name: Name,
+    model: Model,
+    final: Fit,
+    whole: Foretold,
+    found: Found,
+    train: Sequence[Experiment],
+    held: Sequence[Experiment],
+    scales: Mapping[str, Scales],
+) -> Missed:
+    """Take one effect out of a fit, and fit the rest again."""
+    key = name.placed.key
+    assembly = final.assembly.keep([p for p in final.assembly.placed if p.key != key], final.theta)
+    rest = fit(assembly, fitted(assembly, train), start=carry(final, assembly), multi_start=False)
+    other = foretold(_without(model, key), rest, found, train, held, scales)
+    c = list(name.channels)
+    with_it, measured = channel_rms(final.assembly, held, final.theta)
+    rms, _ = channel_rms(assembly, held, rest.theta)
+    worst = c[int(np.argmax(rms[c] / measured[c] - with_it[c] / measured[c]))]
+    trial = float(with_it[worst] / measured[worst]), float(rms[worst] / measured[worst])
+    return Missed(whole.density - other.density, scatter(0.5 * (other.blocks - whole.blocks)), trial, rest)
+
+
+def remainders(found: Found, train: Sequence[Experiment], held: Sequence[Experiment]) -> tuple[Remainder, ...]:
+    """Nameless curves of the last search that the held-out recordings confirm."""
+    n, search, slots = len(train), found.search, found.slots
+    evidence = search.on.evidence
+    both = Projected(evidence, range(n + len(held)), found.weighed.beside.weight(found.tolerance))
+
+    def told(some: Sequence[int]) -> tuple[float, Array]:
+        taken = [(slots[k].taken.item, slots[k].taken.size) for k in some]
+        own, all_of_it = Members(search.on, taken), Members(both, taken)
+        mean = [(item, own.of(item)) for item, _ in taken]
+        always = search.on.beside(mean)
+        pairs = [(evidence.items[item], a) for item, a in mean]
+        parts = [blocks(evidence.left(n + i, always, pairs), e) for i, e in enumerate(held)]
+        return all_of_it.value - own.value, np.concatenate(parts)
+
+    kept = list(range(len(slots)))
+    made: dict[int, Remainder] = {}
+    while kept:
+        density, whole = told(kept)
+        made = {}
+        members = Members(search.on, [(slots[k].taken.item, slots[k].taken.size) for k in kept])
+        for k in kept:
+            item = slots[k].taken.item
+            if found.weighed.pool[slots[k].taken.hypothesis].named:
+                continue
+            other, rest = told([x for x in kept if x != k])
+            error = scatter(0.5 * (rest - whole))
+            c, curve = evidence.items[item].label
+            explained = share_of_residual(search, item, members.of(item))
+            made[k] = Remainder(c, curve.words, slots[k].gain, explained, (density - other) / max(error, 1e-12))
+        weak = min(made, key=lambda k: made[k].held, default=None)
+        if weak is None or made[weak].held > GATE:
+            break
+        kept.remove(weak)
+        made = {}
+    return tuple(sorted(made.values(), key=lambda r: -r.explained))
+
+
+def left_over(
+    best: Confirmed,
+    scales: Mapping[str, Scales],
+    train: Sequence[Experiment],
+    held: Sequence[Experiment],
+    barred: Collection[str],
+) -> tuple[Remainder, ...]:
+    """What the confirmed model still leaves to nameless curves."""
+    if best.rejected:
+        n = len(train)
+        own = best.found
+        weighed = weigh(best.model, best.fit, [*train, *held], own.instruments, n, scales, own.weighed.noises)
+        weighed, made, slots, tolerance = searched(weighed, range(n), barred)
+        best = replace(best, found=replace(own, weighed=weighed, search=made, slots=tuple(slots), tolerance=tolerance))
+    return remainders(best.found, train, held)

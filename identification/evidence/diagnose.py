@@ -1,0 +1,69 @@
+"""The whole decision by one evidence: search, confirm, search again where something was not confirmed, what is left."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from ...models.model import Model
+from ..deciding import SECOND_CHOICES
+from ..fitting.base_parameters import BaseParameters
+from ..fitting.experiment import Experiment, Scales
+from .confirm import Confirmed, confirm, left_over
+from .found import Name, Remainder
+from .rounds import search
+
+
+@dataclass(frozen=True)
+class Decided:
+    """What the recordings say: names confirmed on the held-out ones, nameless curves over what is left, and names that
+    the held-out recordings did not confirm."""
+
+    best: Confirmed
+    rest: tuple[Remainder, ...]
+    rejected: tuple[Name, ...]
+
+    @property
+    def verdict(self) -> str:
+        """``missing_physics``, ``unknown_effect`` or ``adequate``."""
+        return "missing_physics" if self.best.names else "unknown_effect" if self.rest else "adequate"
+
+
+def decide(
+    model: Model,
+    base: BaseParameters | None,
+    scales: Mapping[str, Scales],
+    train: Sequence[Experiment],
+    held: Sequence[Experiment],
+    *,
+    progress: Callable[[str], None] = lambda _: None,
+    seed: int = 0,
+) -> Decided:
+    """Name what a model leaves out.
+
+    Parameters
+    ----------
+    model : Model
+        Baseline.
+    base : BaseParameters or None
+        With ``inertia = "free"``.
+    scales : mapping of str to Scales
+    train, held : sequence of Experiment
+    progress : callable
+        Told in a few words what is under way.
+    seed : int
+        Of random starts.
+    """
+    found = search(model, base, scales, train, held, progress=progress, seed=seed)
+    best = last = confirm(found, train, held, scales, progress)
+    rejected = {n.placed.key: n for n in last.rejected}
+    for _ in range(SECOND_CHOICES):
+        if not last.rejected:
+            break
+        progress("looking for what else could explain what the held-out recordings did not confirm")
+        again = search(
+            model, base, scales, train, held, before=last.found, barred=rejected, progress=progress, seed=seed
+        )
+        last = confirm(again, train, held, scales, progress)
+        rejected |= {n.placed.key: n for n in last.rejected}
+        if last.foretold.density > best.foretold.density:
+            best = last
+    return Decided(best, left_over(best, scales, train, held, rejected), tuple(rejected.values()))

@@ -1,0 +1,256 @@
+"""The evidence of hypotheses on some recordings, with the baseline and every nuisance integrated out.
+
+    r = A b + C t + e,   b ~ N(0, 1),  t ~ N(0, κ² diag(spread²)),  e ~ N(0, K)
+
+A holds all that stands beside every hypothesis in units of its prior: the baseline's parameters, the tolerance of the
+masses, small curves. With S = K + A A' a hypothesis is H = C' S⁻¹ C and g = C' S⁻¹ r, and its log Bayes factor against
+nothing is ½ g' (H + κ⁻²)⁻¹ g - ½ log det(1 + κ² H). Letters: n samples, m columns, P parameters beside.
+"""
+
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cholesky, solve_triangular
+
+from ..nuisance.covariance import Covariance
+from .pool import Columns, Item
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int_]
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One channel of one recording: residual (n,), its covariance, and what always stands beside it: positions (p,)
+    among all such parameters, and columns (n, p) in units of their prior deviation."""
+
+    residual: Array
+    covariance: Covariance
+    index: Index
+    columns: Array
+
+
+@dataclass(frozen=True)
+class Products:
+    """What one channel of one recording says: A'K⁻¹A (p, p), A'K⁻¹r (p,), log det K, r'K⁻¹r, A'K⁻¹C (p, m), C'K⁻¹r
+    (m,) and C'K⁻¹C (m, m), p and m the channel's own."""
+
+    always: Array
+    seen: Array
+    log_det: float
+    energy: float
+    beside: Array
+    score: Array
+    gram: Array
+
+
+class Evidence:
+    """Products of all columns over every recording; `Projected` sums some of them.
+
+    Parameters
+    ----------
+    channels : sequence of sequences of Channel
+        Of recording i and channel c.
+    columns : Columns
+    items : sequence of Item
+        Every hypothesis at every shape.
+    n_always : int
+        How many parameters always stand beside.
+    """
+
+    def __init__(
+        self, channels: Sequence[Sequence[Channel]], columns: Columns, items: Sequence[Item], n_always: int
+    ) -> None:
+        """Work the products out, one channel after the other."""
+        self.channels = [list(row) for row in channels]
+        self.items, self.n_always, self.n_columns = tuple(items), n_always, columns.count
+        self._pools = [[columns.of(i, c)[1] for c in range(len(row))] for i, row in enumerate(channels)]
+        self.numbers = [columns.of(0, c)[0] for c in range(len(channels[0]))]
+        self.where = [_inverse(x, columns.count) for x in self.numbers]
+        self.products = [[self._products(i, c) for c in range(len(row))] for i, row in enumerate(channels)]
+
+    def _products(self, i: int, c: int) -> Products:
+        own, pool = self.channels[i][c], self._pools[i][c]
+        both = np.column_stack([own.residual, own.columns])
+        solved = own.covariance.solve(both)
+        gram = both.T @ solved
+        m = len(self.numbers[c])
+        beside, score, products = np.zeros((len(own.index), m)), np.zeros(m), np.zeros((m, m))
+        if pool.size:
+            first = solved.T @ pool
+            beside, score, products = first[1:], first[0], pool.T @ own.covariance.solve(pool)
+        return Products(gram[1:, 1:], gram[1:, 0], own.covariance.log_det, float(gram[0, 0]), beside, score, products)
+
+    def with_covariances(self, c: int, covariances: Sequence[Covariance]) -> "Evidence":
+        """The same with other covariances of one channel, one a recording."""
+        other = copy(self)
+        other.channels = [list(row) for row in self.channels]
+        other.products = [list(row) for row in self.products]
+        for i, covariance in enumerate(covariances):
+            other.channels[i][c] = replace(self.channels[i][c], covariance=covariance)
+            other.products[i][c] = other._products(i, c)
+        return other
+
+    def energy(self, i: int, c: int) -> float:
+        """r' K⁻¹ r of a channel of a recording."""
+        return self.products[i][c].energy
+
+    def reached(self, item: Item) -> list[int]:
+        """Channels that an item has columns on."""
+        return [c for c, at in enumerate(self.where) if at[item.index[0]] >= 0]
+
+    def contribution(self, i: int, c: int, item: Item, amplitudes: Array) -> Array:
+        """What an item adds to a channel of a recording (n,) at amplitudes in units of its spread."""
+        here = self.where[c][item.index]
+        if here[0] < 0:
+            return np.zeros(len(self.channels[i][c].residual))
+        return self._pools[i][c][:, here] @ (item.spread * amplitudes)
+
+    def left(self, i: int, always: Array, members: Sequence[tuple[Item, Array]]) -> Array:
+        """Each sample's part of e' K⁻¹ e, all channels of a recording (n,), e what is left at these amplitudes."""
+        total = np.zeros(len(self.channels[i][0].residual))
+        for c, own in enumerate(self.channels[i]):
+            e = own.residual - own.columns @ always[own.index]
+            for item, amplitudes in members:
+                e = e - self.contribution(i, c, item, amplitudes)
+            total += e * own.covariance.solve(e)
+        return total
+
+
+def _inverse(numbers: Index, count: int) -> Index:
+    at = np.full(count, -1)
+    at[numbers] = np.arange(len(numbers))
+    return at
+
+
+@dataclass(frozen=True)
+class Group:
+    """Items of the same number of columns k, side by side: their numbers (N,), columns (N, k), spreads and signs, and
+    curvature (N, k, k) and score (N, k) with all that stands beside projected out."""
+
+    numbers: Index
+    index: Index
+    spread: Array
+    positive: NDArray[np.bool_]
+    whole: bool
+    curvature: Array
+    score: Array
+
+
+class Projected:
+    """The evidence of some recordings together, what always stands beside projected out."""
+
+    def __init__(
+        self,
+        evidence: Evidence,
+        recordings: Sequence[int],
+        weight: Array | None = None,
+        known: tuple[Array, Array] | None = None,
+    ) -> None:
+        """``weight`` (P,): factors on the prior deviations of what always stands beside. ``known``: mean (q,) and
+        covariance (q, q) of the first q of them, from other recordings; in place of their prior."""
+        self.evidence, self.recordings = evidence, tuple(recordings)
+        n_always, n_columns = evidence.n_always, evidence.n_columns
+        self._weight = np.ones(n_always) if weight is None else weight
+        matrix, seen = np.zeros((n_always, n_always)), np.zeros(n_always)
+        beside, score = np.zeros((n_always, n_columns)), np.zeros(n_columns)
+        energy = log_det = 0.0
+        for i in recordings:
+            for own, products, numbers in zip(
+                evidence.channels[i], evidence.products[i], evidence.numbers, strict=True
+            ):
+                matrix[np.ix_(own.index, own.index)] += products.always
+                seen[own.index] += products.seen
+                beside[np.ix_(own.index, numbers)] += products.beside
+                score[numbers] += products.score
+                energy, log_det = energy + products.energy, log_det + products.log_det
+        turned, self._mean = np.diag(self._weight), np.zeros(n_always)
+        if known is not None:
+            mean, covariance = known
+            q = len(mean)
+            self._mean[:q] = mean
+            energy += float(mean @ matrix[:q, :q] @ mean - 2 * mean @ seen[:q])
+            seen = seen - matrix[:, :q] @ mean
+            turned[:q, :q] = cholesky(covariance + 1e-12 * np.trace(covariance) * np.eye(q) / max(q, 1), lower=True)
+            matrix, seen, beside = turned.T @ matrix @ turned, turned.T @ seen, turned.T @ beside
+        else:
+            matrix, seen = matrix * np.outer(self._weight, self._weight), seen * self._weight
+            beside = self._weight[:, None] * beside
+        self._turned = turned
+        self._low = cholesky(matrix + np.eye(n_always), lower=True)
+        self._seen = solve_triangular(self._low, seen, lower=True)
+        self.null = float(-0.5 * (energy - self._seen @ self._seen + log_det) - np.sum(np.log(np.diag(self._low))))
+        self._grams: list[Array] = [
+            np.sum([evidence.products[i][c].gram for i in recordings], axis=0) for c in range(len(evidence.where))
+        ]
+        self.beside_all = solve_triangular(self._low, beside, lower=True)
+        self.score_all = score - self.beside_all.T @ self._seen
+        self._crossed: dict[int, Array] = {}
+        self.groups = self._grouped()
+        self._at = {int(x): (g, row) for g in self.groups for row, x in enumerate(g.numbers)}
+
+    def _grouped(self) -> list[Group]:
+        by: dict[tuple[int, bool], list[int]] = {}
+        for number, item in enumerate(self.evidence.items):
+            by.setdefault((len(item.index), item.whole), []).append(number)
+        made = []
+        for (k, whole), numbers in by.items():
+            items = [self.evidence.items[x] for x in numbers]
+            index = np.stack([x.index for x in items])
+            spread = np.stack([x.spread for x in items])
+            curvature = np.zeros((len(items), k, k))
+            for gram, where in zip(self._grams, self.evidence.where, strict=True):
+                at = where[index]
+                rows = np.flatnonzero(at[:, 0] >= 0)
+                curvature[rows] += gram[at[rows][:, :, None], at[rows][:, None, :]]
+            beside = self.beside_all[:, index]
+            curvature -= np.einsum("pak,pal->akl", beside, beside, optimize=True)
+            curvature *= spread[:, :, None] * spread[:, None, :]
+            score = self.score_all[index] * spread
+            positive = np.stack([x.positive for x in items])
+            made.append(Group(np.array(numbers), index, spread, positive, whole, curvature, score))
+        return made
+
+    def cross(self, number: int) -> Array:
+        """C_item' S⁻¹ C of an item, in units of its spread, with every column (k, m)."""
+        if number not in self._crossed:
+            item = self.evidence.items[number]
+            total = np.zeros((len(item.index), self.evidence.n_columns))
+            for gram, where, numbers in zip(self._grams, self.evidence.where, self.evidence.numbers, strict=True):
+                here = where[item.index]
+                if here[0] >= 0:
+                    total[:, numbers] += gram[here]
+            total -= self.beside_all[:, item.index].T @ self.beside_all
+            self._crossed[number] = total * item.spread[:, None]
+        return self._crossed[number]
+
+    def score(self, number: int) -> Array:
+        """C_item' S⁻¹ r, in units of its spread (k,)."""
+        item = self.evidence.items[number]
+        return self.score_all[item.index] * item.spread
+
+    def own(self, number: int) -> Array:
+        """C_item' S⁻¹ C_item, in units of its spread (k, k)."""
+        group, row = self._at[number]
+        return group.curvature[row]
+
+    def curvature(self, one: int, other: int) -> Array:
+        """C_one' S⁻¹ C_other in units of their spreads (k_one, k_other)."""
+        item = self.evidence.items[other]
+        return self.cross(one)[:, item.index] * item.spread
+
+    def posterior(self, q: int) -> tuple[Array, Array]:
+        """Mean (q,) and covariance (q, q) of the first q parameters beside, with no hypothesis."""
+        half = solve_triangular(self._low, np.eye(len(self._low))[:, :q] * self._weight[:q], lower=True)
+        return self.beside([])[:q], half.T @ half
+
+    def beside(self, members: Sequence[tuple[int, Array]]) -> Array:
+        """Posterior mean of what always stands beside (P,) given items at amplitudes."""
+        seen = self._seen.copy()
+        for number, amplitude in members:
+            item = self.evidence.items[number]
+            seen -= self.beside_all[:, item.index] @ (item.spread * amplitude)
+        return self._mean + self._turned @ solve_triangular(self._low.T, seen, lower=False)

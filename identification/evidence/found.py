@@ -1,0 +1,75 @@
+"""What a search found: names with their rivals, and curves that no name explains."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...models.model import Model, Placed
+from ..fitting.experiment import Experiment
+from ..fitting.fit import Fit
+from ..search.choice import RivalOdds
+from .arm import Weighed
+from .search import Search, Slot
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Name:
+    """An effect that the search named.
+
+    ``gain`` is its log Bayes factor on the training recordings, ``share`` its posterior share among all that could
+    stand in its place, ``explained`` the share of its channels' residual energy [0 to 1] that it explains.
+    """
+
+    placed: Placed
+    channels: tuple[int, ...]
+    gain: float
+    share: float
+    explained: float
+    rivals: tuple[RivalOdds, ...]
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """A nameless curve on a channel: what it runs over, its log Bayes factor, the share of the channel's residual that
+    it explains [0 to 1], and what the held-out recordings gain by it in standard errors."""
+
+    channel: int
+    over: str
+    gain: float
+    explained: float
+    held: float
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What one effect at one place explains by itself on top of the baseline: share of the residual energy of its
+    channels [0 to 1], and log posterior odds; ``smallest`` holds, by parameter, what would have been named."""
+
+    placed: Placed
+    explained: float
+    odds: float
+    smallest: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Found:
+    """Baseline fit, model with all that was named and its fit, and the recordings as they were weighed."""
+
+    first: Fit
+    model: Model
+    fit: Fit
+    names: tuple[Name, ...]
+    trials: tuple[Trial, ...]
+    opening: Weighed
+    """The recordings under the first fit ..."""
+    weighed: Weighed
+    """... and under the last."""
+    slots: tuple[Slot, ...]
+    """Of the last search."""
+    search: Search
+    instruments: tuple[Experiment, ...]
+    tolerance: float

@@ -1,0 +1,221 @@
+"""Named effects and nameless curves of an arm's joints as hypotheses: columns, priors, odds."""
+
+import functools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from ...models.effect import Effect
+from ...models.floating.tree import n_carriers
+from ...models.model import Model, Placed
+from ...models.rig.rig import Rig
+from ..deciding import BENDS, ODDS_OF_CURVES, ODDS_OF_NAMES, SLOPE
+from ..fitting.assembly import Assembly, Evaluation
+from ..fitting.experiment import Experiment, Scales
+from ..nuisance.curve import SMALL, Coordinates, family
+from ..search.candidates import Variant, candidate_columns, library, reduced, variants
+from .pool import Columns, Hypothesis, Item
+
+Array = NDArray[np.float64]
+Curves = Mapping[tuple[int, str], Item]
+
+MOST_GRID = 16
+"""Points of a grid over several shapes, or of a law with hidden state, that are tried."""
+
+FINE = 12
+"""Points from which on a grid over one shape follows the law so finely that no curve need ride along."""
+
+
+@dataclass(frozen=True)
+class Along:
+    """What columns are taken from: instruments with the model's state along each, the training recordings first."""
+
+    model: Model
+    assembly: Assembly
+    instruments: Sequence[Experiment]
+    states: Sequence[Evaluation]
+    n_train: int
+    scale: Array
+    """RMS torque of each channel in the training recordings (J,)."""
+
+
+def curves(
+    along: Along, scales: Mapping[str, Scales], columns: Columns, *, small: bool = False
+) -> dict[tuple[int, str], Item]:
+    """Every nameless curve of every channel, or the small ones alone, by channel and words."""
+    tree, n = along.model.tree, along.n_train
+    alone = isinstance(tree, Rig) or bool(n_carriers(tree))
+    found = {}
+    for c, joint in enumerate(along.model.joints):
+        peak, travel = max(scales[joint].speed, 1e-9), scales[joint].travel
+        signals = [Coordinates.of(e, s, c, peak, travel) for e, s in zip(along.instruments, along.states, strict=True)]
+        if max(float(np.ptp(x.q[:, c])) for x in signals[:n]) < 1e-6:
+            continue
+        for curve in family(c, along.model.joints, signals[:n], alone):
+            if small and curve.words not in {*SMALL, *(coordinate(p.effect) for p in along.model.effects)}:
+                continue
+            own = [e.to_band(curve.columns(x), c) for e, x in zip(along.instruments, signals, strict=True)]
+            k = own[0].shape[1]
+            size = float(np.sqrt(np.mean(np.concatenate([(x**2).sum(axis=1) for x in own[:n]])))) or 1.0
+            spread = np.full(k, along.scale[c] / size)
+            found[c, curve.words] = Item(columns.add({c: own}), spread, np.zeros(k, bool), label=(c, curve))
+    return found
+
+
+def names(along: Along, by_words: Curves, columns: Columns) -> dict[str, tuple[Placed, list[Item]]]:
+    """Every effect at every place that the model does not have yet, with all its shapes, by its key."""
+    have = {p.key for p in along.model.effects}
+    found = {}
+    for p in library(along.model):
+        # A whole law beside some of its parts is another way to write the same curve.
+        if (
+            p.effect.at == "joint"
+            and len(p.effect.contains) > 1
+            and any(f"{x}.{p.at}" in have for x in p.effect.contains)
+        ):
+            continue
+        items = _items(along, p, by_words, columns)
+        if items:
+            found[p.key] = (p, items)
+    return found
+
+
+def pool(named: Mapping[str, tuple[Placed, list[Item]]], by_words: Curves) -> list[Hypothesis]:
+    """Hypotheses with their prior odds: shared by the effects, and by the places of each (Scott and Berger 2010)."""
+    places: dict[str, int] = {}
+    for p, _ in named.values():
+        places[p.effect.name] = places.get(p.effect.name, 0) + 1
+    found = [
+        Hypothesis(key, True, tuple(items), float(np.log(ODDS_OF_NAMES / len(places) / places[p.effect.name])), p)
+        for key, (p, items) in named.items()
+    ]
+    each = float(np.log(ODDS_OF_CURVES / max(len(by_words), 1)))
+    return found + [
+        Hypothesis(f"curve.{c}.{words}", False, (item,), each, item.label) for (c, words), item in by_words.items()
+    ]
+
+
+def _items(along: Along, p: Placed, by_words: Curves, columns: Columns) -> list[Item]:
+    grid, between = _grid(along.assembly, p)
+    made = [_made(along, v) for v in grid]
+    extra = None
+    if len(grid) <= FINE:
+        extra = by_words.get((along.assembly.joint_of(p), coordinate(p.effect) or ""))
+    items: list[Item] = []
+    for k, (v, parts) in enumerate(zip(grid, made, strict=True)):
+        size = None if parts is None else _size(along, parts)
+        if parts is None or size is None or not np.any(size > 1e-12):
+            continue
+        n, own = len(size), parts
+        neighbours = [x for x in (made[max(k - 1, 0)], made[min(k + 1, len(grid) - 1)]) if x is not None]
+        if between and len(neighbours) == 2:
+            steps = min(k + 1, len(grid) - 1) - max(k - 1, 0)
+            low, high = neighbours
+            own = {
+                c: [
+                    np.hstack([x, (b - a) * (SLOPE / steps)]) for x, a, b in zip(parts[c], low[c], high[c], strict=True)
+                ]
+                for c in parts
+            }
+        index = columns.add(own)
+        whole = len(v.amplitudes) == 0
+        for subset in v.subsets():
+            some = reduced(v, subset)
+            on = size[subset] > 1e-12
+            if not on.all():
+                continue
+            spread = np.ones(1) if whole else 1 / size[subset] / np.sqrt(len(subset))
+            positive = np.ones(1, bool) if whole else some.low >= 0
+            at = index[subset]
+            if len(index) > n:
+                at, spread = np.concatenate([at, index[n + subset]]), np.tile(spread, 2)
+                positive = np.concatenate([positive, np.zeros(len(subset), bool)])
+            if extra is None or whole:
+                items.append(Item(at, spread, positive, whole, some))
+                continue
+            free = np.zeros(len(extra.index), bool)
+            for bend in BENDS:
+                bent = np.concatenate([at, extra.index]), np.concatenate([spread, bend * extra.spread])
+                items.append(Item(*bent, np.concatenate([positive, free]), whole, some))
+    return items
+
+
+def _grid(assembly: Assembly, p: Placed) -> tuple[list[Variant], bool]:
+    """Points of an effect's grid, and whether a slope to its neighbours may ride along with each.
+
+    A law of one shape without hidden state is cheap: the grid gets a point between every two.
+    """
+    grid = variants(assembly, p)
+    shapes = [i for i, x in enumerate(p.effect.parameters) if len(x.grid) > 1]
+    if p.effect.at != "joint" or p.effect.states or len(shapes) != 1 or not len(grid[0].amplitudes):
+        return grid[:: -(-len(grid) // MOST_GRID)], False
+    i = shapes[0]
+    finer = [grid[0]]
+    for a, b in pairwise(grid):
+        middle = a.parameters.copy()
+        middle[i] = 2 / (1 / a.parameters[i] + 1 / b.parameters[i])
+        finer += [replace(a, parameters=middle), b]
+    return finer, True
+
+
+def _made(along: Along, v: Variant) -> dict[int, list[Array]] | None:
+    """Columns of a point by channel, one array a recording; None where the law cannot be simulated there."""
+    parts: dict[int, list[Array]] = {}
+    for e, s in zip(along.instruments, along.states, strict=True):
+        for c, x in candidate_columns(along.assembly, e, s, v):
+            parts.setdefault(c, []).append(x)
+    complete = all(len(x) == len(along.instruments) for x in parts.values())
+    finite = all(np.isfinite(x).all() for own in parts.values() for x in own)
+    return parts if parts and complete and finite else None
+
+
+def _size(along: Along, parts: Mapping[int, Sequence[Array]]) -> Array:
+    """RMS of each column over the training recordings, in the RMS torque of the channel that it shows most on."""
+    sizes = [
+        np.sqrt(np.mean(np.concatenate(list(own[: along.n_train])) ** 2, axis=0)) / along.scale[c]
+        for c, own in parts.items()
+    ]
+    return np.max(sizes, axis=0)
+
+
+def coordinate(effect: Effect) -> str | None:
+    """What a joint's law runs over, in words of the family of curves; told from the law itself."""
+    if effect.at != "joint" or effect.acts_on != "torque":
+        return None
+    if effect.remembers:
+        return "distance since it turned by direction"
+    reads = _reads(effect)
+    if "qdd" in reads:
+        return None
+    if "load" in reads and not effect.states:
+        return "load by direction"
+    if "q" in reads:
+        return "position by direction" if "qd" in reads else "position"
+    return "speed" if _even(effect) else "speed by direction"
+
+
+@functools.cache
+def _even(effect: Effect) -> bool:
+    """Is a law of speed the same in both directions?"""
+    speed = ca.SX.sym("qd")
+    signals = {n: ca.SX(1.0) for n in _SIGNALS} | {"qd": speed} | {n: ca.SX(0.0) for n in effect.states}
+    parameters = {p.name: ca.SX(p.grid[len(p.grid) // 2] if p.grid else 1.0) for p in effect.parameters}
+    law = ca.Function("law", [speed], [effect.law(signals, parameters)])
+    forth, back = float(law(0.7)), float(law(-0.7))
+    return abs(forth - back) < 1e-9 * (abs(forth) + abs(back))
+
+
+_SIGNALS = ("q", "qd", "qdd", "load", "inertia", "time", "temperature", "speed_scale")
+
+
+@functools.cache
+def _reads(effect: Effect) -> set[str]:
+    signals = {n: ca.SX.sym(n) for n in _SIGNALS}
+    signals |= {n: ca.SX.sym(n) for n in effect.states}
+    parameters = {p.name: ca.SX.sym(f"parameter {p.name}") for p in effect.parameters}
+    laws = [effect.law(signals, parameters), *(effect.rate(signals, parameters) if effect.rate else ())]
+    return {x.name() for law in laws for x in ca.symvar(law)}

@@ -1,0 +1,164 @@
+"""One search over sets of explanations: forward, backward and exchange moves until none raises the posterior.
+
+A set's log posterior is the log Bayes factor of its members at their best shapes and sizes together, and for each of
+them its prior log odds and what averaging over shapes and sizes took off when it was taken. Names and nameless curves
+are judged alike.
+"""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+
+from .evidence import Projected
+from .members import SIZES, Members
+from .pool import Hypothesis
+
+Array = NDArray[np.float64]
+
+MOST = 12
+"""Members of a set at most."""
+
+EXCHANGED = 3
+"""Best replacements of each member that are tried."""
+
+MOVED = 0.05
+"""Log posterior by which a move must raise a set's."""
+
+
+@dataclass(frozen=True)
+class Taken:
+    """A hypothesis in a set: with the number of its item, its size, and its prior log odds less what averaging took."""
+
+    hypothesis: int
+    item: int
+    size: float
+    offset: float
+
+
+@dataclass(frozen=True)
+class Scanned:
+    """Every hypothesis on top of a set: log posterior odds, the best item and size, the log Bayes factor there."""
+
+    odds: Array
+    item: NDArray[np.int_]
+    size: Array
+    gain: Array
+
+
+@dataclass(frozen=True)
+class Slot:
+    """A member of the best set, and who could stand in its place: log odds (n_hypotheses,) and shares of them, the last
+    share being nobody's."""
+
+    taken: Taken
+    gain: float
+    odds: Array
+    shares: Array
+
+
+class Search:
+    """Of the best set of hypotheses on some recordings."""
+
+    def __init__(self, on: Projected, pool: Sequence[Hypothesis], barred: Collection[int] = ()) -> None:
+        """``barred``: hypotheses that no set may have. Items stand in the evidence in the order of the pool."""
+        self.on, self.pool, self.barred = on, pool, set(barred)
+        counts = np.array([len(h.items) for h in pool], int)
+        self._starts = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(int)
+        self._counts = counts
+        self._prior = np.array([h.prior for h in pool])
+        self._scans: dict[frozenset[tuple[int, float]], Scanned] = {}
+        self._sets: dict[frozenset[tuple[int, float]], Members] = {}
+
+    def members(self, taken: Sequence[Taken]) -> Members:
+        """The set, worked out once."""
+        key = _key(taken)
+        if key not in self._sets:
+            self._sets[key] = Members(self.on, [(t.item, t.size) for t in taken])
+        return self._sets[key]
+
+    def scan(self, taken: Sequence[Taken]) -> Scanned:
+        """Every hypothesis on top of a set."""
+        key = _key(taken)
+        if key not in self._scans:
+            gains = self.members(taken).gains()
+            best = gains.max(axis=1)
+            pairs = zip(self._starts, self._counts, strict=True)
+            item = np.array([start + int(np.argmax(best[start : start + n])) for start, n in pairs])
+            top = best[item]
+            weight = np.exp(gains - np.repeat(top, self._counts)[:, None])
+            cases = np.add.reduceat(np.isfinite(gains).sum(axis=1), self._starts)
+            mean = np.log(np.add.reduceat(weight.sum(axis=1), self._starts) / cases) + top
+            self._scans[key] = Scanned(mean + self._prior, item, SIZES[np.argmax(gains[item], axis=1)], top)
+        return self._scans[key]
+
+    def total(self, taken: Sequence[Taken]) -> float:
+        """Log posterior of a set against nothing."""
+        return self.members(taken).value + sum(t.offset for t in taken)
+
+    def run(self, start: Sequence[Taken] = (), *, exchange: bool = True) -> tuple[float, list[Taken]]:
+        """The best set that moves from a start reach, and its log posterior.
+
+        Members are added, and dropped, until neither helps; only then is each tried against what could replace it.
+        """
+        taken = list(start)
+        best = self.total(taken)
+        while True:
+            moves = [[*taken, t] for t in self._best(taken, 1) if self.scan(taken).odds[t.hypothesis] > 0]
+            moves = moves if len(taken) < MOST else []
+            moves += [taken[:k] + taken[k + 1 :] for k in range(len(taken))]
+            value, move = self._highest(moves)
+            if value <= best + MOVED and exchange:
+                rests = [(t, taken[:k] + taken[k + 1 :]) for k, t in enumerate(taken)]
+                value, move = self._highest(
+                    [[*rest, x] for t, rest in rests for x in self._best(rest, EXCHANGED) if x.item != t.item]
+                )
+            if value <= best + MOVED:
+                return best, taken
+            best, taken = value, move
+
+    def _highest(self, moves: Sequence[list[Taken]]) -> tuple[float, list[Taken]]:
+        """The move to the best set."""
+        return max(((self.total(m), m) for m in moves), key=lambda pair: pair[0], default=(-np.inf, []))
+
+    def _best(self, taken: Sequence[Taken], count: int) -> list[Taken]:
+        """The hypotheses with the highest odds on top of a set, which does not have them."""
+        odds = self.scan(taken).odds.copy()
+        odds[[t.hypothesis for t in taken] + sorted(self.barred)] = -np.inf
+        return [self.take(taken, int(h)) for h in np.argsort(-odds)[:count] if np.isfinite(odds[h])]
+
+    def take(self, taken: Sequence[Taken], h: int) -> Taken:
+        """A hypothesis at its best on top of a set."""
+        rows = self.scan(taken)
+        plain = Taken(h, int(rows.item[h]), float(rows.size[h]), 0.0)
+        gained = self.members([*taken, plain]).value - self.members(taken).value
+        return replace(plain, offset=float(rows.odds[h]) - gained)
+
+    def answer(self) -> list[Slot]:
+        """The best set from two starts, nothing and the best nameless curve, and the rivals of each member."""
+        if not self.pool:
+            return []
+        found = [self.run()]
+        odds = self.scan([]).odds
+        curves = [h for h, x in enumerate(self.pool) if not x.named and h not in self.barred]
+        top = max(curves, key=lambda h: odds[h], default=None)
+        if top is not None and odds[top] > 0 and found[0][1]:
+            found.append(self.run([self.take([], top)]))
+        _, taken = max(found, key=lambda pair: pair[0])
+        return [self.slot(taken, k) for k in range(len(taken))]
+
+    def slot(self, taken: Sequence[Taken], k: int) -> Slot:
+        """A member of a set, and who could stand in its place."""
+        taken = list(taken)
+        rest = taken[:k] + taken[k + 1 :]
+        rows = self.scan(rest)
+        odds = rows.odds.copy()
+        odds[[t.hypothesis for t in rest] + sorted(self.barred)] = -np.inf
+        both = np.append(odds, 0.0)
+        return Slot(taken[k], float(rows.gain[taken[k].hypothesis]), odds, np.exp(both - logsumexp(both)))
+
+
+def _key(taken: Sequence[Taken]) -> frozenset[tuple[int, float]]:
+    return frozenset((t.item, t.size) for t in taken)

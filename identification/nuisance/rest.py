@@ -1,0 +1,51 @@
+"""Sticking: near rest a joint holds whatever torque it is given, up to its level, and no law of speed says how much.
+
+A sign that is sampled, or rounded over a small speed, says it wrong, and so does any law of what moves. There the
+torque is free: a sample of which the share s stands near rest has, beside all else, the variance (s F)², F the level
+of dry friction (known), and just outside that the variance (s' g)², g estimated.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...recordings.condition import Motion
+from .. import deciding
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Zone:
+    """What counts as near rest: below ``speed``, a share of the joint's peak speed, or within ``travel``, a share of
+    the joint's travel, after it stood."""
+
+    speed: float
+    travel: float
+
+
+STICKS = Zone(*deciding.STICKS)
+SETTLES = Zone(*deciding.SETTLES)
+
+
+def share(motion: Motion, joint: int, zone: Zone, peak: float, travel: float) -> Array:
+    """How much of each sample in the analysis band stands near rest (n_band,), 0 to 1.
+
+    Parameters
+    ----------
+    motion : Motion
+    joint : int
+    zone : Zone
+    peak, travel : float
+        The joint's peak speed and travel over the training recordings.
+    """
+    speed = motion.qd[:, joint]
+    slow = np.abs(speed) < zone.speed * peak + 2 * motion.encoder_noise[1, joint]
+    slow[:-1] |= speed[:-1] * speed[1:] < 0
+    reach = zone.travel * travel
+    for s in motion.segments:
+        gone = np.concatenate([[0.0], np.cumsum(np.abs(speed[s]))]) * motion.period
+        for t in np.flatnonzero(slow[s][:-1] & ~slow[s][1:]) + 1:
+            slow[s.start + t : s.start + int(np.searchsorted(gone[: s.stop - s.start], gone[t] + reach))] = True
+    return np.clip(motion.to_band(slow.astype(float)), 0.0, 1.0)

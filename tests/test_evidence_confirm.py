@@ -1,0 +1,131 @@
+"""The held-out recordings' say: the name missed least goes first, blocks of time, and a name of one recording alone."""
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from decided import decided
+from decided import names as named
+from pendulum import record, recorded
+
+from snarelab.identification.evidence import confirm as module
+from snarelab.identification.evidence.confirm import FEWEST_BLOCKS, Foretold, Missed, blocks, confirm, scatter
+from snarelab.models.effects import get_effect
+from snarelab.models.model import Placed
+
+N = 6
+NAMES = ("sensor_bias", "sensor_gain", "sensor_drift", "viscous_friction", "coulomb_friction", "backlash")
+
+
+def names(n=N):
+    return tuple(cast(Any, SimpleNamespace(placed=Placed(get_effect(x), "joint1"), number=k))
+                 for k, x in enumerate(NAMES[:n]))  # fmt: skip
+
+
+def missed_by(gain, fit=None, scatter_=1.0) -> Missed:
+    return Missed(gain, scatter_, (0.1, 0.2), cast(Any, fit))
+
+
+def eager(rise) -> set[int]:
+    """What is left when every name is tried again after each that went."""
+    left = set(range(N))
+    while left:
+        weakest = min(left, key=lambda k: rise(k, left))
+        if rise(weakest, left) > 1:
+            break
+        left.remove(weakest)
+    return left
+
+
+def confirmed(monkeypatch, some, missed, told=None):
+    """`confirm` with a fit that is the set of names it has, and what is missed of each given by a function."""
+    densities = iter(range(100))
+    monkeypatch.setattr(module, "foretold", lambda *_: Foretold(float(next(densities)), np.zeros(4)))
+    monkeypatch.setattr(module, "_missed", missed)
+    model: Any = SimpleNamespace(effects=tuple(n.placed for n in some))
+    monkeypatch.setattr(module, "_without", lambda m, key: SimpleNamespace(
+        effects=tuple(p for p in m.effects if p.key != key)))  # fmt: skip
+    found: Any = SimpleNamespace(names=some, model=model, fit=frozenset(n.number for n in some))
+    return confirm(found, [], [], {}, (told if told is not None else []).append)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_trying_few_again_rules_out_what_trying_all_again_would(seed, monkeypatch):
+    """Effects that stand in for each other are missed more once the other is gone: then the least missed is found
+    without trying all."""
+    rng = np.random.default_rng(seed)
+    alone, stands_in = rng.uniform(0.0, 1.3, N), rng.uniform(0.0, 0.7, (N, N))
+    tried = []
+
+    def rise(number: int, left) -> float:
+        return float(alone[number] + sum(stands_in[number, k] for k in range(N) if k not in left))
+
+    def missed(name: Any, _model: Any, final: Any, *_: Any) -> Missed:
+        tried.append(name.number)
+        return missed_by(rise(name.number, final), final - {name.number})
+
+    done: Any = confirmed(monkeypatch, names(), missed)
+    left = {n.number for n in done.names}
+    assert left == eager(rise) == done.fit
+    assert {n.number for n in done.rejected} == set(range(N)) - left
+    assert set(done.missed) == {n.placed.key for n in done.names}
+    assert set(done.weak) == {n.placed.key for n in done.rejected}
+    assert {p.key for p in done.model.effects} == set(done.missed)
+    gone = len(done.rejected)
+    assert len(tried) <= N + sum(range(N - gone, N))  # no more than trying all again
+
+
+def test_of_two_twins_one_stays(monkeypatch):
+    def missed(name: Any, _model: Any, final: Any, *_: Any) -> Missed:
+        return missed_by(0.2 if len(final) == 2 else 5.0, final - {name.number})
+
+    done = confirmed(monkeypatch, names(2), missed)
+    assert len(done.names) == len(done.rejected) == 1
+    assert done.missed[done.names[0].placed.key].gain == 5.0
+
+
+@pytest.mark.parametrize(("gain", "scattered", "stays"), [(2.0, 2.0, False), (2.01, 2.0, True), (-3.0, 0.1, False)])
+def test_a_name_stays_if_it_is_missed_by_more_than_its_scatter(monkeypatch, gain, scattered, stays):
+    told = []
+    done: Any = confirmed(monkeypatch, names(1), lambda *_: missed_by(gain, "fit without", scattered), told)
+    assert (len(done.names), len(done.rejected)) == ((1, 0) if stays else (0, 1))
+    assert done.fit == (frozenset([0]) if stays else "fit without")
+    assert done.foretold.density == (0.0 if stays else 1.0)  # what is left foretells anew
+    assert len(told) == (1 if stays else 2)
+
+
+def test_without_a_name_nothing_is_tried(monkeypatch):
+    done = confirmed(monkeypatch, (), lambda *_: pytest.fail("tried"))
+    assert (done.names, done.rejected, dict(done.missed)) == ((), (), {})
+
+
+def run(band: float) -> Any:
+    return SimpleNamespace(motion=SimpleNamespace(band=band))
+
+
+def test_blocks_are_of_one_and_a_half_seconds_and_add_up():
+    x = np.random.default_rng(0).normal(size=1203)  # at 80 samples a second 15.04 s
+    found = blocks(x, run(40.0))
+    assert len(found) == 10
+    assert found.sum() == pytest.approx(x.sum(), rel=1e-12)
+    assert found[0] == pytest.approx(x[:121].sum(), rel=1e-12)
+    assert len(blocks(x[:100], run(40.0))) == FEWEST_BLOCKS  # a short recording has a few all the same
+
+
+def test_the_scatter_of_a_sum_is_its_standard_error():
+    """Of independent blocks: the deviation of the sum itself, counted on draws of it."""
+    rng = np.random.default_rng(1)
+    drawn = rng.normal(2.0, 3.0, (4000, 16))
+    assert np.mean([scatter(x) for x in drawn]) == pytest.approx(np.std(drawn.sum(axis=1)), rel=0.05)
+
+
+def test_what_only_the_training_recording_has_is_not_named(tmp_path):
+    """Drag of 1.2 N·m s² in the recording that is searched, and none in the one held out; and in both."""
+    model = recorded(tmp_path, 3, drag=1.2)
+    both = decided(model, tmp_path)
+    record(tmp_path / "hold.csv", 1003, 12.0)
+    one = decided(model, tmp_path)
+    assert named(both) == ["quadratic_friction.joint1"]
+    assert "quadratic_friction.joint1" not in named(one)
+    assert "quadratic_friction.joint1" in [n.placed.key for n in one.rejected]

@@ -1,0 +1,153 @@
+"""The evidence of hypotheses against the Gaussian density of all samples at once, by SciPy, in dense matrices."""
+
+import numpy as np
+import pytest
+from explained import explained
+from scipy.integrate import quad
+from scipy.stats import norm
+
+from snarelab.identification import deciding
+from snarelab.identification.evidence.evidence import Projected
+from snarelab.identification.evidence.members import SIZES, Members
+from snarelab.identification.evidence.pool import Columns
+
+FREE = (0, 1, 2, 5)
+"""Items whose amplitudes may have either sign."""
+POSITIVE, WHOLE = 3, 4
+WEIGHT = np.array([1.0, 0.3, 1.0, 3.0, 0.1])
+
+
+@pytest.fixture(params=range(3))
+def case(request):
+    made = explained(request.param)
+    return made, made.evidence()
+
+
+@pytest.mark.parametrize("weight", [None, WEIGHT])
+@pytest.mark.parametrize("recordings", [(0,), (0, 1)])
+def test_the_evidence_of_nothing_is_the_density_of_what_stands_beside(case, recordings, weight):
+    made, evidence = case
+    n = sum(len(own.residual) for i in recordings for own in made.pieces[i])
+    found = Projected(evidence, recordings, weight).null - 0.5 * n * np.log(2 * np.pi)
+    assert found == pytest.approx(made.log_density(recordings, (), weight), rel=1e-9)
+
+
+@pytest.mark.parametrize("weight", [None, WEIGHT])
+@pytest.mark.parametrize("recordings", [(0,), (0, 1)])
+def test_a_log_bayes_factor_is_the_ratio_of_densities(case, recordings, weight):
+    made, evidence = case
+    on = Projected(evidence, recordings, weight)
+    gains = Members(on).gains()
+    nothing = made.log_density(recordings, (), weight)
+    for number in FREE:
+        for k, size in enumerate(SIZES):
+            wanted = made.log_density(recordings, [(number, size)], weight) - nothing
+            assert gains[number, k] == pytest.approx(wanted, rel=1e-7, abs=1e-8)
+            assert Members(on, [(number, size)]).value == pytest.approx(wanted, rel=1e-7, abs=1e-8)
+    wanted = made.log_density(recordings, [(WHOLE, deciding.WHOLE)], weight) - nothing
+    assert gains[WHOLE, 0] == pytest.approx(wanted, rel=1e-7, abs=1e-8)
+    assert np.all(np.isneginf(gains[WHOLE, 1:]))  # it has one size: what it does
+    assert Members(on, [(WHOLE, 0.3)]).value == pytest.approx(wanted, rel=1e-7, abs=1e-8)
+
+
+def test_an_amplitude_that_cannot_be_negative_has_twice_the_prior_where_it_may_be(case):
+    """The Gaussian prior cut at zero, its density doubled, integrated by quadrature."""
+    made, evidence = case
+    gains = Members(Projected(evidence, (0, 1))).gains()
+    r, k, a, pool = made.stacked((0, 1))
+    solved = np.linalg.inv(k + a @ a.T)
+    item = made.items[POSITIVE]
+    c = pool[:, item.index[0]] * item.spread[0]
+    score, curvature = c @ solved @ r, c @ solved @ c
+    for k_, size in enumerate(SIZES):
+        value, _ = quad(
+            lambda t, size=size: 2 * norm.pdf(t, 0, size) * np.exp(t * score - 0.5 * curvature * t * t), 0, 12 * size,
+            epsabs=0, epsrel=1e-10, limit=400, points=[max(score / (curvature + size**-2), 0.0)],
+        )  # fmt: skip
+        assert gains[POSITIVE, k_] == pytest.approx(np.log(value), rel=1e-6, abs=1e-8)
+
+
+@pytest.mark.parametrize("before", [((1, 0.3),), ((1, 0.1), (2, 0.3)), ((4, 0.3), (2, 0.03))])
+def test_a_gain_on_top_of_others_is_the_difference_of_two_densities(case, before):
+    made, evidence = case
+    on, recordings = Projected(evidence, (0, 1), WEIGHT), (0, 1)
+    members = Members(on, before)
+    dense = [(number, deciding.WHOLE if made.items[number].whole else size) for number, size in before]
+    nothing, own = made.log_density(recordings, (), WEIGHT), made.log_density(recordings, dense, WEIGHT)
+    assert members.value == pytest.approx(own - nothing, rel=1e-8)
+    gains = members.gains()
+    for number in FREE:
+        for k, size in enumerate(SIZES):
+            wanted = made.log_density(recordings, [*dense, (number, size)], WEIGHT) - own
+            assert gains[number, k] == pytest.approx(wanted, rel=1e-6, abs=1e-7)
+    wanted = made.log_density(recordings, [*dense, (WHOLE, deciding.WHOLE)], WEIGHT) - own
+    if WHOLE not in dict(before):
+        assert gains[WHOLE, 0] == pytest.approx(wanted, rel=1e-6, abs=1e-7)
+
+
+def test_amplitudes_and_what_stands_beside_are_the_posterior_mean(case):
+    """All unknowns in one Gaussian regression, with the prior's precision."""
+    made, evidence = case
+    on, taken = Projected(evidence, (0, 1), WEIGHT), [(1, 0.3), (WHOLE, 1.0)]
+    members = Members(on, taken)
+    r, k, a, pool = made.stacked((0, 1))
+    c = np.concatenate([pool[:, made.items[n].index] * made.items[n].spread for n, _ in taken], axis=1)
+    x = np.concatenate([a, c], axis=1)
+    precision = np.concatenate([WEIGHT**-2.0, np.full(2, 0.3**-2), np.full(1, deciding.WHOLE**-2)])
+    mean = np.array([*np.zeros(7), 1.0])
+    solved = np.linalg.solve(k, x)
+    wanted = np.linalg.solve(x.T @ solved + np.diag(precision), solved.T @ r + precision * mean)
+    np.testing.assert_allclose(members.amplitudes, wanted[5:], rtol=1e-7, atol=1e-9)
+    np.testing.assert_allclose(members.of(WHOLE), wanted[7:], rtol=1e-7)
+    mean_of = [(number, members.of(number)) for number, _ in taken]
+    np.testing.assert_allclose(on.beside(mean_of), wanted[:5], rtol=1e-6, atol=1e-8)
+
+
+def test_what_is_left_of_each_sample_adds_up_to_the_whitened_energy(case):
+    made, evidence = case
+    always, amplitudes = np.linspace(-1, 1, 5), np.array([0.3, -0.2])
+    left = evidence.left(1, always, [(made.items[1], amplitudes)])
+    r, k, a, pool = made.stacked((1,))
+    e = r - a @ always - pool[:, made.items[1].index] @ (made.items[1].spread * amplitudes)
+    assert left.sum() == pytest.approx(e @ np.linalg.solve(k, e), rel=1e-9)
+    n = len(made.pieces[1][0].residual)
+    by_sample = (e * np.linalg.solve(k, e)).reshape(2, n).sum(axis=0)
+    np.testing.assert_allclose(left, by_sample, rtol=1e-7, atol=1e-9)
+    for c in range(2):
+        own = made.pieces[1][c]
+        energy = own.residual @ np.linalg.solve(own.covariance.dense(), own.residual)
+        assert evidence.energy(1, c) == pytest.approx(energy, rel=1e-9)
+
+
+def test_curvature_and_score_are_those_of_the_dense_matrices(case):
+    made, evidence = case
+    on = Projected(evidence, (0, 1), WEIGHT)
+    r, k, a, pool = made.stacked((0, 1))
+    solved = np.linalg.inv(k + (a * WEIGHT**2) @ a.T)
+    for one in FREE:
+        x = pool[:, made.items[one].index] * made.items[one].spread
+        np.testing.assert_allclose(on.score(one), x.T @ solved @ r, rtol=1e-7, atol=1e-9)
+        for other in FREE:
+            y = pool[:, made.items[other].index] * made.items[other].spread
+            np.testing.assert_allclose(on.curvature(one, other), x.T @ solved @ y, rtol=1e-6, atol=1e-8)
+
+
+def test_channels_that_an_item_reaches(case):
+    made, evidence = case
+    assert [evidence.reached(x) for x in made.items[:3]] == [[0], [0, 1], [1]]
+    assert not evidence.contribution(0, 0, made.items[2], np.ones(3)).any()
+
+
+def test_columns_are_given_back_in_the_order_that_was_asked_for():
+    rng = np.random.default_rng(0)
+    columns = Columns([7, 5])
+    one, two = ([rng.normal(size=(n, k)) for n in (7, 5)] for k in (2, 3))
+    a, b = columns.add({1: one}), columns.add({0: two, 1: two})
+    assert (a.tolist(), b.tolist(), columns.count) == ([0, 1], [2, 3, 4], 5)
+    wanted = np.array([4, 0, 2])
+    np.testing.assert_array_equal(columns.some(1, 1, wanted), np.stack([two[1][:, 2], one[1][:, 0], two[1][:, 0]], 1))
+    assert columns.some(0, 2, np.zeros(0, int)).shape == (7, 0)
+    assert [columns.has(c, 1) for c in (0, 1, 2)] == [False, True, False]
+    numbers, x = columns.of(0, 0)
+    assert numbers.tolist() == [2, 3, 4]
+    np.testing.assert_array_equal(x, two[0])

@@ -1,0 +1,65 @@
+"""Whole decisions by one evidence on what is told wrong today: a torque that wanders, and a motor that ripples."""
+
+import numpy as np
+import pytest
+from decided import decided, names
+from pendulum import recorded
+
+from snarelab.models.model_file import load_model
+
+
+def wander(path, seed, rms=0.3, rate=200):
+    """Add a random walk of this RMS about its mean to the torque of a recording [N·m]."""
+    table = np.loadtxt(path, delimiter=",", skiprows=1)
+    walk = np.cumsum(np.random.default_rng(seed).normal(size=len(table)))
+    table[:, 2] += rms * (walk - walk.mean()) / walk.std()
+    np.savetxt(path, table, delimiter=",", header="time,q.joint1,tau.joint1", comments="", fmt="%.8g")
+
+
+@pytest.mark.parametrize("seed", [11, 12])
+def test_a_clean_pendulum_is_adequate(tmp_path, seed):
+    found = decided(recorded(tmp_path, seed), tmp_path)
+    assert found.verdict == "adequate", names(found)
+
+
+@pytest.mark.parametrize("seed", [21, 22, 23])
+def test_a_torque_that_wanders_is_no_physics(tmp_path, seed):
+    model = recorded(tmp_path, seed)
+    for number, name in enumerate(("train.csv", "hold.csv")):
+        wander(tmp_path / name, 100 * seed + number)
+    found = decided(model, tmp_path)
+    assert not names(found)
+
+
+def motor(path, seed, seconds, ripple=1.0):
+    """A rotor under a slow servo; its ripple makes most of what the torque is, so that 88 % of it is not modelled."""
+    rng, t = np.random.default_rng(seed), np.arange(0.0, seconds, 1 / 200)
+    w, phase = 2 * np.pi * np.array([0.05, 0.11, 0.17]), rng.uniform(0, 2 * np.pi, 3)
+    turn = w * t[:, None] + phase
+    q, qd, qdd = (x.sum(axis=1) for x in (0.5 / w * np.sin(turn), 0.5 * np.cos(turn), -0.5 * w * np.sin(turn)))
+    modelled = 0.05 * qdd + 0.3 * np.tanh(qd / 2e-3) + 0.1 * qd
+    tau = modelled + ripple * np.cos(2 * np.pi * q / 0.4 + 0.7) + 0.05 * rng.normal(size=len(t))
+    table = np.column_stack([t, q, tau])
+    np.savetxt(path, table, delimiter=",", header="time,q.joint1,tau.joint1", comments="", fmt="%.9g")
+
+
+def test_a_ripple_that_is_most_of_a_motors_torque_is_named(tmp_path):
+    own = '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="0.05"/></inertial>'
+    (tmp_path / "motor.urdf").write_text(
+        f'<robot name="motor"><link name="base"/><link name="link1">{own}</link><joint name="joint1" type="revolute">'
+        '<parent link="base"/><child link="link1"/><axis xyz="0 0 1"/>'
+        '<limit lower="-9" upper="9" velocity="5" effort="200"/></joint></robot>'
+    )
+    (tmp_path / "motor.toml").write_text(
+        'name = "motor"\nsystem = "arm"\nurdf = "motor.urdf"\neffects = ["viscous_friction", "coulomb_friction"]\n'
+    )
+    motor(tmp_path / "train.csv", 1, 40.0)
+    motor(tmp_path / "hold.csv", 2, 25.0)
+    found = decided(load_model(tmp_path / "motor.toml"), tmp_path)
+    assert names(found) == ["torque_ripple.joint1"]
+    without, within = found.best.missed["torque_ripple.joint1"].trial[::-1]
+    assert without > 0.8
+    assert within < 0.15
+    fit = found.best.fit
+    period = fit.theta[[s.key for s in fit.assembly.slots].index("torque_ripple.joint1.period")]
+    assert period == pytest.approx(0.4, rel=0.01)
