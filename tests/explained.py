@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -54,7 +55,8 @@ class Explained:
             c = pool[:, item.index] * item.spread
             k = k + size**2 * c @ c.T
             mean = mean + c[:, 0] * item.whole
-        return float(multivariate_normal(mean, k).logpdf(r))
+        whole: Any = k
+        return float(multivariate_normal(mean, whole).logpdf(r))
 
 
 def covariance(rng, n) -> Covariance:

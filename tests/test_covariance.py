@@ -90,6 +90,6 @@ def test_noise_that_was_drawn_has_unit_variance_once_it_is_whitened():
     r = 0.5 * rng.normal(size=n) + 1.2 * coloured + encoders
     own = Covariance(np.full(n, 0.25), [Remembering(1.2, 0.1)], b, STEP, (slice(0, n),))
     assert r @ own.solve(r) / n == pytest.approx(1.0, abs=4 * np.sqrt(2 / n))
-    white = Covariance(np.full(n, np.var(r)), [], None, STEP, (slice(0, n),))
+    white = Covariance(np.full(n, float(np.var(r))), [], None, STEP, (slice(0, n),))
     likelihood = [-0.5 * (r @ k.solve(r) + k.log_det) for k in (own, white)]
     assert likelihood[0] > likelihood[1] + 500

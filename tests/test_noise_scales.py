@@ -1,5 +1,7 @@
 """Scales of the noise learnt on data in which one nuisance alone is present, drawn by its own recipe."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.linalg import block_diag, cholesky, toeplitz
@@ -118,7 +120,7 @@ def test_the_likelihood_is_that_of_all_samples_with_the_amplitudes_integrated_ou
     noise, spread = Noise(0.9, 0.4, 0.1, 0.3, 8.0, 0.0), 0.7
     x = [rng.normal(size=(n, 3)) for _ in range(2)]
     r = [rng.normal(size=n) + c @ np.ones(3) for c in x]
-    k = (
+    k: Any = (
         np.asarray(block_diag(*[noise.covariance(own).dense()] * 2), float)
         + spread**2 * np.concatenate(x) @ np.concatenate(x).T
     )
