@@ -157,6 +157,8 @@ def test_thresholds_are_those_of_the_code():
     sources = [path for folder in ("recordings", "identification") for path in (ROOT / folder).rglob("*.py")]
     # The search over captures has thresholds of its own, under names that mean the same.
     sources = [path for path in sources if path.parent.name != "snare"]
+    # Nor does the one evidence decide yet; its numbers stand in a file of their own.
+    sources = [p for p in sources if p.name != "deciding.py" and p.parent.name not in ("evidence", "nuisance")]
     code = "\n".join(read(path) for path in sources)
     for name, value, _ in table:
         defined = re.findall(rf"^{name.strip('`')} = (.*)$", code, re.MULTILINE)
