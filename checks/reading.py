@@ -52,7 +52,7 @@ class Reading:
 
     def but(self, **changes: object) -> "Reading":
         """The reading with something changed."""
-        return replace(self, **changes)  # type: ignore[arg-type]
+        return replace(self, **changes)  # type: ignore[arg-type]  a mapping of names says no types
 
 
 def as_read(n_joints: int) -> Reading:
