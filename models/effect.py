@@ -12,6 +12,9 @@ place (a joint, a link, a sling, a sensor channel) and one instant, in CasADi sy
   takes each to the torque of every joint.
 - On a free-floating arm: ``at="base"``, the wrench (6,) on the base, force [N] and moment [N·m] about the origin of its
   frame, in its own axes.
+- In a docking: ``at="carriage"``, the friction force [N] on the carriage; ``at="grooves"``, the friction force (2,) on a
+  flank along both tangents [N], which opposes the slip; ``at="groove"``, the lateral shift of one groove [m];
+  ``at="latches"``, a force (3,) on each ball beside what its latch does without the effect, in the target's axes [N].
 - In a snare: ``at="pin"``, a force [N] at each contact of a cable with the pin; ``at="cables"``, a force [N] or moment
   [N·m] inside all cables; ``at="target"``, the force (3,) on the target [N]. The snare's engine has the same laws
   compiled (``models/snare``), at places that no recording shows.
@@ -85,7 +88,8 @@ class Effect:
         The vocabulary's word; also the file's name.
     family : str
         Heading of the vocabulary it stands under.
-    at : "joint", "link", "sensor", "sling", "slide", "boom", "base", "pin", "cables" or "target"
+    at : "joint", "link", "sensor", "sling", "slide", "boom", "base", "pin", "cables", "target", "carriage", "grooves",
+        "groove" or "latches"
         Where it acts; a slide goes by the name of its joint, a boom by that of its link.
     sentence : str
         What a test engineer would say: "friction that does not depend on speed".
@@ -108,7 +112,12 @@ class Effect:
         numbers each in the base's axes, and ``time``. Pin: ``overlap`` [m] and its rate ``approach`` [m/s], the
         ``elastic_force`` and ``normal_force`` [N], ``slip`` of the cable against the pin (3 numbers [m/s]) and the
         ``slip_velocity`` [m/s] below which friction is smooth. Cables: ``bending_stiffness`` [N·m²] and
-        ``curvature_rate`` [1/(m·s)]. Target: ``displacement`` since the start (3 numbers [m]).
+        ``curvature_rate`` [1/(m·s)]. Target: ``displacement`` since the start (3 numbers [m]). Carriage: rate ``qd``
+        [m/s], what the cables and bumpers take of the motor ``load`` [N], the ``slip_velocity`` [m/s] below which
+        friction is smooth, ``time``. Grooves: ``normal_force`` [N] of a flank, ``presliding`` along both tangents, as a
+        share of where it slides. Groove: ``across``, the ball's lateral distance [m]. Latches: how far a ball is
+        ``drawn`` from where its latch took hold (3 numbers [m]), the latch's ``stiffness`` [N/m] and ``preload`` [N],
+        and the time ``since`` it began to close [s].
         A state is read as ``s[state_name]``.
     states : tuple of str
         Names of hidden states, all starting at rest (zero rate), or from zero.
@@ -143,7 +152,10 @@ class Effect:
 
     name: str
     family: str
-    at: Literal["joint", "link", "sensor", "sling", "slide", "boom", "base", "pin", "cables", "target"]
+    at: Literal[
+        "joint", "link", "sensor", "sling", "slide", "boom", "base", "pin", "cables", "target", "carriage", "grooves",
+        "groove", "latches",
+    ]  # fmt: skip
     sentence: str
     equation: str
     source: str

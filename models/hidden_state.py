@@ -47,6 +47,10 @@ SIGNALS = {
     "pin": {"overlap": 1, "approach": 1, "elastic_force": 1, "normal_force": 1, "slip": 3, "slip_velocity": 1},
     "cables": {"bending_stiffness": 1, "curvature_rate": 1},
     "target": {"displacement": 3},
+    "carriage": {"qd": 1, "load": 1, "slip_velocity": 1, "time": 1},
+    "grooves": {"normal_force": 1, "presliding": 2},
+    "groove": {"across": 1},
+    "latches": {"drawn": 3, "stiffness": 1, "preload": 1, "since": 1},
 }
 
 #: The signal, by place, that itself depends on the model's parameters; none on a rig's slings, slides and booms.

@@ -13,6 +13,7 @@ from .hidden_state import rows
 from .holding import Holding
 from .rig.kinematics import booms, reached_joints, slides
 from .rig.rig import Rig
+from .docking.bench_setup import DockingTree, docking_places
 from .snare.setup import SnareTree, snare_places
 from .tree import Tree
 
@@ -49,7 +50,7 @@ class Model:
     tree : Tree
         Joints, links, nominal inertia and gravity; a `Rig` for ``zero_g_rig``, with its slings; a `FloatingTree` for
         ``free_floating_arm``, whose first six joints carry the base; a `SnareTree` without joints for
-        ``snare_capture``.
+        ``snare_capture``, a `DockingTree` for ``docking``.
     inertia : "fixed" or "free"
     effects : tuple of Placed
         Physics that the model has, one entry a place.
@@ -102,6 +103,8 @@ def places(effect: Effect, tree: Tree) -> tuple[str, ...]:
     """Places of a tree at which an effect can act on some torque; sensor effects act on torque channels by default."""
     if isinstance(tree, SnareTree):
         return snare_places(effect.name, tree)
+    if isinstance(tree, DockingTree):
+        return docking_places(effect.at)
     carriers = n_carriers(tree)
     if effect.at == "joint":
         return tuple(j.name for j in tree.joints[carriers:])

@@ -15,6 +15,7 @@ from ..recordings.cuts import read_cuts
 from ..recordings.mixes import read_signal
 from ..recordings.read import SUFFIXES
 from ..recordings.signals import FORMS, Signal, is_signal, joint_of
+from .docking.bench_setup import read_bench
 from .effects import get_effect
 from .floating.tree import UNNAMED, n_carriers, read_floating
 from .holding import Holding, read_holding
@@ -26,10 +27,13 @@ from .snare.setup import read_setup
 from .tree import Tree
 from .urdf import load_urdf
 
-SYSTEMS = ("arm", "zero_g_rig", "free_floating_arm", "snare_capture")
+SYSTEMS = ("arm", "zero_g_rig", "free_floating_arm", "snare_capture", "docking")
 """Systems that this version can fit."""
 
-_GRAVITY = {"free_floating_arm": [0.0, 0.0, 0.0], "snare_capture": [-9.81, 0.0, 0.0]}
+_GRAVITY = {"free_floating_arm": [0.0, 0.0, 0.0], "snare_capture": [-9.81, 0.0, 0.0], "docking": [0.0, 0.0, 0.0]}
+_TABLES = {"snare_capture": "capture", "docking": "docking"}
+"""Systems whose set-up is a table of its own, without a URDF."""
+
 """[m/s²], where it is not given: the paper's ground test hangs along the snare's axis."""
 
 _KEYS = (
@@ -47,6 +51,7 @@ _KEYS = (
     "effects",
     "slings",
     "capture",
+    "docking",
     "signals",
     "bandwidth",
     "parameters",
@@ -84,14 +89,17 @@ def load_model(path: str | Path, fix: Fix = "") -> Model:
     number = isinstance(bandwidth, int | float) and not isinstance(bandwidth, bool)
     if bandwidth is not None and not (number and 0 < bandwidth < np.inf):
         raise InputError(f"{path}: bandwidth = {bandwidth!r}; allowed is a positive number of hertz")
-    if system == "snare_capture":
-        for key, instead in (("urdf", "[capture] has its sizes"), ("bandwidth", "recordings have none")):
+    if system in _TABLES:
+        for key, instead in (("urdf", f"[{_TABLES[system]}] has its sizes"), ("bandwidth", "recordings have none")):
             if key in raw:
-                raise InputError(f"{path}: system = 'snare_capture' has no {key}, {instead}; take it out")
+                raise InputError(f"{path}: system = {system!r} has no {key}, {instead}; take it out")
         if inertia != "fixed":
-            raise InputError(f"{path}: inertia = {inertia!r}; system = 'snare_capture' allows 'fixed' only")
-    elif "capture" in raw:
-        raise InputError(f"{path}: [capture] belongs to system = 'snare_capture'; take it out")
+            raise InputError(f"{path}: inertia = {inertia!r}; system = {system!r} allows 'fixed' only")
+    if system == "docking" and any(gravity):
+        raise InputError(f"{path}: gravity = {gravity}; a docking test hangs balanced: take it out")
+    for owner, table in _TABLES.items():
+        if table in raw and owner != system:
+            raise InputError(f"{path}: [{table}] belongs to system = {owner!r}; take it out")
     urdf = path.parent / _text(path, raw, "urdf", "") if "urdf" in raw else None
     if urdf is not None and _missing(urdf):
         hint = _neighbour(urdf, ".urdf") or "check the path, which starts where the model file is"
@@ -138,10 +146,13 @@ def _tree(
     """The arm of a model file, on its slings where the system is a rig."""
     if "slings" in raw and (system != "zero_g_rig" or urdf is None):
         raise InputError(f"{path}: [slings] belong to system = 'zero_g_rig' with a URDF of your own; take them out")
-    if system == "snare_capture":
+    if system in _TABLES:
         if "base" in raw:
             raise InputError(f"{path}: key 'base' belongs to system = 'free_floating_arm'; take it out")
-        return read_setup(path, _text(path, raw, "name", path.stem), raw.get("capture"), list(gravity))
+        name = _text(path, raw, "name", path.stem)
+        if system == "docking":
+            return read_bench(path, name, raw.get("docking"))
+        return read_setup(path, name, raw.get("capture"), list(gravity))
     if system == "free_floating_arm":
         try:
             return read_floating(urdf, tuple(gravity), _text(path, raw, "base", UNNAMED))

@@ -14,6 +14,7 @@ from .model import Model, Placed, places
 from .model_comments import with_comments
 from .rig.file import sling_table
 from .rig.rig import Rig
+from .docking.bench_setup import DockingTree
 from .snare.setup import SnareTree
 
 
@@ -64,6 +65,8 @@ def save_model(model: Model, path: str | Path, note: str) -> None:
             lines.append(f"{toml_text(name)} = {{ {', '.join(f'{k} = {toml_text(v)}' for k, v in fields.items())} }}")
     if isinstance(model.tree, SnareTree) and model.tree.setup.given:
         lines += ["", "[capture]", *(f"{k} = {toml_text(v)}" for k, v in model.tree.setup.given.items())]
+    if isinstance(model.tree, DockingTree) and model.tree.setup.given:
+        lines += ["", "[docking]", *(f"{k} = {toml_text(v)}" for k, v in model.tree.setup.given.items())]
     if model.signals:
         lines += ["", "[signals]"]
         for name, signal in model.signals.items():

@@ -1,7 +1,7 @@
 """The names a recording's columns can have, and their SI default units.
 
 ``time``; of a joint ``q qd qdd q_link tau temp``; ``tension.<sling>``; of a body ``pos quat vel omega``; of a wrench
-sensor ``force torque``; ``angle.ring``.
+sensor ``force torque``; ``angle.ring``; ``closed.latches``.
 """
 
 from collections.abc import Iterable, Mapping
@@ -19,12 +19,12 @@ _JOINT = {
 }
 _SCALAR = {"tension": "N", "temp": "degC"}
 _VECTOR = {"pos": "m", "quat": "dimensionless", "vel": "m/s", "omega": "rad/s", "force": "N", "torque": "N*m"}
-_SINGLE = {"time": "s", "angle.ring": "rad"}
+_SINGLE = {"time": "s", "angle.ring": "rad", "closed.latches": "dimensionless"}
 
 #: How signal names look, for messages.
 FORMS = (
     "time, q|qd|qdd|q_link|tau|temp.<joint>, tension.<sling>, pos|vel|omega.<body>.x|y|z, quat.<body>.w|x|y|z, "
-    "force|torque.<sensor>.x|y|z, angle.ring"
+    "force|torque.<sensor>.x|y|z, angle.ring, closed.latches"
 )
 
 

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
+from ..effects.carriage_friction import EFFECT as FRICTION
 from .parameters import DockingParameters
 
 
@@ -43,7 +44,9 @@ def carriage(
     limit = 2 * np.pi * p["efficiency"] / p["lead"] * p["torque_limit"]
     asked = p["drive_stiffness"] * (wanted - s) + p["drive_damping"] * (speed - rate)
     motor = on * ca.fmax(ca.fmin(asked, limit), -limit)
-    friction = p["coulomb"] * ca.tanh(rate / p["coulomb_speed"]) + p["viscous"] * rate
+    friction = FRICTION.law(
+        {"qd": rate, "slip_velocity": p["coulomb_speed"]}, {"level": p["coulomb"], "viscous": p["viscous"]}
+    )
     holding = brake * (p["brake_stiffness"] * (held - s) - p["brake_damping"] * rate)
     stops = ca.SX(0)
     for depth, way in ((-s, 1.0), (s - p["stroke"], -1.0)):

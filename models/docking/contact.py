@@ -14,12 +14,17 @@ approximation)
     ln((1 + D v)/(1 − e D v)) = D v (1 + e).
 """
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 from scipy.optimize import brentq
 
+from ..effects.docking_friction import EFFECT as FRICTION
+
+Rub = Callable[[ca.SX, ca.SX], ca.SX]
+"""Friction (2,) [N] from a flank's normal force [N] and presliding as a share of the breakaway distance (2,)."""
 ELASTIC = 0.7
 """Share of the breakaway distance below which nothing slides; chosen."""
 RELAX = 0.01
@@ -50,7 +55,9 @@ def damping_number(restitution: float) -> float:
     return number(float(w))
 
 
-def contact(gap: ca.SX, approach: ca.SX, slip: ca.SX, bristle: ca.SX, p: dict[str, ca.SX]) -> Contact:
+def contact(
+    gap: ca.SX, approach: ca.SX, slip: ca.SX, bristle: ca.SX, p: dict[str, ca.SX], rub: Rub | None = None
+) -> Contact:
     """Write the law out.
 
     Parameters
@@ -61,6 +68,8 @@ def contact(gap: ca.SX, approach: ca.SX, slip: ca.SX, bristle: ca.SX, p: dict[st
         w_t [m/s] and z [m] along both tangents.
     p : dict
         ``stiffness`` [N/m], ``damping`` D [s/m], ``friction``, ``breakaway`` [m], ``bristle_damping`` d [s/m].
+    rub : callable, optional
+        Law in place of `docking_friction` with coefficient ``friction``.
     """
     overlap = ca.fmax(-gap, 0.0)
     spring = p["stiffness"] * overlap
@@ -71,7 +80,9 @@ def contact(gap: ca.SX, approach: ca.SX, slip: ca.SX, bristle: ca.SX, p: dict[st
     along = ca.fmax(ca.dot(bristle, slip), 0.0) / (size * size)
     held = slip - sliding * along * bristle
     rate = ca.if_else(gap < 0, held, -bristle / RELAX)
-    tangential = -normal * p["friction"] * (bristle / p["breakaway"] + p["bristle_damping"] * held)
+    presliding = bristle / p["breakaway"] + p["bristle_damping"] * held
+    own = {"normal_force": normal, "presliding": presliding}
+    tangential = -(rub(normal, presliding) if rub else FRICTION.law(own, {"coefficient": p["friction"]}))
     return Contact(
         normal,
         tangential,

@@ -4,12 +4,13 @@ Everything is in the target's frame. Each ball is a point of the end effector; w
 the other, in the same point, the other way round.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
-from .contact import contact, damping_number
+from .contact import Rub, contact, damping_number
 from .groove import BALLS, axes, flank
 from .parameters import DockingParameters
 
@@ -19,12 +20,22 @@ HELD = tuple(f"{name}.{i + 1}" for i in range(BALLS) for name in ("x", "y", "z")
 """Where each ball was as its latch took hold, in the target's frame [m]: inputs of the mechanism."""
 
 
+class Laws(NamedTuple):
+    """What a docking has beside the parameters' own: friction of the flanks in place of theirs; lateral shift [m] of a
+    groove by its number; force (3,) [N] on a ball from how far it is drawn from where its latch took hold (3,) [m]."""
+
+    rub: Rub
+    shift: Callable[[int], ca.SX]
+    latch: Callable[[ca.SX], ca.SX]
+
+
 class Docked(NamedTuple):
     """What the docking does.
 
     Force (3,) and moment (3,) on the end effector about its origin [N, N·m], of contacts and latches together; rates of
     the bristles (12,); normal forces (6,) [N]; distance of each ball from its seat, axial and lateral (3, 2) [m]; the
-    contacts' stored energy [J], powers lost in their damping and friction, and the power that latches take [W].
+    contacts' stored energy [J], powers lost in their damping and friction, and the power that latches take [W]; the
+    latches' axial pulls on their balls (3,) [N].
     """
 
     force: ca.SX
@@ -36,6 +47,7 @@ class Docked(NamedTuple):
     damped: ca.SX
     rubbed: ca.SX
     latched: ca.SX
+    grip: ca.SX
 
 
 def ball_places(p: DockingParameters) -> np.ndarray:
@@ -57,6 +69,7 @@ def docked(
     engaged: ca.SX,
     held: ca.SX,
     p: dict[str, ca.SX],
+    laws: Laws | None = None,
 ) -> Docked:
     """Write the mechanism out.
 
@@ -74,9 +87,11 @@ def docked(
         See `HELD`.
     p : dict
         Names of `constants`.
+    laws : Laws, optional
+        Of effects.
     """
     force, moment = ca.SX(3, 1), ca.SX(3, 1)
-    rates, normals, off = [], [], []
+    rates, normals, off, grips = [], [], [], []
     stored, damped, rubbed, latched = ca.SX(0), ca.SX(0), ca.SX(0), ca.SX(0)
     for ball in range(BALLS):
         axial, lateral, radial = (ca.DM(axis) for axis in axes(ball))
@@ -84,22 +99,25 @@ def docked(
         centre, speed = place + arm, velocity + ca.cross(spin, arm)
         from_seat = centre - p["radius"] * radial
         x, y = ca.dot(axial, from_seat), ca.dot(lateral, from_seat)
+        beside = laws.shift(ball) if laws else ca.SX(0)
         off += [x, y]
         push = ca.SX(3, 1)
         for k, side in enumerate((1.0, -1.0)):
-            gap, nx, ny = flank(x, side * y, p["flank"], p["half_width"], p["edge"])
+            gap, nx, ny = flank(x, side * (y - beside), p["flank"], p["half_width"], p["edge"])
             normal = nx * axial + side * ny * lateral
             across = -side * ny * axial + nx * lateral
             slip = ca.vertcat(ca.dot(radial, speed), ca.dot(across, speed))
             first = 2 * (2 * ball + k)
-            found = contact(gap, -ca.dot(normal, speed), slip, bristles[first : first + 2], p)
+            found = contact(gap, -ca.dot(normal, speed), slip, bristles[first : first + 2], p, laws and laws.rub)
             push += found.normal * normal + found.tangential[0] * radial + found.tangential[1] * across
             rates.append(found.rate)
             normals.append(found.normal)
             stored, damped, rubbed = stored + found.stored, damped + found.damped, rubbed + found.rubbed
-        drawn = p["latch_stiffness"] * (centre - held[3 * ball : 3 * ball + 3]) + p["latch_damping"] * speed
-        grip = engaged[ball] * (p["latch_preload"] * axial - drawn)
+        drawn = centre - held[3 * ball : 3 * ball + 3]
+        pull = p["latch_preload"] * axial - p["latch_stiffness"] * drawn - p["latch_damping"] * speed
+        grip = engaged[ball] * (pull + laws.latch(drawn) if laws else pull)
         latched -= ca.dot(grip, speed)
+        grips.append(ca.dot(axial, grip))
         push += grip
         force += push
         moment += ca.cross(arm, push)
@@ -113,6 +131,7 @@ def docked(
         damped,
         rubbed,
         latched,
+        ca.vertcat(*grips),
     )
 
 

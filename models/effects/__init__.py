@@ -19,6 +19,7 @@ FAMILIES = (
     "suspension rig",
     "free-floating base",
     "snare and contact",
+    "docking",
     "measurement",
 )
 

@@ -1,0 +1,1 @@
+"""Docking recordings: effects of carriage, grooves and latches by simulation in the loop, by the one evidence."""
