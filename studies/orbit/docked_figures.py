@@ -4,12 +4,12 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from ...models.docking.parameters import PRELOAD_WINDOW, DockingParameters
 from ...models.inertia import Array
-from ...report.drawing import AFTER, BEFORE, GREY, MEASURED, SHADE, drawing, line, margins, svg
+from ...report.drawing import AFTER, BEFORE, GREY, MEASURED, SHADE, drawing, line, svg
 from ..page import Picture
+from .axes import panels, plain
 from .docked import Docked, energies, mean_wrist
 
 _THIRD = "#009E73"
@@ -35,7 +35,7 @@ def pictures(d: Docked, p: DockingParameters) -> list[Picture]:
 
 def _way(d: Docked, p: DockingParameters) -> Picture:
     with drawing():
-        figure, axes = _panels(3, 5.6)
+        figure, axes = panels(3, 5.6)
         line(axes[0], d.times, 1e3 * d.travel, AFTER, 1.4, "travel of the carriage")
         for ball, colour in enumerate((AFTER, BEFORE, _THIRD)):
             line(axes[1], d.times, -1e3 * d.off[:, ball, 0], colour, 1.2, f"ball {ball + 1}")
@@ -51,7 +51,7 @@ def _way(d: Docked, p: DockingParameters) -> Picture:
 
 def _forces(d: Docked) -> Picture:
     with drawing():
-        figure, axes = _panels(3, 5.6)
+        figure, axes = panels(3, 5.6)
         line(axes[0], d.times, 1e-3 * d.motor, AFTER, 1.2, "carriage's motor")
         axes[0].axhspan(*(1e-3 * x for x in PRELOAD_WINDOW), color=SHADE, alpha=0.35, linewidth=0)
         line(axes[1], d.times, 1e-3 * d.tension, BEFORE, 1.2, "a cable on its ring, largest")
@@ -70,7 +70,7 @@ def _forces(d: Docked) -> Picture:
 
 def _flanks(d: Docked) -> Picture:
     with drawing():
-        figure, axes = _plain(3.0)
+        figure, axes = plain(3.0)
         for k, colour in enumerate((AFTER, BEFORE, _THIRD)):
             for side, style in ((0, "-"), (1, "--")):
                 line(axes, d.times, d.normal[:, 2 * k + side], colour, 1.1, f"flank {2 * k + side + 1}")
@@ -84,7 +84,7 @@ def _flanks(d: Docked) -> Picture:
 
 def _motion(d: Docked) -> Picture:
     with drawing():
-        figure, axes = _panels(2, 4.0)
+        figure, axes = panels(2, 4.0)
         for panel, frame, name in ((axes[0], d.capture.base, "base"), (axes[1], d.capture.pin, "pin's foot")):
             for axis, colour in enumerate((MEASURED, BEFORE, AFTER)):
                 line(panel, d.times, 1e3 * (frame[:, 0, axis] - frame[0, 0, axis]), colour, 1.2, "xyz"[axis])
@@ -111,7 +111,7 @@ def _ledger(d: Docked) -> Picture:
         "#CC1111",
     )
     with drawing():
-        figure, axes = _plain(3.6)
+        figure, axes = plain(3.6)
         for (name, values), colour in zip(ledger.items(), colours, strict=True):
             line(axes, d.times, values, colour, 2.0 if name == "motors" else 1.1, name)
         axes.set(xlabel="time [s]", ylabel="energy [J]")
@@ -120,18 +120,3 @@ def _ledger(d: Docked) -> Picture:
         worst: Array = np.abs(ledger["residual"]).max()
         text = f"What both motors have put in, and where it is; {1e3 * float(worst):.2g} mJ at most are unexplained."
         return Picture(svg(figure), "Energies over time", text)
-
-
-def _plain(height: float) -> tuple[Figure, Axes]:
-    figure = Figure(figsize=(9.0, height))
-    axes: Any = figure.subplots()
-    figure.subplots_adjust(**margins(figure, 0.7, 0.1, 0.5, 0.15))
-    return figure, axes
-
-
-def _panels(rows: int, height: float) -> tuple[Figure, list[Axes]]:
-    figure = Figure(figsize=(9.0, height))
-    axes: list[Axes] = list(figure.subplots(rows, 1, sharex=True))
-    axes[-1].set_xlabel("time [s]")
-    figure.subplots_adjust(**margins(figure, 0.7, 0.1, 0.5, 0.15), hspace=0.15)
-    return figure, axes

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from ...models.inertia import Array
 from ...report.drawing import AFTER, BEFORE, GREY, MEASURED, SHADE, drawing, line, margins, svg
 from ..page import Picture
+from .axes import panels, plain
 from .ledger import WINDOW, Momentum
 from .map import LEVELS, STIFFNESSES, Cell
 from .setting import Capture
@@ -21,7 +22,7 @@ PAPER_CONTACT, PAPER_Y, PAPER_Z = 7.0, 0.005, 0.010
 def displacement(capture: Capture, reference: Capture) -> Picture:
     """Like the paper's figure 10."""
     with drawing():
-        figure, axes = _plain(3.2)
+        figure, axes = plain(3.2)
         for axis, name, colour, bar in ((1, "y", AFTER, PAPER_Y), (2, "z", BEFORE, PAPER_Z)):
             line(axes, capture.times, 1e3 * capture.relative[:, axis], colour, 1.6, f"{name}, co-simulated")
             line(axes, reference.times, 1e3 * reference.relative[:, axis], MEASURED, 0.7)
@@ -40,7 +41,7 @@ def displacement(capture: Capture, reference: Capture) -> Picture:
 def forces(capture: Capture, reference: Capture) -> Picture:
     """Force on the end effector, both ways."""
     with drawing():
-        figure, axes = _panels(3, 5.0)
+        figure, axes = panels(3, 5.0)
         for axis, panel in enumerate(axes):
             for who, colour, width in ((capture, AFTER, 1.6), (reference, MEASURED, 0.7)):
                 middles, force = who.mean_force(WINDOW, 0.01)
@@ -53,7 +54,7 @@ def forces(capture: Capture, reference: Capture) -> Picture:
 def base_motion(capture: Capture) -> Picture:
     """Where the base goes and turns to."""
     with drawing():
-        figure, axes = _panels(2, 4.0)
+        figure, axes = panels(2, 4.0)
         for axis, colour in enumerate((MEASURED, BEFORE, AFTER)):
             name = "xyz"[axis]
             line(axes[0], capture.times, 1e3 * (capture.base[:, 0, axis] - capture.base[0, 0, axis]), colour, 1.2, name)
@@ -72,7 +73,7 @@ def ledgers(capture: Capture, energies: Mapping[str, Array], momentum: Momentum)
     shown = {"motor and cables' strain": energies["motor"] - energies["cables, strain"]}
     shown |= {name: values for name, values in energies.items() if name not in ("motor", "cables, strain")}
     with drawing():
-        figure, axes = _plain(3.6)
+        figure, axes = plain(3.6)
         for (name, values), colour in zip(shown.items(), colours, strict=True):
             line(axes, capture.times, 1e3 * values, colour, 2.0 if colour == MEASURED else 1.1, name)
         axes.set(xlabel="time [s]", ylabel="energy [mJ]")
@@ -83,7 +84,7 @@ def ledgers(capture: Capture, energies: Mapping[str, Array], momentum: Momentum)
         )
         pictures = [Picture(svg(figure), "Energies over time", text)]
     with drawing():
-        figure, axes = _panels(2, 4.2)
+        figure, axes = panels(2, 4.2)
         shares = (("base and arm", momentum.arm, AFTER), ("cables and target", momentum.snare, BEFORE))
         for name, values, colour in shares:
             for axis in range(3):
@@ -132,18 +133,3 @@ def passive_map(cells: Sequence[Cell]) -> Picture:
         figure.subplots_adjust(**margins(figure, 0.7, 0.1, 0.5, 0.15), wspace=0.3)
         text = "End point and peak force by joint friction and stiffness; grey: inside the paper's figures."
         return Picture(svg(figure), "End point against joint friction and stiffness", text)
-
-
-def _plain(height: float) -> tuple[Figure, Axes]:
-    figure = Figure(figsize=(9.0, height))
-    axes: Any = figure.subplots()
-    figure.subplots_adjust(**margins(figure, 0.7, 0.1, 0.5, 0.15))
-    return figure, axes
-
-
-def _panels(rows: int, height: float) -> tuple[Figure, list[Axes]]:
-    figure = Figure(figsize=(9.0, height))
-    axes: list[Axes] = list(figure.subplots(rows, 1, sharex=True))
-    axes[-1].set_xlabel("time [s]")
-    figure.subplots_adjust(**margins(figure, 0.7, 0.1, 0.5, 0.15), hspace=0.15)
-    return figure, axes
