@@ -1,7 +1,6 @@
 """Figures of the two captures in orbit."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
