@@ -1,4 +1,4 @@
-"""A docking test again in MuJoCo: balls in grooves by its own collision and contact code, cables and latches as tendons.
+"""A docking test again in MuJoCo: balls in grooves by its own collision code, cables and latches as tendons.
 
 Nothing of our model is used but the dimensions. A ball is a sphere, a groove two boxes for its flanks and two for the
 land beside them; a sphere's centre follows an edge rounded by its radius, so that spheres of the edge's radius meet
@@ -66,8 +66,8 @@ class Truth:
 
 @dataclass
 class Seen:
-    """What a run leaves, a row a sample: time [s], travel and the motor's force [m, N], place [m], quaternion, force and
-    torque on the target [N, N·m], pull of each latch [N], and how far the latches have closed."""
+    """What a run leaves, a row a sample: time [s], travel and the motor's force [m, N], place [m], quaternion, force
+    and torque on the target [N, N·m], pull of each latch [N], and how far the latches have closed."""
 
     time: list[float] = field(default_factory=list)
     travel: list[float] = field(default_factory=list)
@@ -121,6 +121,7 @@ def simulate(
     ring = mj.mj_name2id(model, mj.mjtObj.mjOBJ_SITE, "ring")
     seen, wrench, left = Seen(), np.zeros(6), truth.latch_preload
     taken, share = False, 0.0
+
     def look(time: float) -> None:
         data.ctrl[0] = command(time)
         mj.mj_forward(model, data)
@@ -129,7 +130,9 @@ def simulate(
             contact = data.contact[k]
             mj.mj_contactForce(model, data, k, wrench)
             # The frame's x points from the first geom to the second, on which the force is.
-            force = contact.frame.reshape(3, 3).T @ wrench[:3] * (1.0 if model.geom_bodyid[contact.geom2] == 0 else -1.0)
+            force = (
+                contact.frame.reshape(3, 3).T @ wrench[:3] * (1.0 if model.geom_bodyid[contact.geom2] == 0 else -1.0)
+            )
             on += force
             about += np.cross(contact.pos, force)
         drawn = data.site_xpos[ring] - knob
@@ -240,8 +243,8 @@ def mjcf(truth: Truth, place: Array, turn: Rotation, travel: float, step: float)
     preloads = "".join(
         f'<general site="ball{i}" refsite="held{i}" gear="1 0 0 0 0 0" gaintype="fixed" gainprm="1"/>' for i in range(3)
     )
-    return f"""<mujoco><option timestep="{step}" gravity="0 0 0" integrator="implicitfast" cone="elliptic" impratio="1000"
- iterations="50" tolerance="1e-12"/>
+    return f"""<mujoco><option timestep="{step}" gravity="0 0 0" integrator="implicitfast" cone="elliptic"
+ impratio="1000" iterations="50" tolerance="1e-12"/>
 <default><geom condim="3" friction="{t.friction} 0 0"/></default>
 <worldbody>{"".join(lines)}
 <site name="knob" pos="{-t.knob} 0 0"/>{"".join(f'<site name="held{i}" pos="-1 0 0"/>' for i in range(3))}
@@ -255,7 +258,8 @@ def mjcf(truth: Truth, place: Array, turn: Rotation, travel: float, step: float)
  frictionloss="{t.dry}" solimpfriction="0.9999 0.9999 0.001 0.5 2" damping="{t.viscous}"/>
 <inertial pos="0 0 0" mass="{t.carriage_mass}" diaginertia="0.001 0.001 0.001"/>
 <site name="ring" pos="{-t.ring} 0 0"/>{bumpers}</body></body></worldbody>
-<tendon><spatial name="cable" springlength="0 {t.slack}"><site site="knob"/><site site="ring"/></spatial>{latches}</tendon>
+<tendon><spatial name="cable" springlength="0 {t.slack}"><site site="knob"/><site site="ring"/></spatial>
+{latches}</tendon>
 <actuator><position joint="carriage" kp="{LOOP[0]}" kv="{LOOP[1]}"/>{preloads}</actuator>
 </mujoco>"""
 

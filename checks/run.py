@@ -8,6 +8,7 @@ import xarray as xr
 from ..errors import InputError
 from ..identification.fitting.experiment import Experiment, load_experiments, with_silence
 from ..identification.fitting.recorded import read_all, with_recorded_joints
+from ..models.docking.bench_setup import DockingTree
 from ..models.model import Model
 from ..models.model_file import load_model
 from ..models.rigid_body import RigidBody
@@ -27,8 +28,8 @@ def check(
     """
     if not recordings:
         raise InputError("recordings: none is given; give one or more")
-    if isinstance(model.tree, SnareTree):
-        raise InputError(f"{model.path}: system = 'snare_capture' has no joints that could be checked")
+    if isinstance(model.tree, SnareTree | DockingTree):
+        raise InputError(f"{model.path}: system = {model.system!r} has no joints that could be checked")
     progress("reading and conditioning the recordings")
     datasets = read_all(model, recordings)
     model = with_recorded_joints(model, datasets)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from ..models.docking.bench_setup import DockingTree
 from ..models.floating.arm import FloatingArm
 from ..models.floating.ets_vii import ets_vii
 from ..models.floating.tree import FloatingTree, arm_on
@@ -51,6 +52,8 @@ def export(what: str, version: int, out: str | Path, inverse: bool = False, stif
         model = load_model(what)
         if stiff is not None and (inverse or isinstance(model.tree, SnareTree)):
             raise InputError(f"{what}: nothing is integrated that --integrator could be for; leave it out")
+        if isinstance(model.tree, DockingTree):
+            raise InputError(f"{what}: a docking test is no FMU; its end effector is: give hover_end_effector")
         if isinstance(model.tree, SnareTree):
             _export_capture(model, model.tree, version, out, inverse)
             return

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..checks.run import early_checks, run_checks
+from ..models.docking.bench_setup import DockingTree
 from ..models.effects import effects
 from ..models.hidden_state import prepare
 from ..models.model import Model
@@ -88,6 +89,10 @@ def diagnose(
 
         return Answer(*diagnose_captures(model, recordings, holdout, progress=progress, seed=seed, jobs=jobs))
     demand_one_process(model, jobs)
+    if isinstance(model.tree, DockingTree):
+        from .docking.diagnose import diagnose_dockings
+
+        return Answer(*diagnose_dockings(model, recordings, holdout, progress=progress))
     progress("reading and conditioning the recordings")
     prepare(effects().values())
     *read, held = read_all(model, [*recordings, holdout])

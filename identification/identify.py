@@ -10,6 +10,7 @@ import numpy as np
 from ..checks.finding import Finding as Check
 from ..checks.run import early_checks, run_checks
 from ..errors import InputError
+from ..models.docking.bench_setup import DockingTree
 from ..models.floating.tree import channel
 from ..models.inertia import Array
 from ..models.model import Model
@@ -24,6 +25,7 @@ from .fitting.friction_curve import friction_curves, identifiable
 from .fitting.recorded import read_all, with_recorded_joints
 
 if TYPE_CHECKING:
+    from .docking.identify import IdentifiedDockings
     from .snare.identify import IdentifiedCaptures
 
 
@@ -120,7 +122,7 @@ def identify(
     progress: Callable[[str], None] = lambda _: None,
     seed: int = 0,
     jobs: int | None = None,
-) -> "Identified | IdentifiedCaptures":
+) -> "Identified | IdentifiedCaptures | IdentifiedDockings":
     """Fit all parameters of a model to all recordings jointly.
 
     Parameters
@@ -150,6 +152,10 @@ def identify(
 
         return identify_captures(model, recordings, holdout, progress=progress, jobs=jobs)
     demand_one_process(model, jobs)
+    if isinstance(model.tree, DockingTree):
+        from .docking.identify import identify_dockings
+
+        return identify_dockings(model, recordings, holdout, progress=progress)
     progress("reading and conditioning the recordings")
     read = read_all(model, [*recordings, *holdout])
     model = with_recorded_joints(model, read)

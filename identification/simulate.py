@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from ..errors import InputError
+from ..models.docking.bench_setup import DockingTree
 from ..models.floating.tree import FloatingTree
 from ..models.model import Model
 from ..models.rigid_body import RigidBody
@@ -44,6 +45,10 @@ def simulate(model: Model, motion: str | Path | None) -> xr.Dataset:
         from .snare.simulate import simulate_capture
 
         return simulate_capture(model, motion)
+    if isinstance(tree, DockingTree):
+        from .docking.simulate import simulate_docking
+
+        return simulate_docking(model, motion)
     if motion is None:
         raise InputError(f"{model.path}: system = {model.system!r} follows a motion; give --motion RECORDING")
     read = [] if isinstance(tree, FloatingTree) else load_experiments(model, [motion], RigidBody(tree), torque=False)

@@ -12,8 +12,8 @@ place (a joint, a link, a sling, a sensor channel) and one instant, in CasADi sy
   takes each to the torque of every joint.
 - On a free-floating arm: ``at="base"``, the wrench (6,) on the base, force [N] and moment [N·m] about the origin of its
   frame, in its own axes.
-- In a docking: ``at="carriage"``, the friction force [N] on the carriage; ``at="grooves"``, the friction force (2,) on a
-  flank along both tangents [N], which opposes the slip; ``at="groove"``, the lateral shift of one groove [m];
+- In a docking: ``at="carriage"``, the friction force [N] on the carriage; ``at="grooves"``, the friction force (2,) on
+  a flank along both tangents [N], which opposes the slip; ``at="groove"``, the lateral shift of one groove [m];
   ``at="latches"``, a force (3,) on each ball beside what its latch does without the effect, in the target's axes [N].
 - In a snare: ``at="pin"``, a force [N] at each contact of a cable with the pin; ``at="cables"``, a force [N] or moment
   [N·m] inside all cables; ``at="target"``, the force (3,) on the target [N]. The snare's engine has the same laws

@@ -7,13 +7,13 @@ from pathlib import Path
 from ..errors import InputError
 from ..recordings.cuts import Cuts
 from ..recordings.signals import Signal
+from .docking.bench_setup import DockingTree, docking_places
 from .effect import Effect
 from .floating.tree import n_carriers
 from .hidden_state import rows
 from .holding import Holding
 from .rig.kinematics import booms, reached_joints, slides
 from .rig.rig import Rig
-from .docking.bench_setup import DockingTree, docking_places
 from .snare.setup import SnareTree, snare_places
 from .tree import Tree
 

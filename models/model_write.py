@@ -7,6 +7,7 @@ from typing import Any
 
 from ..files import written_whole
 from ..recordings.mixes import signal_fields
+from .docking.bench_setup import DockingTree
 from .effects import get_effect
 from .floating.tree import FloatingTree
 from .holding import Holding
@@ -14,7 +15,6 @@ from .model import Model, Placed, places
 from .model_comments import with_comments
 from .rig.file import sling_table
 from .rig.rig import Rig
-from .docking.bench_setup import DockingTree
 from .snare.setup import SnareTree
 
 

@@ -169,6 +169,31 @@ def wrong_pull(s, share, lag_loss):
     return wrench(0, 0, 475.0 * share - lag_loss * rise, 0, 0, 0)
 
 
+PLAY = 0.009
+"""The most that a latch's play may be [m], nearly."""
+
+
+def sliding_ball(s, coefficient):
+    """Coulomb's cone, by size and angle."""
+    size = np.hypot(*s["presliding"].T)
+    angle = np.arctan2(s["presliding"][:, 1], s["presliding"][:, 0])
+    return (coefficient * s["normal_force"] * size * np.array([np.cos(angle), np.sin(angle)])).T
+
+
+def loose_latch(s, play):
+    """What a spring without play pulls with, less one on the far side of a sphere of free travel."""
+    size = np.linalg.norm(s["drawn"], axis=1, keepdims=True)
+    beyond = np.clip(size - play / 2, 0, None)
+    return 3.0 * s["drawn"] * (1 - beyond / size)
+
+
+def maxwell(s, share, relaxes):
+    """A damper in series with a spring that is held stretched from one second on."""
+    run = solve_ivp(lambda _, f: -f / relaxes, (0.0, TIME[-1]), [share * 10.0], "DOP853", rtol=1e-10, dense_output=True)
+    lost = np.where(TIME > 1.0, share * 10.0 - run.sol(np.clip(TIME - 1.0, 0, None))[0], 0.0)
+    return np.stack([-lost, 0 * lost, 0 * lost], axis=1)
+
+
 def late_carriage(s, stiffness, lag):
     def follow(time, carriage):
         return (hang_point(time)[0][:2] - carriage) / lag
@@ -305,6 +330,13 @@ REFERENCES = {
         {"time": 0.02}, lambda s, t: np.gradient(bending(s), DT, edge_order=2) * t, likeness=1e-2
     ),
     "cable_pretension": Reference({"tension": 40.0}, lambda s, tension: np.full(TIME.size, tension)),
+    "carriage_friction": Reference(
+        {"level": 30.0, "viscous": 4.0}, lambda s, a, b: np.where(s["qd"] > 0, a, -a) + b * s["qd"]
+    ),
+    "docking_friction": Reference({"coefficient": 0.2}, sliding_ball),
+    "groove_misalignment": Reference({"offset": 0.003}, lambda s, x: np.repeat(x, TIME.size)),
+    "latch_play": Reference({"play": 0.9 * PLAY}, loose_latch),
+    "preload_loss": Reference({"share": 0.3, "time": 2.0}, maxwell),
     "umbilical_stiffness": Reference({"stiffness": 80.0}, three_springs),
     "sensor_bias": Reference({"offset": 0.3}, lambda s, offset: np.polyval([1.0, offset], s["value"])),
     "sensor_drift": Reference({"rate": 0.05}, lambda s, rate: np.interp(TIME, [0, 9], [0, 9 * rate]) + s["value"]),

@@ -58,7 +58,20 @@ def contacts():
     found = {"overlap": np.abs(overlap + 0.5), "approach": approach, "elastic_force": elastic, "normal_force": elastic}
     found |= {"slip": hang_point(TIME)[1], "slip_velocity": np.full(TIME.size, 2e-4)}
     found |= {"bending_stiffness": np.full(TIME.size, 0.25), "curvature_rate": wave(TIME, (3.0, 0.9, 0.1))[1]}
-    return found | {"displacement": hang_point(TIME)[0]}
+    return found | {"displacement": hang_point(TIME)[0]} | docking()
+
+
+def docking():
+    """Balls on their flanks and in their latches: what laws of a docking read."""
+    x, y = wave(TIME, (0.7, 0.4, 0.2)), wave(TIME, (0.5, 0.9, 1.0))
+    return {
+        "presliding": np.stack([x[0], y[0]], axis=1),
+        "across": x[0],
+        "drawn": hang_point(TIME)[0],
+        "stiffness": np.full(TIME.size, 3.0),
+        "preload": np.full(TIME.size, 10.0),
+        "since": TIME - 1.0,
+    }
 
 
 def shaken(time):

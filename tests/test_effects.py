@@ -26,7 +26,8 @@ load_dependent_friction position_dependent_friction presliding_hysteresis joint_
 rotor_inertia link_torsion link_bending payload_mass com_offset inertia_error harness_stiffness slide_friction
 sling_tension_error suspension_sway hang_point_clearance external_torque flexible_appendage propellant_slosh
 wheel_friction contact_friction contact_damping contact_stiffness cable_damping cable_pretension umbilical_stiffness
-sensor_bias sensor_drift sensor_gain sensor_delay
+sensor_bias sensor_drift sensor_gain sensor_delay carriage_friction docking_friction groove_misalignment latch_play
+preload_loss
 """
 NAMES = list(effects())
 

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,11 +26,11 @@ from ..diagnosis import (
 )
 from ..wording import experiment_sentence, named
 from .confirm import Confirmed
-from .fit import Linear, normal, priors, start
+from .fit import Linear, normal, priors, residuals, simulate, start
 from .recording import EVERY, Record, unit_of
 from .runs import SHIFTS, Runs
 from .search import Found
-from .weigh import covariances
+from .weigh import Weighed, covariances
 
 Array = NDArray[np.float64]
 
@@ -46,12 +47,12 @@ def report_on(
 ) -> Diagnosis:  # fmt: skip
     """Put everything into words and numbers."""
     records = runs.records
-    values = estimates(runs, train, model, confirmed.train, found)
+    values = estimates(model, confirmed.train, found.weighed)
     names = {n.placed.key for n in confirmed.names}
     findings = []
     own = [records[i] for i in train]
     locked = [records[i] for i in held]
-    before_held = _held_before(confirmed, found, runs, held)
+    before_held = _held_before(found, runs, held)
     for n in confirmed.names:
         p = n.placed
         rivals = tuple(
@@ -63,8 +64,9 @@ def report_on(
         a, b, unit, channel = _worst(locked, missed.held, confirmed.held)
         what = p.effect.sentence
         evidence = (
-            f"{what[:1].upper()}{what[1:]}: the recordings are e^{n.gain:.0f} times likelier with it, and taking it out "
-            f"again raises the error of {channel} on the held-out docking from {_size(b, unit)} to {_size(a, unit)}."
+            f"{what[:1].upper()}{what[1:]}: the recordings are e^{n.gain:.0f} times likelier with it, and taking it "
+            f"out again raises the error of {channel} on the held-out docking from {_size(b, unit)} to "
+            f"{_size(a, unit)}."
         )
         findings.append(Finding(p.effect.name, p.at, n.share, n.share, values[p.key], evidence, rivals))
     fits = _fits(own, locked, found.first, confirmed.train, before_held, confirmed.held, found)
@@ -105,11 +107,9 @@ def report_on(
     )  # fmt: skip
 
 
-def estimates(
-    runs: Runs, numbers: Sequence[int], model: Model, at: Linear, found: Found
-) -> dict[str, dict[str, Estimate]]:
+def estimates(model: Model, at: Linear, weighed: Weighed) -> dict[str, dict[str, Estimate]]:
     """Parameters by the effect's key and their own name, the set-up's numbers free within their tolerances."""
-    _, matrix = normal(at, covariances(found.weighed), priors(model, at.at))
+    _, matrix = normal(at, covariances(weighed), priors(model, at.at))
     size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(matrix / np.outer(size, size), rcond=1e-12)), 0)) / size
     made: dict[str, dict[str, Estimate]] = {}
@@ -133,7 +133,7 @@ def with_found(model: Model, at: Linear) -> Model:
     return replace(model, effects=at.at.placed, values={**model.values, **at.at.all_values})
 
 
-def channel_rms(records: Sequence[Record], linear: Linear) -> Array:
+def channel_rms(linear: Linear) -> Array:
     """RMS of measurement less simulation (c,) over all recordings."""
     return np.sqrt(np.mean(np.concatenate(linear.residuals) ** 2, axis=0))
 
@@ -144,23 +144,22 @@ def channel_sizes(records: Sequence[Record]) -> Array:
     return np.maximum(np.sqrt(np.nanmean(every**2, axis=0)), 1e-12)
 
 
-def _held_before(confirmed: Confirmed, found: Found, runs: Runs, held: Sequence[int]) -> Linear:
-    from .fit import residuals, simulate
-
+def _held_before(found: Found, runs: Runs, held: Sequence[int]) -> Linear:
     at = found.first.at
     return Linear(at, residuals(runs, held, simulate(runs, held, at)), ())
 
 
 def _worst(records: Sequence[Record], without: Linear, within: Linear) -> tuple[float, float, str, str]:
     """RMS without and with an effect, unit and name of the channel that misses it most."""
-    a, b, size = channel_rms(records, without), channel_rms(records, within), channel_sizes(records)
+    a, b, size = channel_rms(without), channel_rms(within), channel_sizes(records)
     c = int(np.argmax((a - b) / size))
     channel = records[0].channels[c]
     return float(a[c]), float(b[c]), unit_of(channel), channel
 
 
 def _size(value: float, unit: str) -> str:
-    return f"{1e6 * value:.3g} um" if unit == "m" else f"{1e3 * value:.3g} mrad" if unit == "rad" else f"{value:.3g} {unit}"
+    factor, word = {"m": (1e6, "um"), "rad": (1e3, "mrad")}.get(unit, (1.0, unit))
+    return f"{factor * value:.3g} {word}"
 
 
 def _fits(
@@ -168,20 +167,18 @@ def _fits(
     found: Found,
 ) -> tuple[ChannelFit, ...]:  # fmt: skip
     sizes = channel_sizes(train), channel_sizes(held)
-    rms = [channel_rms(train, first), channel_rms(train, last), channel_rms(held, held_first), channel_rms(held, held_last)]
+    rms = [channel_rms(first), channel_rms(last), channel_rms(held_first), channel_rms(held_last)]
     made = []
     for c, name in enumerate(train[0].channels):
         a, b, d, e = (float(x[c]) for x in rms)
         s, h = float(sizes[0][c]), float(sizes[1][c])
         floor = float(found.noises[c].white)
-        made.append(
-            ChannelFit(name, unit_of(name), Misfit(a, b, a / s, b / s), Misfit(d, e, d / h, e / h), floor)
-        )
+        made.append(ChannelFit(name, unit_of(name), Misfit(a, b, a / s, b / s), Misfit(d, e, d / h, e / h), floor))
     return tuple(made)
 
 
 def _relative(records: Sequence[Record], linear: Linear) -> float:
-    return float(np.sqrt(np.mean((channel_rms(records, linear) / channel_sizes(records)) ** 2)))
+    return float(np.sqrt(np.mean((channel_rms(linear) / channel_sizes(records)) ** 2)))
 
 
 def _steps(
@@ -247,14 +244,17 @@ def _traces(
     train: Sequence[Record], held: Sequence[Record], first: Linear, last: Linear, held_first: Linear, held_last: Linear
 ) -> tuple[Trace, ...]:
     made = []
-    for role, records, before, after in (("train", train, first, last), ("holdout", held, held_first, held_last)):
+    sets: tuple[tuple[Literal["train", "holdout"], Sequence[Record], Linear, Linear], ...] = (
+        ("train", train, first, last),
+        ("holdout", held, held_first, held_last),
+    )
+    for role, records, before, after in sets:
         for r, a, b in zip(records, before.residuals, after.residuals, strict=True):
             middle = 0.5 * (r.times[1:] + r.times[:-1])
-            place, speed = (np.interp(middle, r.times, x) for x in (r.motion.travel, r.motion.rate))
+            place, speed = (np.interp(middle, r.motion.times, x) for x in (r.motion.travel, r.motion.rate))
             for c, channel in enumerate(r.channels):
-                known = np.isfinite(r.measured[:, c])
-                columns = middle + r.zero, place, speed, r.measured[:, c], r.measured[:, c] - a[:, c], r.measured[:, c] - b[:, c]
-                made.append(
-                    Trace(Path(r.path).name, role, channel, unit_of(channel), *(x[known] for x in columns))  # pyright: ignore[reportArgumentType]
-                )
+                own = r.measured[:, c]
+                known = np.isfinite(own)
+                columns = (x[known] for x in (middle + r.zero, place, speed, own, own - a[:, c], own - b[:, c]))
+                made.append(Trace(Path(r.path).name, role, channel, unit_of(channel), *columns))
     return tuple(made)

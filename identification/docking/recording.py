@@ -1,4 +1,4 @@
-"""A docking test as recorded, brought to what a simulation of it can be compared with: means over 50 ms.
+"""A docking test as recorded, brought to what a simulation of it can be compared with: means over a tenth of a second.
 
 The carriage's travel and the latches' closing are what the test was told to do, everything else is what came of it.
 The end effector's pose is in the target's frame, and its turn counts from the start.
@@ -21,14 +21,14 @@ from ...recordings.attitude import attitude
 
 Array = NDArray[np.float64]
 
-EVERY = 0.05
-"""[s] Windows over which everything is averaged."""
+EVERY, KNOTS = 0.1, 2
+"""[s] Windows over which everything is averaged, and into how many stretches of its travel each is cut."""
 BEFORE = 0.25
 """[s] At the start, carriage still and nothing touching, over which the pose is averaged."""
 SHORTEST = 2.0
 """[s] Least length of a recording."""
-FEWEST = 4
-"""Least samples in a window: what a line with its rate takes, and two more."""
+FEWEST = 8
+"""Least samples in a window: four for each parabola of its travel."""
 UNITS = {"pos": "m", "turn": "rad", "force": "N", "torque": "N*m", "tau": "N", "tension": "N"}
 
 
@@ -46,8 +46,9 @@ class Record:
     notes: tuple[str, ...]
 
     def of(self, seen: Array) -> Array:
-        """A simulation's columns (n, c) in the order of these channels, from `SEEN`'s."""
-        return seen[:, [SEEN.index(name) for name in self.channels]]
+        """A simulation's columns (n, c) in the order of these channels, from `SEEN`'s over each stretch."""
+        own = seen[:, [SEEN.index(name) for name in self.channels]]
+        return own.reshape(-1, KNOTS, len(self.channels)).mean(axis=1)
 
 
 def unit_of(channel: str) -> str:
@@ -71,9 +72,7 @@ def _record(model: Model, path: str | Path, data: xr.Dataset) -> Record:
     if since[-1] < SHORTEST:
         raise InputError(f"{path}: it lasts {since[-1]:.3g} s; give {SHORTEST:g} s of a docking test or more")
     if np.median(np.diff(time)) > EVERY / FEWEST:
-        raise InputError(
-            f"{path}: a sample every {np.median(np.diff(time)):.3g} s; give {FEWEST / EVERY:g} Hz or more"
-        )
+        raise InputError(f"{path}: a sample every {np.median(np.diff(time)):.3g} s; give {FEWEST / EVERY:g} Hz or more")
     for name in ("q.carriage", *(f"pos.effector.{a}" for a in "xyz"), *(f"quat.effector.{a}" for a in "wxyz")):
         if name not in data:
             raise InputError(f"{path}: {name} is missing; a docking test is told by the carriage's travel and the pose")
@@ -92,9 +91,10 @@ def _record(model: Model, path: str | Path, data: xr.Dataset) -> Record:
     columns |= {name: data[name].values for name in SEEN if name in data}
     channels = tuple(name for name in SEEN if name in columns)
     measured = np.stack([_means(since, columns[name], times) for name in channels], axis=1)
-    travel, rate = _followed(path, since, data["q.carriage"].values, times)
+    knots = np.linspace(0.0, times[-1], KNOTS * (len(times) - 1) + 1)
+    travel, rate = _followed(path, since, data["q.carriage"].values, knots)
     motion = Motion(
-        times, travel, rate, np.nanmean(place[still], axis=0), start.as_quat(canonical=True, scalar_first=True),
+        knots, travel, rate, np.nanmean(place[still], axis=0), start.as_quat(canonical=True, scalar_first=True),
         _latch(path, since, data),
     )  # fmt: skip
     return Record(str(path), times, channels, measured, motion, zero, tuple(data.attrs["notes"]))
@@ -110,13 +110,14 @@ def _means(since: Array, values: Array, times: Array) -> Array:
 
 
 def _followed(path: str | Path, since: Array, travel: Array, times: Array) -> tuple[Array, Array]:
-    """Travel [m] and rate [m/s] at the windows' ends (n + 1,): a parabola through the samples half a window about."""
+    """Travel [m] and rate [m/s] at the stretches' ends: a parabola through the samples half a stretch about."""
     found = np.empty((len(times), 2))
     known = np.isfinite(travel)
     own, values = since[known], travel[known]
-    edges = np.searchsorted(own, np.stack([times - EVERY / 2, times + EVERY / 2]) + 1e-9)
+    about = EVERY / KNOTS / 2
+    edges = np.searchsorted(own, np.stack([times - about, times + about]) + 1e-9)
     for k, (t, a, b) in enumerate(zip(times, *edges, strict=True)):
-        if b - a < FEWEST // 2:
+        if b - a < FEWEST // KNOTS // 2:
             raise InputError(f"{path}: q.carriage has a gap at {t:.3g} s; give its travel without one")
         degree = min(2, b - a - 1)
         powers = np.vander(own[a:b] - t, degree + 1, increasing=True)
@@ -145,4 +146,3 @@ def _latch(path: str | Path, since: Array, data: xr.Dataset) -> tuple[float, flo
     if slope <= 0:
         return float(own[first]), float(own[last])
     return float(-start / slope), float((1 - start) / slope)
-

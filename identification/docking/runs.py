@@ -44,18 +44,21 @@ class Runs:
     def __call__(self, number: int, values: Values, shifts: Array) -> Array | None:
         """Channels (n, c) of a recording with effects' values and shifts of `SHIFTS` in their deviations; None where it
         cannot be simulated."""
+        seen = self.seen(number, values, shifts)
+        return None if seen is None else self.records[number].of(seen)
+
+    def seen(self, number: int, values: Values, shifts: Array) -> Array | None:
+        """The same of all that a simulation shows, over each stretch of the travel."""
         moved = dict(zip(SHIFTS, map(float, shifts), strict=True))
         own = dict(values) | {k: self._said[k] + moved[k] * x for k, x in TOLERANCES.items() if moved[k]}
         own |= {k: values.get(k, 0.0) + moved[k] * x for k, x in MACHINED.items() if moved[k]}
         own |= {k: moved[k] * x for k, x in REGISTRATION.items() if moved[k]}
         key = number, tuple(sorted((k, float(f"{v:.12g}")) for k, v in own.items()))
         if key not in self._known:
-            record = self.records[number]
             off = np.array([own.pop(k, 0.0) for k in REGISTRATION])
             try:
-                seen = _bench().run(self.setup, own, _registered(record.motion, off))
+                seen = _bench().run(self.setup, own, _registered(self.records[number].motion, off))
                 seen[:, :3] += off[:3]
-                seen = record.of(seen)
             except (StepFault, InputError):
                 seen = None
             self._known[key] = seen if seen is not None and np.all(np.isfinite(seen)) else None

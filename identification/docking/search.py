@@ -145,4 +145,3 @@ def _seen(made: Search, h: int) -> dict[str, float]:
         if len(enough):
             found[key.rpartition(".")[2]] = float(t[enough[0]] * item.spread[k])
     return found
-

@@ -16,7 +16,7 @@ from ..evidence.hypotheses import pool
 from ..evidence.pool import Columns, Hypothesis, Item
 from ..nuisance.noise import Noise, Run, learn
 from .fit import Covariances, Linear, priors
-from .recording import EVERY, Record
+from .recording import EVERY, KNOTS, Record
 from .runs import SHIFTS, Runs
 
 Array = NDArray[np.float64]
@@ -25,8 +25,8 @@ STRONGEST = 10
 """Directions of what could explain a residual beside which its noise is learnt."""
 
 
-ABOUT = 5
-"""Windows either way over which what nothing explains is averaged: a quarter of a second, a touch and its rebound."""
+ABOUT = 3
+"""Windows either way over which what nothing explains is averaged: 0.3 s, a touch and its rebound."""
 
 
 @dataclass(frozen=True)
@@ -170,12 +170,12 @@ def touching(record: Record, seen: Array) -> NDArray[np.bool_]:
     change = _change(seen)
     loads = [c for c, name in enumerate(record.channels) if name.startswith(("force.", "torque."))]
     fast = change[:, loads or range(len(record.channels))].max(axis=1) > STICKS[0]
-    return np.logical_or.reduce([np.roll(fast, k) for k in (-2, -1, 0, 1, 2)])
+    return np.logical_or.reduce([np.roll(fast, k) for k in (-1, 0, 1)])
 
 
 def standing(record: Record) -> NDArray[np.bool_]:
     """Windows (n,) in which the carriage stands, and takes any force up to its friction."""
-    rate = record.motion.rate
+    rate = record.motion.rate[::KNOTS]
     slowest = np.minimum(np.abs(rate[1:]), np.abs(rate[:-1]))
     return (slowest < STICKS[0] * np.abs(rate).max()) | (rate[1:] * rate[:-1] < 0)
 

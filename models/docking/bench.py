@@ -185,9 +185,7 @@ class DockingBench:
         found = docked(
             place, turn, velocity, turning, x[_RIGID : _RIGID + BRISTLES], ca.repmat(share, BALLS, 1), held, p, laws
         )
-        bump, bump_moment, _, _ = bumped(
-            place, turn, velocity, turning, s, rate, p | {"damping": p["bumper_damping"]}
-        )
+        bump, bump_moment, _, _ = bumped(place, turn, velocity, turning, s, rate, p | {"damping": p["bumper_damping"]})
         rings = place - (p["ring"] + s) * axis
         rings_speed = velocity - rate * axis - ca.cross(turning, (p["ring"] + s) * axis)
         line = ca.vertcat(-p["knob"], 0, 0) - rings

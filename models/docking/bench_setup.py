@@ -27,22 +27,46 @@ AT = ("carriage", "grooves", "groove", "latches")
 """Kinds of place in a docking."""
 GROOVES = tuple(f"groove{i + 1}" for i in range(BALLS))
 TOLERANCES = {
-    "front": 5e-5, "slack": 2e-4, "seat": 2e-5, "mass": 1.0, "mount_stiffness": 50.0, "mount_damping": 30.0,
-    "turning_stiffness": 10.0, "turning_damping": 5.0, "cable_stiffness": 6e3, "stiffness": 5e5,
-    "bumper_stiffness": 5e4, "damping": 100.0, "bumper_damping": 150.0, "breakaway": 1e-5, "latch_stiffness": 5e6, "latch_preload": 20.0,
-}  # fmt: skip
+    "front": 5e-5,
+    "slack": 2e-4,
+    "seat": 2e-5,
+    "mass": 1.0,
+    "mount_stiffness": 50.0,
+    "mount_damping": 30.0,
+    "turning_stiffness": 10.0,
+    "turning_damping": 5.0,
+    "cable_stiffness": 6e3,
+    "stiffness": 5e5,
+    "bumper_stiffness": 5e4,
+    "damping": 100.0,
+    "bumper_damping": 150.0,
+    "breakaway": 1e-5,
+    "latch_stiffness": 5e6,
+    "latch_preload": 20.0,
+}
 """How far numbers of the set-up may be from what they are said to be: one standard deviation, in their units; chosen as
 a workshop measures them, and for stiffness and damping of contacts as laws of contact differ."""
 MACHINED = {f"groove_misalignment.{at}.offset": 2e-5 for at in GROOVES}
 """What a workshop's tolerance leaves of an effect: one standard deviation, in the parameter's unit; chosen. More than
 that is a misalignment."""
 REGISTRATION = {f"register.{a}": 1e-5 for a in "xyz"} | {f"register.turn.{a}": 3e-5 for a in "xyz"}
-"""How far the measured pose may be from the true one in the target's frame: one standard deviation [m, rad]; chosen as a
-laser tracker on reference nests has it."""
-_UNUSED = (
-    "restitution_speed switch_travel lead efficiency torque_limit stroke drive_stiffness drive_damping "
-    "brake_stiffness brake_damping stop_stiffness stop_damping latch_time"
-).split()
+"""How far the measured pose may be from the true one in the target's frame: one standard deviation [m, rad]; chosen, as
+a laser tracker on reference nests has it."""
+_UNUSED = [
+    "restitution_speed",
+    "switch_travel",
+    "lead",
+    "efficiency",
+    "torque_limit",
+    "stroke",
+    "drive_stiffness",
+    "drive_damping",
+    "brake_stiffness",
+    "brake_damping",
+    "stop_stiffness",
+    "stop_damping",
+    "latch_time",
+]
 
 
 @dataclass(frozen=True)
