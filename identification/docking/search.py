@@ -11,7 +11,7 @@ from ..evidence.evidence import Projected
 from ..evidence.members import Members, log_bayes
 from ..evidence.search import Search, Slot
 from ..nuisance.noise import Noise
-from .fit import Linear, fit, linearised, start
+from .fit import Linear, fit, linearised, shift_columns, start
 from .runs import Runs
 from .weigh import Variant, Weighed, covariances, weigh
 
@@ -65,6 +65,7 @@ def search(
     """Add effects to a docking's model until nothing more raises the posterior."""
     progress(f"simulating {len(numbers)} dockings with the model as given")
     first = here = linearised(runs, numbers, start(model))
+    shifted = shift_columns(first)
     names: list[Name] = []
     candidates: tuple[Candidate, ...] = ()
     weighed: Weighed | None = None
@@ -78,19 +79,16 @@ def search(
         slots = made.answer()
         if not slots:
             break
-        added, values = [], {}
-        members = made.members([s.taken for s in slots])
-        for s in slots:
-            placed, own = _started(weighed, members, s)
-            added.append(placed)
-            values |= own
-            names.append(_name(weighed, s))
-        at = here.at.with_effects(added, values)
-        progress("fitting " + ", ".join(f"{p.effect.name} at {p.at}" for p in added))
-        here = fit(runs, numbers, model, at, covariances(weighed))
+        # One at a time: what bends with its own size leaves a rest in proportion to nothing, which others would take up.
+        best = max(slots, key=lambda slot: slot.gain)
+        placed, values = _started(weighed, made.members([s.taken for s in slots]), best)
+        names.append(_name(weighed, best))
+        at = here.at.with_effects([placed], values)
+        progress(f"fitting {placed.effect.name} at {placed.at}")
+        here = fit(runs, numbers, model, at, covariances(weighed), shifted)
     assert weighed is not None
     if not names:
-        here = fit(runs, numbers, model, here.at, covariances(weighed))
+        here = fit(runs, numbers, model, here.at, covariances(weighed), shifted)
     return Found(tuple(names), first, here, weighed, candidates)
 
 

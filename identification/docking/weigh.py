@@ -187,7 +187,7 @@ def hangs(
 
     While balls touch and slide no law of contact tells the load to the window: a channel may then be off, as a joint
     near rest may hold any torque, by what nothing explains there, in the RMS over `ABOUT` windows either way, and by
-    `LEAST_LEVEL` of its size at least. Where a channel changes fast it may be off by more, which the noise learns.
+    `LEAST_LEVEL` of its size at least, a vector's of the largest of its axes. Where a channel changes fast it may be off by more, which the noise learns.
 
     Parameters
     ----------
@@ -199,6 +199,8 @@ def hangs(
     scale : array (c,)
     """
     seen = [np.nan_to_num(r.measured) - left for r, left in zip(records, linear.residuals, strict=True)]
+    kinds = [name.rpartition(".")[0] for name in records[0].channels]
+    least = [LEAST_LEVEL * max(x for x, other in zip(scale, kinds, strict=True) if other == kind) for kind in kinds]
     loose = [touching(r, x) for r, x in zip(records, seen, strict=True)]
     found: tuple[list[Run], ...] = tuple([] for _ in records)
     for c, name in enumerate(records[0].channels):
@@ -213,7 +215,7 @@ def hangs(
             energy, count = np.zeros(len(k)), np.convolve(k, np.ones(2 * ABOUT + 1), "same")
             energy[k] = part**2
             energy = np.convolve(energy, np.ones(2 * ABOUT + 1), "same") / np.maximum(count, 1)
-            sticks = np.where(k, np.maximum(np.sqrt(energy), LEAST_LEVEL * scale[c]), 0.0)
+            sticks = np.where(k, np.maximum(np.sqrt(energy), least[c]), 0.0)
             n = len(k)
             own.append(Run(EVERY, (slice(0, n),), np.zeros(n), sticks, _change(x)[:, c], 1.0))
     return found

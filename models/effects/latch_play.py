@@ -21,7 +21,7 @@ EFFECT = Effect(
     equation="stiffness of a latch acts beyond play/2 from where it took hold, in every direction",
     source="Nordin and Gutman (2002), the dead zone",
     parameters=(Parameter("play", "m", "free travel of a latch, both ways together", low=0.0, high=0.01,
-                          grid=(2e-4, 1e-3)),),
+                          grid=(1e-4, 3e-4, 1e-3)),),
     law=_law,
     experiment="push the target off against the closed {at} beyond their preload, and draw its motion over the force",
 )  # fmt: skip
