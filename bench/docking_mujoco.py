@@ -9,7 +9,7 @@ actuator for its preload. The carriage has its own mass, dry friction and positi
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import mujoco
@@ -26,6 +26,8 @@ LOOP = 5e6, 2e4
 ROTOR = 2e-5 * (2 * np.pi / 0.005) ** 2
 """Of motor and screw, as a mass of the carriage [kg]."""
 _HALF = 0.04
+ANGLES = np.pi / 2 + 2 * np.pi / 3 * np.arange(3)
+"""Of the grooves about the axis, from y towards z [rad]."""
 EVERY = 4
 """Steps between two samples."""
 
@@ -183,6 +185,42 @@ def simulate(
     return seen
 
 
+@dataclass(frozen=True)
+class Pushed:
+    """A body pushed into the grooves: time (n,) [s], origin (n, 3) [m], quaternion (n, 4), velocity (n, 3) [m/s]; the
+    grooves' impulse on it since the start (n, 3) [N·s]; and how far each ball is from its seat in the end (3,) [m]."""
+
+    time: Array
+    place: Array
+    quaternion: Array
+    velocity: Array
+    impulse: Array
+    off: Array
+
+
+def push(truth: Truth, force: float, duration: float, place: Array, turn: Rotation, step: float = 1e-4) -> Pushed:
+    """Push a free body of ``truth``'s mass along the axis by a force [N]; carriage, cables and mount are idle."""
+    loose = replace(truth, mount=(0.0, 0.0), turning=(0.0, 0.0), knob=5.0, ring=1.0, slack=100.0, dry=0.0, front=-1.0)
+    model = mj.MjModel.from_xml_string(mjcf(loose, place, turn, 0.0, step))
+    harden(model, loose)
+    data = mj.MjData(model)
+    body = mj.mj_name2id(model, mj.mjtObj.mjOBJ_BODY, "effector")
+    balls = [mj.mj_name2id(model, mj.mjtObj.mjOBJ_SITE, f"ball{i}") for i in range(3)]
+    data.xfrc_applied[body, 0] = force
+    n = round(duration / step)
+    rows, six = np.empty((n, 10)), np.empty(6)
+    for k in range(n):
+        mj.mj_step(model, data)
+        mj.mj_objectVelocity(model, data, mj.mjtObj.mjOBJ_XBODY, body, six, 0)
+        rows[k] = *data.xpos[body], *data.xquat[body], *six[3:]
+    mj.mj_forward(model, data)
+    seats = np.array([[0.0, truth.radius * np.cos(a), truth.radius * np.sin(a)] for a in ANGLES])
+    time = step * np.arange(1, n + 1)
+    impulse = truth.mass * rows[:, 7:] - np.outer(time, [force, 0.0, 0.0])
+    off = np.linalg.norm(data.site_xpos[balls] - seats, axis=1)
+    return Pushed(time, rows[:, :3], rows[:, 3:7], rows[:, 7:], impulse, off)
+
+
 def harden(model: Any, truth: Truth) -> None:
     """Give every contact the stiffness that is asked for; see the module."""
     body = mj.mj_name2id(model, mj.mjtObj.mjOBJ_BODY, "effector")
@@ -203,7 +241,7 @@ def mjcf(truth: Truth, place: Array, turn: Rotation, travel: float, step: float)
     t, lines = truth, []
     s, c, r = np.sin(t.flank), np.cos(t.flank), t.edge
     for i in range(3):
-        a = np.pi / 2 + 2 * np.pi / 3 * i
+        a = float(ANGLES[i])
         radial, lateral = np.array([0, np.cos(a), np.sin(a)]), np.array([0, -np.sin(a), np.cos(a)])
         for side in (1.0, -1.0):
             across, middle = side * lateral, t.radius * radial + t.offsets[i] * lateral
@@ -219,10 +257,9 @@ def mjcf(truth: Truth, place: Array, turn: Rotation, travel: float, step: float)
             lines.append(_box(f"land{i}{'+' if side > 0 else '-'}", land, np.array([1.0, 0, 0]), across, _HALF, _HALF))
     lines.append('<geom name="face" type="box" pos="0.05 0 0" size="0.05 0.13 0.13" contype="2" conaffinity="2"/>')
     w, x, y, z = turn.as_quat(scalar_first=True)
-    angles = np.pi / 2 + 2 * np.pi / 3 * np.arange(3)
 
     def at(depth: float, radius: float, i: int) -> str:
-        return f"{depth} {radius * np.cos(angles[i]):.17g} {radius * np.sin(angles[i]):.17g}"
+        return f"{depth} {radius * np.cos(ANGLES[i]):.17g} {radius * np.sin(ANGLES[i]):.17g}"
 
     balls = "".join(
         f'<geom name="ball{i}" type="sphere" size="{r}" pos="{at(t.seat, t.radius, i)}" friction="{t.friction}"/>'

@@ -41,6 +41,28 @@ AFTER = 1.0
 """How long a run goes on in its last state [s]."""
 
 
+def connections() -> list[tuple[str, str]]:
+    """Between ``snare``, ``effector`` and ``program``: the source's output, the target's input."""
+    links: list[tuple[str, str]] = []
+    for ours, theirs in (("carriage", "effector"), ("pin", "pin")):
+        links += [(f"effector.{name.format(ours)}", f"snare.{name.format(theirs)}") for name in _FRAME]
+        links += [
+            (f"snare.{kind}.{theirs}.{axis}", f"effector.{kind}.{ours}.{axis}")
+            for kind in ("impulse", "angular_impulse")
+            for axis in "xyz"
+        ]
+    links += [(f"program.{name}", f"effector.{name}") for name in ("speed", "motor", "brake", "latch", "servo")]
+    links += [("program.rate.ring", "snare.rate.ring")]
+    links += [(f"snare.{name}", f"program.{name}") for name in ("angle.ring", "torque.ring")]
+    links += [("snare.touching", "program.cables_touching")]
+    links += [
+        (f"effector.{name}", f"program.{name}")
+        for name in ("travel", "rate", "gap", "force.motor", "force.wrist.x", "force.wrist.y", "force.wrist.z",
+                     "switches", "closed", "enclosed", "touching")
+    ]  # fmt: skip
+    return links
+
+
 def whole_system(
     start: Setting, passive: Passive, snare: SnareParameters, docking: DockingParameters, table: StateTable | None,
     own_step: float,
@@ -63,24 +85,7 @@ def whole_system(
         "effector": EndEffectorParticipant(arm, t, drive, CAPTURE_POSE, start.rates, total, docking, snare, values),
         "program": ControlProgram(table),
     }
-    links = []
-    for ours, theirs in (("carriage", "effector"), ("pin", "pin")):
-        links += [(f"effector.{name.format(ours)}", f"snare.{name.format(theirs)}") for name in _FRAME]
-        links += [
-            (f"snare.{kind}.{theirs}.{axis}", f"effector.{kind}.{ours}.{axis}")
-            for kind in ("impulse", "angular_impulse")
-            for axis in "xyz"
-        ]
-    links += [(f"program.{name}", f"effector.{name}") for name in ("speed", "motor", "brake", "latch", "servo")]
-    links += [("program.rate.ring", "snare.rate.ring")]
-    links += [(f"snare.{name}", f"program.{name}") for name in ("angle.ring", "torque.ring")]
-    links += [("snare.touching", "program.cables_touching")]
-    links += [
-        (f"effector.{name}", f"program.{name}")
-        for name in ("travel", "rate", "gap", "force.motor", "force.wrist.x", "force.wrist.y", "force.wrist.z",
-                     "switches", "closed", "enclosed", "touching")
-    ]  # fmt: skip
-    return System(participants, links, name=start.case)
+    return System(participants, connections(), name=start.case)
 
 
 @dataclass(frozen=True)

@@ -25,8 +25,8 @@ results and in reports. This page is written from the code by `python docs/make_
   own axes, about the origin of its frame.
 - In a capture (`system = "snare_capture"`): what the cables meet acts at the *pin*, what they are made of at the
   *cables*, what holds the target back at the *target*. All are simulated with the snare itself.
-- In a docking test (`system = "docking"`): at the *carriage*, at all *grooves*, at one *groove* (`groove1` to `groove3`) or
-  at the *latches*. All are simulated with the docking itself; a grid is where an amplitude is tried.
+- In a docking test (`system = "docking"`): at the *carriage*, at all *grooves*, at one *groove* (`groove1` to
+  `groove3`) or at the *latches*. All are simulated with the docking itself; a grid is where an amplitude is tried.
 - Units are those of a rotary joint. For a sliding joint read N for N·m, and m for rad. U is the channel's own unit.
 - `q`, `qd` and `qdd` are the joint's position, speed and acceleration. `load` is the rigid-body torque at the joint,
   from the model. `sgn` is the direction of motion, smoothed over 0.1 % of the joint's peak speed.

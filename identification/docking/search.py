@@ -79,9 +79,9 @@ def search(
         slots = made.answer()
         if not slots:
             break
-        # One at a time: what bends with its own size leaves a rest in proportion to nothing, which others would take up.
+        # One at a time: what is not in proportion to its size leaves a rest, which others would take up.
         best = max(slots, key=lambda slot: slot.gain)
-        placed, values = _started(weighed, made.members([s.taken for s in slots]), best)
+        placed, values = _started(weighed, made.members([best.taken]), best)
         names.append(_name(weighed, best))
         at = here.at.with_effects([placed], values)
         progress(f"fitting {placed.effect.name} at {placed.at}")

@@ -133,7 +133,7 @@ def weigh(
         ]
         own = hangs(records, linear, could, scale)
         noises = tuple(
-            learn([r[:, c] for r in linear.residuals], could[c], [row[c] for row in own], freely=bool(named))
+            learn([r[:, c] for r in linear.residuals], could[c], [row[c] for row in own])
             for c in range(len(scale))
         )
     else:
@@ -187,7 +187,8 @@ def hangs(
 
     While balls touch and slide no law of contact tells the load to the window: a channel may then be off, as a joint
     near rest may hold any torque, by what nothing explains there, in the RMS over `ABOUT` windows either way, and by
-    `LEAST_LEVEL` of its size at least, a vector's of the largest of its axes. Where a channel changes fast it may be off by more, which the noise learns.
+    `LEAST_LEVEL` of its size at least, a vector's of the largest of its axes. A motor whose carriage stands may hold
+    anything up to its friction. Where a channel changes fast it may be off by more, which the noise learns.
 
     Parameters
     ----------
@@ -204,7 +205,8 @@ def hangs(
     loose = [touching(r, x) for r, x in zip(records, seen, strict=True)]
     found: tuple[list[Run], ...] = tuple([] for _ in records)
     for c, name in enumerate(records[0].channels):
-        rows = [k | (standing(r) & (name == "tau.carriage")) for r, k in zip(records, loose, strict=True)]
+        driven = name.startswith(("tau.", "tension."))
+        rows = [(standing(r) & (name == "tau.carriage")) if driven else k for r, k in zip(records, loose, strict=True)]
         left = np.concatenate([r[k, c] for r, k in zip(linear.residuals, rows, strict=True)])
         columns = np.concatenate([x[k] for x, k in zip(could[c], rows, strict=True)])
         if len(left) > 2 * columns.shape[1]:
