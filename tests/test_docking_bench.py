@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from snarelab.errors import InputError
 from snarelab.models.docking.bench import SEEN, DockingBench, Motion
-from snarelab.models.docking.bench_setup import GROOVES, BenchSetup, docking_effects, read_bench
+from snarelab.models.docking.bench_setup import GROOVES, Bench, BenchSetup, docking_effects, read_bench
 from snarelab.models.docking.closed_forms import seated_stiffness
 from snarelab.models.docking.parameters import DockingParameters
 from snarelab.models.model_file import load_model
@@ -53,9 +53,9 @@ def at(seen, times, name, when):
 def test_a_free_carriage_feels_its_friction_and_its_mass(bench):
     """Nothing touches: level + viscous * speed, and (m + J (2 pi/l)^2) times the acceleration."""
     given = motion([0, 1, 3, 4], [0.0, 0.0, 0.02, 0.02], start=(-0.13, 0.0, 0.0), latch=(1e9, 2e9))
-    seen, times = run(
-        bench, {"carriage_friction.carriage.level": 30.0, "carriage_friction.carriage.viscous": 500.0}, given
-    )
+    far = BenchSetup(ABSENT, Bench(knob=0.5))
+    values = {"carriage_friction.carriage.level": 30.0, "carriage_friction.carriage.viscous": 500.0}
+    seen, times = run(bench, values, given, far)
     p = DockingParameters()
     mass = p.carriage_mass + p.rotor * (2 * np.pi / p.lead) ** 2
     speed, push = 1.5 * 0.01, 6 * 0.02 / 2**2  # of the cubic: in its middle, and at its start

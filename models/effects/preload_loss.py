@@ -22,7 +22,7 @@ EFFECT = Effect(
     source="Maxwell (1867); VDI 2230-1 (2015), embedding",
     parameters=(
         Parameter("share", "1", "of the preload that is lost in the end", low=0.0, high=0.95, grid=(0.15, 0.5)),
-        Parameter("time", "s", "relaxation time", zero=5.0, low=0.2, high=1e3, grid=(1.0, 5.0, 25.0)),
+        Parameter("time", "s", "relaxation time", zero=5.0, low=0.5, high=1e3, grid=(1.0, 5.0, 25.0)),
     ),
     law=_law,
     experiment="push the target off against the closed {at} at once and again later: it lifts at less force",
