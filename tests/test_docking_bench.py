@@ -19,6 +19,7 @@ SETUP = BenchSetup(ABSENT)
 PRELOAD, BACK, OFF = 0.0573, 0.024, 0.0185
 """Travels [m]: preloaded, unloaded again, and pushed off against the latches."""
 LATCH = (5.0, 6.0)
+"""At a window's end: what is drawn together there counts once."""
 
 
 @pytest.fixture(scope="module")
@@ -140,7 +141,7 @@ def test_a_start_that_is_turned_keeps_its_turn(bench):
     """Free in its mount nothing moves, whichever way it faces."""
     turn = Rotation.from_rotvec([0.2, -0.1, 0.3]).as_quat(scalar_first=True)
     given = dataclasses.replace(motion([0, 1], [0.0, 0.0], start=(-0.3, 0.01, 0.0), latch=(1e9, 2e9)), quaternion=turn)
-    seen, _ = run(bench, {}, given)
+    seen, _ = run(bench, {}, given, BenchSetup(ABSENT, Bench(knob=2.0)))
     assert np.abs(seen["turn.effector.z"]).max() < 1e-9
     assert np.abs(seen["pos.effector.y"] - 0.01).max() < 1e-9
 

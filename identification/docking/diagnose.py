@@ -56,7 +56,7 @@ def diagnose_dockings(
     rejected = {n.placed.key: n for n in best.rejected}
     last = best
     for _ in range(SECOND_CHOICES):
-        if not last.rejected:
+        if best.names or not last.rejected:
             break
         progress("looking for what else could explain what the held-out recording did not confirm")
         again = search(runs, train, model, barred=rejected, progress=progress)

@@ -130,16 +130,11 @@ class DockingBench:
         for k, (a, b) in enumerate(zip(motion.times[:-1], motion.times[1:], strict=True)):
             moved = [a, motion.travel[k], motion.rate[k], square[k], cube[k], begun, closed]
             u = np.concatenate([moved, held, tail])
-            for end in (begun, b):
-                if end == begun:
-                    if not a <= begun < b:
-                        continue
-                    if begun > a:
-                        state, size = self._go(a, state, begun, u, size)
-                    held = self._balls(state[None], u)[0][0, :, 0]
-                    u[len(_GIVEN) : len(_GIVEN) + 3 * BALLS] = held
-                else:
-                    state, size = self._go(max(a, begun) if a <= begun < b else a, state, b, u, size)
+            if a <= begun < b:
+                if begun > a:
+                    state, size = self._go(a, state, begun, u, size)
+                u[len(_GIVEN) : len(_GIVEN) + 3 * BALLS] = held = self._balls(state[None], u)[0][0, :, 0]
+            state, size = self._go(begun if a <= begun < b else a, state, b, u, size)
             seen[k + 1] = state[-len(SEEN) :]
         return np.diff(seen, axis=0) / np.diff(motion.times)[:, None]
 

@@ -1,0 +1,139 @@
+"""Docking recordings: what is read of them, what is refused, and what a diagnosis says of one by another engine."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from bench.docking_concealed import EFFECTS, program, run_case
+from snarelab.errors import InputError
+from snarelab.identification.diagnose import diagnose
+from snarelab.identification.docking.recording import EVERY, load_records
+from snarelab.identification.docking.runs import SHIFTS, Runs
+from snarelab.identification.simulate import simulate
+from snarelab.models.docking.bench import NEVER
+from snarelab.models.model_file import load_model
+
+RATE = 200.0
+
+
+@pytest.fixture
+def model(tmp_path):
+    path = tmp_path / "docking.toml"
+    path.write_text(
+        'system = "docking"\neffects = ["carriage_friction", "docking_friction"]\n[docking]\nrestitution = 0.8\nknob = 0.6\n'
+        '[parameters]\n"carriage_friction.carriage.level" = 20.0\n"carriage_friction.carriage.viscous" = 200.0\n'
+        '"docking_friction.grooves.coefficient" = 0.15\n'
+    )
+    return load_model(path)
+
+
+def told(duration=3.0, **changed):
+    """A carriage that moves at 5 mm/s from 0.5 s on, the end effector at rest before the grooves."""
+    time = np.arange(0.0, duration, 1 / RATE)
+    columns = {"time": time + 7.0, "q.carriage [m]": 0.005 * np.clip(time - 0.5, 0, None), "tau.carriage [N]": 0 * time}
+    columns |= {f"pos.effector.{a}": np.full(len(time), x) for a, x in zip("xyz", (-0.13, 0.002, 0.0), strict=True)}
+    columns |= {f"quat.effector.{a}": np.full(len(time), float(a == "w")) for a in "wxyz"}
+    columns |= {"force.target.x": 0 * time, "closed.latches": np.clip((time - 1.0) / 0.8, 0, 1)}
+    return columns | changed
+
+
+def written(tmp_path, columns, name="a.csv"):
+    pd.DataFrame(columns).to_csv(tmp_path / name, index=False)
+    return tmp_path / name
+
+
+def test_a_recording_gives_the_travel_the_latches_and_the_start(tmp_path, model):
+    (record,) = load_records(model, [written(tmp_path, told())])
+    m = record.motion
+    assert record.channels == (
+        *(f"pos.effector.{a}" for a in "xyz"), *(f"turn.effector.{a}" for a in "xyz"), "force.target.x", "tau.carriage"
+    )  # fmt: skip
+    assert record.zero == 7.0
+    np.testing.assert_allclose(np.interp([0.3, 2.0], m.times, m.travel), [0.0, 0.0075], atol=1e-7)
+    np.testing.assert_allclose(np.interp([0.3, 2.0], m.times, m.rate), [0.0, 0.005], atol=1e-6)
+    np.testing.assert_allclose(m.latch, (1.0, 1.8), atol=2e-3)
+    np.testing.assert_allclose(m.place, [-0.13, 0.002, 0.0])
+    assert record.measured.shape == (len(record.times) - 1, 8)
+    assert len(m.times) - 1 == 2 * (len(record.times) - 1)
+
+
+def test_means_are_over_their_windows(tmp_path, model):
+    time = np.arange(0.0, 3.0, 1 / RATE)
+    (record,) = load_records(model, [written(tmp_path, told(**{"tau.carriage [N]": 10 * time}))])
+    # Samples of a window are those after its begin, up to its end.
+    middles = EVERY * (np.arange(len(record.times) - 1) + 0.5) + 0.5 / RATE
+    np.testing.assert_allclose(record.measured[:, record.channels.index("tau.carriage")], 10 * middles, atol=1e-9)
+
+
+def test_latches_that_were_not_recorded_stay_open(tmp_path, model):
+    columns = told()
+    del columns["closed.latches"]
+    (record,) = load_records(model, [written(tmp_path, columns)])
+    assert record.motion.latch[0] == NEVER
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"q.carriage [m]": None}, r"q\.carriage is missing; a docking test is told by"),
+        ({"quat.effector.w": None}, r"quat\.effector\.w is missing"),
+        ({"closed.latches": np.linspace(1, 0, 600)}, r"closed\.latches must rise from 0 \(open\) to 1"),
+        ({"closed.latches": np.linspace(0.0, 0.5, 600)}, r"closed\.latches goes from 0 to 0\.5; record all"),
+    ],
+)
+def test_what_is_missing_or_cannot_be_is_refused(tmp_path, model, changed, words):
+    columns = {k: v for k, v in (told() | changed).items() if v is not None}
+    with pytest.raises(InputError, match=words):
+        load_records(model, [written(tmp_path, columns)])
+
+
+def test_too_short_too_slow_and_unlike_recordings_are_refused(tmp_path, model):
+    with pytest.raises(InputError, match=r"it lasts 0\.995 s; give 2 s"):
+        load_records(model, [written(tmp_path, told(1.0))])
+    with pytest.raises(InputError, match=r"a sample every 0\.05 s; give 80 Hz"):
+        load_records(model, [written(tmp_path, {k: v[::10] for k, v in told().items()})])
+    other = told()
+    del other["tau.carriage [N]"]
+    paths = [written(tmp_path, told()), written(tmp_path, other, "b.csv")]
+    with pytest.raises(InputError, match=r"tau\.carriage is not in all recordings"):
+        load_records(model, paths)
+    gap = np.where(np.abs(np.arange(600) - 300) < 20, np.nan, told()["q.carriage [m]"])
+    with pytest.raises(InputError, match=r"q\.carriage has a gap at 1\.4"):
+        load_records(model, [written(tmp_path, told(**{"q.carriage [m]": gap}), "c.csv")])
+    apart = written(tmp_path, told(4.0), "d.csv")
+    with pytest.raises(InputError, match="jobs = 2; only captures"):
+        diagnose(model, [paths[0]], apart, jobs=2)
+
+
+def test_a_simulation_follows_the_test_and_is_remembered(tmp_path, model):
+    path = written(tmp_path, told())
+    seen = simulate(model, path)
+    assert seen["tau.carriage"].sel(time=9.0, method="nearest") == pytest.approx(20.0 + 200.0 * 0.005, rel=1e-3)
+    records = load_records(model, [path])
+    runs = Runs(model.tree.setup, records)
+    once = runs(0, dict(model.values), np.zeros(len(SHIFTS)))
+    again = runs(0, dict(model.values), np.zeros(len(SHIFTS)))
+    assert runs.count == 1
+    np.testing.assert_array_equal(once, again)
+    moved = runs(0, dict(model.values), np.eye(len(SHIFTS))[SHIFTS.index("register.y")])
+    # The pose is as it was measured: its registration does not move what nothing touches.
+    np.testing.assert_allclose(moved[:, 1], once[:, 1], atol=1e-9)
+
+
+def test_programs_of_the_proof_preload_and_push_off():
+    travel, duration, (begun, closed) = program(np.random.default_rng(3))
+    at = np.array([travel(t) for t in np.arange(0.0, duration, 0.01)])
+    assert at[0] == pytest.approx(0.004)
+    assert 0.0573 <= at.max() <= 0.0582
+    assert begun < closed < duration
+    assert np.abs(np.diff(at)).max() < 1.6e-4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("effect", ["docking_friction", "clean"])
+def test_an_effect_concealed_in_mujoco_is_named_alone(tmp_path, effect):
+    row = run_case(effect, 1, tmp_path)
+    assert effect in EFFECTS
+    assert row["right"], row
+    if effect != "clean":
+        assert row["found"]["coefficient"] == pytest.approx(row["truth"]["coefficient"], rel=0.1)
