@@ -64,7 +64,7 @@ def truth_of(effect: str, rng: np.random.Generator) -> tuple[Truth, dict[str, fl
         size = float(10 ** rng.uniform(-4.0, -3.0))
         return Truth(play=size), {"play": size}, "latches"
     if effect == "preload_loss":
-        share, fades = float(rng.uniform(0.08, 0.4)), float(10 ** rng.uniform(0.0, 1.2))
+        share, fades = float(rng.uniform(0.3, 0.8)), float(10 ** rng.uniform(0.0, 1.2))
         return Truth(lost=share, lost_time=fades), {"share": share, "time": fades}, "latches"
     return Truth(), {}, ""
 
