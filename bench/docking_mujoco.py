@@ -155,12 +155,15 @@ def simulate(
                 pulls[i] = grip[0]
                 on -= grip
                 about -= np.cross(data.site_xpos[b], grip)
-        for kept, value in (
-            (seen.time, time), (seen.travel, float(data.qpos[s_at])), (seen.motor, float(data.qfrc_actuator[s_dof])),
-            (seen.place, data.xpos[body].copy()), (seen.quaternion, data.xquat[body].copy()), (seen.force, on),
-            (seen.torque, about), (seen.pull, pulls), (seen.closed, share),
-        ):  # fmt: skip
-            kept.append(value)
+        seen.time.append(time)
+        seen.travel.append(float(data.qpos[s_at]))
+        seen.motor.append(float(data.qfrc_actuator[s_dof]))
+        seen.place.append(data.xpos[body].copy())
+        seen.quaternion.append(data.xquat[body].copy())
+        seen.force.append(on)
+        seen.torque.append(about)
+        seen.pull.append(pulls)
+        seen.closed.append(share)
 
     for k in range(round(duration / step)):
         time = k * step
@@ -215,7 +218,7 @@ def push(truth: Truth, force: float, duration: float, place: Array, turn: Rotati
         rows[k] = *data.xpos[body], *data.xquat[body], *six[3:]
     mj.mj_forward(model, data)
     seats = np.array([[0.0, truth.radius * np.cos(a), truth.radius * np.sin(a)] for a in ANGLES])
-    time = step * np.arange(1, n + 1)
+    time = np.asarray(step * np.arange(1, n + 1), float)
     impulse = truth.mass * rows[:, 7:] - np.outer(time, [force, 0.0, 0.0])
     off = np.linalg.norm(data.site_xpos[balls] - seats, axis=1)
     return Pushed(time, rows[:, :3], rows[:, 3:7], rows[:, 7:], impulse, off)

@@ -1,5 +1,7 @@
 """Docking recordings: what is read of them, what is refused, and what a diagnosis says of one by another engine."""
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -27,14 +29,14 @@ def model(tmp_path):
     return load_model(path)
 
 
-def told(duration=3.0, **changed):
+def told(duration: float = 3.0, changed: dict[str, Any] | None = None) -> dict[str, Any]:
     """A carriage that moves at 5 mm/s from 0.5 s on, the end effector at rest before the grooves."""
     time = np.arange(0.0, duration, 1 / RATE)
     columns = {"time": time + 7.0, "q.carriage [m]": 0.005 * np.clip(time - 0.5, 0, None), "tau.carriage [N]": 0 * time}
     columns |= {f"pos.effector.{a}": np.full(len(time), x) for a, x in zip("xyz", (-0.13, 0.002, 0.0), strict=True)}
     columns |= {f"quat.effector.{a}": np.full(len(time), float(a == "w")) for a in "wxyz"}
     columns |= {"force.target.x": 0 * time, "closed.latches": np.clip((time - 1.0) / 0.8, 0, 1)}
-    return columns | changed
+    return columns | (changed or {})
 
 
 def written(tmp_path, columns, name="a.csv"):
@@ -59,7 +61,7 @@ def test_a_recording_gives_the_travel_the_latches_and_the_start(tmp_path, model)
 
 def test_means_are_over_their_windows(tmp_path, model):
     time = np.arange(0.0, 3.0, 1 / RATE)
-    (record,) = load_records(model, [written(tmp_path, told(**{"tau.carriage [N]": 10 * time}))])
+    (record,) = load_records(model, [written(tmp_path, told(changed={"tau.carriage [N]": 10 * time}))])
     # Samples of a window are those after its begin, up to its end.
     middles = EVERY * (np.arange(len(record.times) - 1) + 0.5) + 0.5 / RATE
     np.testing.assert_allclose(record.measured[:, record.channels.index("tau.carriage")], 10 * middles, atol=1e-9)
@@ -99,7 +101,7 @@ def test_too_short_too_slow_and_unlike_recordings_are_refused(tmp_path, model):
         load_records(model, paths)
     gap = np.where(np.abs(np.arange(600) - 300) < 20, np.nan, told()["q.carriage [m]"])
     with pytest.raises(InputError, match=r"q\.carriage has a gap at 1\.4"):
-        load_records(model, [written(tmp_path, told(**{"q.carriage [m]": gap}), "c.csv")])
+        load_records(model, [written(tmp_path, told(changed={"q.carriage [m]": gap}), "c.csv")])
     apart = written(tmp_path, told(4.0), "d.csv")
     with pytest.raises(InputError, match="jobs = 2; only captures"):
         diagnose(model, [paths[0]], apart, jobs=2)
@@ -116,6 +118,8 @@ def test_a_simulation_follows_the_test_and_is_remembered(tmp_path, model):
     assert runs.count == 1
     np.testing.assert_array_equal(once, again)
     moved = runs(0, dict(model.values), np.eye(len(SHIFTS))[SHIFTS.index("register.y")])
+    assert once is not None
+    assert moved is not None
     # The pose is as it was measured: its registration does not move what nothing touches.
     np.testing.assert_allclose(moved[:, 1], once[:, 1], atol=1e-9)
 

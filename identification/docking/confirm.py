@@ -94,8 +94,8 @@ def _foretold(
     both = Linear(here.at, (*here.residuals, *there.residuals), (*here.columns, *there.columns))
     evidence = weigh(runs, [*train, *held], model, both, known, search=False).evidence
     n = len(train)
-    known = Projected(evidence, range(n)).posterior(evidence.n_always)
-    on = Projected(evidence, range(n, n + len(held)), None, known)
+    learnt = Projected(evidence, range(n)).posterior(evidence.n_always)
+    on = Projected(evidence, range(n, n + len(held)), None, learnt)
     always = on.beside([])
     count = max(round(BLOCK / EVERY), 1)
     parts = []

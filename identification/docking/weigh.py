@@ -133,8 +133,7 @@ def weigh(
         ]
         own = hangs(records, linear, could, scale)
         noises = tuple(
-            learn([r[:, c] for r in linear.residuals], could[c], [row[c] for row in own])
-            for c in range(len(scale))
+            learn([r[:, c] for r in linear.residuals], could[c], [row[c] for row in own]) for c in range(len(scale))
         )
     else:
         own, noises = known.hangs, known.noises
