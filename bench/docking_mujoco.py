@@ -9,7 +9,7 @@ actuator for its preload. The carriage has its own mass, dry friction and positi
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import mujoco
@@ -186,42 +186,6 @@ def simulate(
         if (k + 1) % EVERY == 0:
             look(float(data.time))
     return seen
-
-
-@dataclass(frozen=True)
-class Pushed:
-    """A body pushed into the grooves: time (n,) [s], origin (n, 3) [m], quaternion (n, 4), velocity (n, 3) [m/s]; the
-    grooves' impulse on it since the start (n, 3) [N·s]; and how far each ball is from its seat in the end (3,) [m]."""
-
-    time: Array
-    place: Array
-    quaternion: Array
-    velocity: Array
-    impulse: Array
-    off: Array
-
-
-def push(truth: Truth, force: float, duration: float, place: Array, turn: Rotation, step: float = 1e-4) -> Pushed:
-    """Push a free body of ``truth``'s mass along the axis by a force [N]; carriage, cables and mount are idle."""
-    loose = replace(truth, mount=(0.0, 0.0), turning=(0.0, 0.0), knob=5.0, ring=1.0, slack=100.0, dry=0.0, front=-1.0)
-    model = mj.MjModel.from_xml_string(mjcf(loose, place, turn, 0.0, step))
-    harden(model, loose)
-    data = mj.MjData(model)
-    body = mj.mj_name2id(model, mj.mjtObj.mjOBJ_BODY, "effector")
-    balls = [mj.mj_name2id(model, mj.mjtObj.mjOBJ_SITE, f"ball{i}") for i in range(3)]
-    data.xfrc_applied[body, 0] = force
-    n = round(duration / step)
-    rows, six = np.empty((n, 10)), np.empty(6)
-    for k in range(n):
-        mj.mj_step(model, data)
-        mj.mj_objectVelocity(model, data, mj.mjtObj.mjOBJ_XBODY, body, six, 0)
-        rows[k] = *data.xpos[body], *data.xquat[body], *six[3:]
-    mj.mj_forward(model, data)
-    seats = np.array([[0.0, truth.radius * np.cos(a), truth.radius * np.sin(a)] for a in ANGLES])
-    time = np.asarray(step * np.arange(1, n + 1), float)
-    impulse = truth.mass * rows[:, 7:] - np.outer(time, [force, 0.0, 0.0])
-    off = np.linalg.norm(data.site_xpos[balls] - seats, axis=1)
-    return Pushed(time, rows[:, :3], rows[:, 3:7], rows[:, 7:], impulse, off)
 
 
 def harden(model: Any, truth: Truth) -> None:

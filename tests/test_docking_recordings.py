@@ -22,7 +22,8 @@ RATE = 200.0
 def model(tmp_path):
     path = tmp_path / "docking.toml"
     path.write_text(
-        'system = "docking"\neffects = ["carriage_friction", "docking_friction"]\n[docking]\nrestitution = 0.8\nknob = 0.6\n'
+        'system = "docking"\neffects = ["carriage_friction", "docking_friction"]\n'
+        "[docking]\nrestitution = 0.8\nknob = 0.6\n"
         '[parameters]\n"carriage_friction.carriage.level" = 20.0\n"carriage_friction.carriage.viscous" = 200.0\n'
         '"docking_friction.grooves.coefficient" = 0.15\n'
     )
