@@ -1,6 +1,6 @@
 """Seat or jam from random starts, by our docking and by MuJoCo's: ``python bench/docking_seats.py --count 50``.
 
-A body of 90 kg is pushed along the axis by 20 N from starts inside the grooves' mouth, under friction from none to 0.6.
+A body of 90 kg is pushed along the axis by 20 N from starts inside the grooves' mouth, under friction from 0.05 to 0.6.
 The limit of jamming (0.318 at 45°) is a limit for each contact that may be last; starts whose friction is within `BAND`
 of it are left out: there the law of sliding decides. Printed: in how many both engines say the same, and of those that
 seat, the seated pose and the impulse. All is in ``build/bench/docking_seats.json``.
@@ -30,7 +30,7 @@ from snarelab.models.docking.parameters import DockingParameters
 Array = NDArray[np.float64]
 
 ROOT = Path(__file__).resolve().parents[1]
-MASS, INERTIA, FORCE, DURATION = 90.0, (25.0, 60.0, 60.0), 20.0, 5.0
+MASS, INERTIA, FORCE, DURATION = 90.0, (25.0, 60.0, 60.0), 20.0, 25.0
 BAND = 0.06
 """Of friction about the limit of jamming."""
 SEATED = 1e-4
@@ -78,7 +78,7 @@ def start(rng: np.random.Generator) -> tuple[float, Array, Rotation]:
     """Friction outside the band, place [m] and turn: inside the mouth, 5 to 12 mm before the seat."""
     limit = jamming_friction(P.flank)
     while True:
-        friction = float(rng.uniform(0.0, 0.6))
+        friction = float(rng.uniform(0.05, 0.6))
         if abs(friction - limit) > BAND:
             break
     turn = Rotation.from_rotvec(np.deg2rad([*rng.uniform(-1.0, 1.0, 1), *rng.uniform(-1.5, 1.5, 2)]))

@@ -80,7 +80,7 @@ def search(
         if not slots:
             break
         # One at a time: what is not in proportion to its size leaves a rest, which others would take up.
-        best = max(slots, key=lambda slot: slot.gain)
+        best = _first(made, slots)
         placed, values = _started(weighed, made.members([best.taken]), best)
         names.append(_name(weighed, best))
         at = here.at.with_effects([placed], values)
@@ -90,6 +90,15 @@ def search(
     if not names:
         here = fit(runs, numbers, model, here.at, covariances(weighed), shifted)
     return Found(tuple(names), first, here, weighed, candidates)
+
+
+def _first(made: Search, slots: Sequence[Slot]) -> Slot:
+    """The name to take first: the likeliest by itself, where one by itself is likelier than none; else the one that the
+    best set gains most by."""
+    odds = made.scan([]).odds.copy()
+    odds[sorted(made.barred)] = -np.inf
+    h = int(np.argmax(odds))
+    return made.slot([made.take([], h)], 0) if odds[h] > 0 else max(slots, key=lambda slot: slot.gain)
 
 
 def _started(weighed: Weighed, members: Members, slot: Slot) -> tuple[Placed, dict[str, float]]:
