@@ -184,7 +184,7 @@ def loose_latch(s, play):
     """What a spring without play pulls with, less one on the far side of a sphere of free travel."""
     size = np.linalg.norm(s["drawn"], axis=1, keepdims=True)
     beyond = np.clip(size - play / 2, 0, None)
-    return 3.0 * s["drawn"] * (1 - beyond / size)
+    return 3e3 * s["drawn"] * (1 - beyond / size)
 
 
 def maxwell(s, share, relaxes):

@@ -68,7 +68,7 @@ def docking():
         "presliding": np.stack([x[0], y[0]], axis=1),
         "across": x[0],
         "drawn": hang_point(TIME)[0],
-        "stiffness": np.full(TIME.size, 3.0),
+        "stiffness": np.full(TIME.size, 3e3),
         "preload": np.full(TIME.size, 10.0),
         "since": TIME - 1.0,
     }
