@@ -21,8 +21,7 @@ EFFECT = Effect(
     source="Hale and Slocum (2001), errors of kinematic couplings",
     parameters=(
         Parameter(
-            "offset", "m", "shift along the circle of the balls, positive with the turn from y to z", low=-0.02,
-            high=0.02, grid=(-2e-4, 2e-4),
+            "offset", "m", "shift along the circle of the balls, positive with the turn from y to z", grid=(-2e-4, 2e-4),
         ),
     ),
     law=_law,
