@@ -21,7 +21,8 @@ EFFECT = Effect(
     source="Hale and Slocum (2001), errors of kinematic couplings",
     parameters=(
         Parameter(
-            "offset", "m", "shift along the circle of the balls, positive with the turn from y to z", grid=(-2e-4, 2e-4),
+            "offset", "m", "shift along the circle of the balls, positive with the turn from y to z",
+            grid=(-2e-4, 2e-4),
         ),
     ),
     law=_law,
