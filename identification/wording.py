@@ -2,8 +2,12 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..models.model import Placed
 from .diagnosis import ChannelFit, Finding
+from .nuisance.noise import Noise
 from .report.words import chance, words
 
 LIKELY = 0.5
@@ -46,6 +50,19 @@ def experiment_sentence(placed: Placed, rival: Placed) -> str:
     if other and other != own:
         return other.format(at=joint)
     return own.format(at=placed.at.removeprefix("tau.").removeprefix("q."))
+
+
+def noise_words(channel: str, unit: str, noise: Noise, encoders: Sequence[NDArray[np.float64]]) -> str:
+    """What a channel's noise is made of, with sizes and times."""
+    u = unit.replace("*", "·")
+    heard = float(np.sqrt(np.mean(np.concatenate(encoders) ** 2)))
+    parts = [
+        f"{noise.white:.2g} {u} from sample to sample",
+        f"{noise.coloured:.2g} {u} over {noise.coloured_time:.2g} s",
+        f"a wander of {noise.wander:.2g} {u} over {noise.wander_time:.2g} s",
+        f"{heard:.2g} {u} of the encoders",
+    ]
+    return f"noise of {channel}: {listed(parts)}"
 
 
 def verdict_sentence(findings: Sequence[Finding], fit: Sequence[ChannelFit], remainder: str) -> str:

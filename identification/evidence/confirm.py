@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from ...models.model import Model
 from ..deciding import BLOCK, GATE
 from ..fitting.experiment import Experiment, Scales
-from ..fitting.fit import Fit, channel_rms, fit
-from ..search.forward import carry
-from ..search.rest import fitted
+from ..fitting.fit import Fit, channel_rms
+from ..search.refit import without
 from .arm import weigh
 from .evidence import Projected
 from .found import Found, Name, Remainder
@@ -158,12 +157,11 @@ def _missed(
 ) -> Missed:
     """Take one effect out of a fit, and fit the rest again."""
     key = name.placed.key
-    assembly = final.assembly.keep([p for p in final.assembly.placed if p.key != key], final.theta)
-    rest = fit(assembly, fitted(assembly, train), start=carry(final, assembly), multi_start=False)
+    rest = without(final, [key], train)
     other = foretold(_without(model, key), rest, found, train, held, scales)
     c = list(name.channels)
     with_it, measured = channel_rms(final.assembly, held, final.theta)
-    rms, _ = channel_rms(assembly, held, rest.theta)
+    rms, _ = channel_rms(rest.assembly, held, rest.theta)
     worst = c[int(np.argmax(rms[c] / measured[c] - with_it[c] / measured[c]))]
     trial = float(with_it[worst] / measured[worst]), float(rms[worst] / measured[worst])
     return Missed(whole.density - other.density, scatter(0.5 * (other.blocks - whole.blocks)), trial, rest)

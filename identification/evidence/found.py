@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from ...models.model import Model, Placed
 from ..fitting.experiment import Experiment
 from ..fitting.fit import Fit
-from ..search.choice import RivalOdds
 from .arm import Weighed
+from .rival import RivalOdds
 from .search import Search, Slot
 
 Array = NDArray[np.float64]
@@ -64,6 +64,9 @@ class Found:
     fit: Fit
     names: tuple[Name, ...]
     trials: tuple[Trial, ...]
+    """Before anything was found ..."""
+    closing: tuple[Trial, ...]
+    """... and beside all that was."""
     opening: Weighed
     """The recordings under the first fit ..."""
     weighed: Weighed

@@ -12,13 +12,13 @@ from ..fitting.base_parameters import BaseParameters
 from ..fitting.experiment import Experiment, Scales
 from ..fitting.fit import Fit, fit
 from ..search.candidates import free_parameters
-from ..search.choice import RivalOdds
 from ..search.closed_loop import planned
-from ..search.forward import assemble, refitted
+from ..search.refit import assemble, refitted
 from ..search.rest import fitted
 from .arm import Weighed, weigh
 from .found import Found, Name, Trial
 from .members import Members, log_bayes
+from .rival import RivalOdds
 from .search import Search, Slot, Taken
 from .tolerant import searched
 
@@ -98,7 +98,18 @@ def search(
         instruments = planned(found, train, instruments, others=held, driven=DRIVEN)
     assert opening is not None
     return Found(
-        first, model, found, tuple(named), trials, opening, weighed, tuple(slots), made, tuple(instruments), tolerance
+        first,
+        model,
+        found,
+        tuple(named),
+        trials,
+        _trials(made, weighed),
+        opening,
+        weighed,
+        tuple(slots),
+        made,
+        tuple(instruments),
+        tolerance,
     )
 
 

@@ -1,6 +1,5 @@
 """Which effects could be missing, at which places, and the columns each would add to the torque."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, product
 
@@ -83,23 +82,6 @@ def library(model: Model) -> list[Placed]:
             spots = tuple(at for at in other if f"{effect.name}.{other[at]}" not in have)
         found += [Placed(effect, at) for at in spots if f"{effect.name}.{at}" not in have]
     return found
-
-
-def has_whole_law(effects: Sequence[Placed], at: str) -> bool:
-    """Is there a whole friction law among effects at a place, free in every parameter?"""
-    return any(p.effect.name in (SLIDE, "makkar_friction") and p.at == at and not p.hold for p in effects)
-
-
-def refines(model: Model, placed: Placed) -> bool:
-    """Is an effect a curve over the joint's speed, where the model has a whole friction law whose shape it changes?"""
-    curve = placed.effect.name in (*_makkar(), "quadratic_friction")
-    return curve and has_whole_law(model.effects, placed.at)
-
-
-def widens(model: Model, placed: Placed) -> bool:
-    """Is an effect all that the model has at the same link already, and more?"""
-    contained = placed.effect.contains if placed.effect.at == "link" else ()
-    return any(p.at == placed.at and p.effect.name in contained for p in model.effects)
 
 
 def _makkar() -> tuple[str, ...]:
