@@ -7,6 +7,8 @@ stay beside their solver, and what only words or pictures depend on beside those
 # Prior odds, before the recordings are looked at. Shared by the vocabulary's effects, and by the places of each.
 ODDS_OF_NAMES = 0.5
 """That one of the named effects is missing."""
+ELSEWHERE = 0.5
+"""That an effect which is there may be at any of its places, and not at a single one: joints are made alike."""
 ODDS_OF_CURVES = 0.2
 """That something without a name is."""
 

@@ -10,9 +10,9 @@ from encoder_pairs import RATE, motion, placed
 
 from snarelab.identification import answer
 from snarelab.identification.diagnosis import ChannelFit, Finding, Misfit, Step
+from snarelab.identification.evidence.rival import RivalOdds
 from snarelab.identification.fitting.experiment import Experiment
 from snarelab.identification.search.bursts import Bursts
-from snarelab.identification.search.choice import RivalOdds
 from snarelab.identification.search.screening import Nameless
 
 NAMES = ("joint1", "joint2", "joint3")

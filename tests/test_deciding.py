@@ -71,12 +71,13 @@ def odds_of(made: Explained):
     effects = ("viscous_friction",) * 5 + ("coulomb_friction",)
     placed = [Placed(get_effect(n), f"joint{k}") for k, n in enumerate(effects)]
     named = {p.key: (p, [x]) for p, x in zip(placed, made.items, strict=False)}
-    return pool(named, {(0, f"curve {k}"): x for k, x in enumerate(made.items[6:])})
+    return pool(named, {(0, f"curve {k}"): x for k, x in enumerate(made.items[6:])}, ())
 
 
 def test_priors_are_shared_by_effects_and_by_places():
     several = odds_of(white(np.random.default_rng(0), 10, {}))
-    assert [np.exp(h.prior) for h in several] == pytest.approx([0.5 / 2 / 5] * 5 + [0.5 / 2] + [0.2 / 4] * 4)
+    one_of_five = 0.5 / 5 + 0.5 / 25
+    assert [np.exp(h.prior) for h in several] == pytest.approx([0.5 / 2 * one_of_five] * 5 + [0.5 / 2] + [0.2 / 4] * 4)
     assert [h.named for h in several] == [True] * 6 + [False] * 4
 
 

@@ -11,8 +11,7 @@ from proof.judge import judge
 from snarelab.identification.diagnose import diagnose
 from snarelab.identification.fitting.experiment import load_experiments, scales
 from snarelab.identification.search.candidates import candidate_columns, variants
-from snarelab.identification.search.forward import assemble
-from snarelab.identification.search.screening import reliably_positive
+from snarelab.identification.search.refit import assemble
 from snarelab.models.effects import get_effect
 from snarelab.models.model import Placed
 from snarelab.models.model_file import load_model
@@ -118,17 +117,6 @@ def test_twins_share_their_probability_and_the_sensor_is_told_first(tmp_path):
     assert not twin.separable
     assert twin.probability == pytest.approx(bias.probability, rel=0.05)
     assert bias.probability < 0.5 < bias.margin
-
-
-def test_a_block_that_dwarfs_the_others_is_no_reason_to_doubt_them():
-    gains = np.array([62.3, 59.1, 29.6, 18.5, 51.7, 34.5, 55.6, 66.2, 1527.0, 26.9, 45.9, 71.1, 81.5])
-    assert reliably_positive(gains)
-    assert not reliably_positive(-gains)
-    few = np.array([7646.0, 310.0, 947.0, 1851.0, 76.0, 82.0, 73.0])  # 94 % of a residual, of 12 s
-    assert reliably_positive(few)
-    assert not reliably_positive(np.where(few < 80, -few, few))
-    mixed = np.array([-15.6, -17.4, -4.7, 46.6, -29.6, 0.2, -21.1, 67.4, -391.0, 18.8, -28.6, 2.5, 32.4])
-    assert not reliably_positive(mixed)
 
 
 def test_a_candidate_with_fewer_amplitudes_has_its_own_columns():

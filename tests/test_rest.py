@@ -7,8 +7,8 @@ from scipy.signal import lfilter
 
 from snarelab.identification.fitting.experiment import Bridge, load_experiments, scales
 from snarelab.identification.fitting.fit import channel_rms, fit
-from snarelab.identification.search.forward import assemble, refitted
 from snarelab.identification.search.noise import Whitener
+from snarelab.identification.search.refit import assemble, refitted
 from snarelab.identification.search.rest import fitted, without
 from snarelab.models.effects import get_effect
 from snarelab.models.model import Placed

@@ -11,11 +11,8 @@ from snarelab.identification.search.candidates import (
     Variant,
     candidate_columns,
     free_parameters,
-    has_whole_law,
     library,
-    refines,
     variants,
-    widens,
 )
 from snarelab.models.effect import Parameter
 from snarelab.models.effects import effects, get_effect
@@ -159,29 +156,6 @@ def test_slides_of_the_first_joint_are_its_friction():
     names = ("makkar_friction", "viscous_friction", "coulomb_friction", "stribeck_friction")
     assert gone == {f"{name}.joint1" for name in names}
     assert keys(arm(("slide_friction", "joint2"))) == keys(arm())
-
-
-def test_a_whole_law_of_friction_is_free_in_every_parameter():
-    law, held = ("makkar_friction", "joint1"), ("makkar_friction", "joint2", "viscous")
-    model = arm(law, held, ("slide_friction", "joint2", "viscous"), ("viscous_friction", "joint2"))
-    assert has_whole_law(model.effects, "joint1")
-    assert not has_whole_law(model.effects, "joint2")
-    assert has_whole_law(arm(("slide_friction", "joint2")).effects, "joint2")
-    refined = {
-        e.name
-        for e in effects().values()
-        if e.at == "joint" and refines(model, Placed(e, "joint1")) and not refines(model, Placed(e, "joint2"))
-    }
-    shapes = {"makkar_friction", "viscous_friction", "coulomb_friction", "stribeck_friction"}
-    assert refined == shapes | {"quadratic_friction"}
-
-
-def test_an_effect_widens_what_it_contains_at_the_same_link():
-    model = arm(("payload_mass", "link1"), ("joint_elasticity", "joint1"))
-    assert widens(model, Placed(get_effect("inertia_error"), "link1"))
-    assert not widens(model, Placed(get_effect("inertia_error"), "link2"))
-    assert not widens(model, Placed(get_effect("com_offset"), "link1"))
-    assert not widens(model, Placed(get_effect("backlash"), "joint1"))  # a joint's spring is no link's
 
 
 VALUES, COLUMNS = np.array([1.0, 2.0]), np.array([[3.0, 4.0], [5.0, 6.0]])

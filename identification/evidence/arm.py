@@ -110,7 +110,7 @@ def weigh(
     ]
     if not search:
         columns = Columns([len(e.measured) for e in experiments])
-    found_pool = tuple(pool(named, by_words)) if search else ()
+    found_pool = tuple(pool(named, by_words, model.effects)) if search else ()
     items = [item for h in found_pool for item in h.items]
 
     def bare(c: int) -> Noise:

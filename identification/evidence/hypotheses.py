@@ -4,6 +4,7 @@ import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from math import factorial
 
 import casadi as ca
 import numpy as np
@@ -13,7 +14,7 @@ from ...models.effect import Effect
 from ...models.floating.tree import n_carriers
 from ...models.model import Model, Placed
 from ...models.rig.rig import Rig
-from ..deciding import BENDS, ODDS_OF_CURVES, ODDS_OF_NAMES, SLOPE
+from ..deciding import BENDS, ELSEWHERE, ODDS_OF_CURVES, ODDS_OF_NAMES, SLOPE
 from ..fitting.assembly import Assembly, Evaluation
 from ..fitting.experiment import Experiment, Scales
 from ..nuisance.curve import SMALL, Coordinates, family
@@ -84,19 +85,35 @@ def names(along: Along, by_words: Curves, columns: Columns) -> dict[str, tuple[P
     return found
 
 
-def pool(named: Mapping[str, tuple[Placed, list[Item]]], by_words: Curves) -> list[Hypothesis]:
-    """Hypotheses with their prior odds: shared by the effects, and by the places of each (Scott and Berger 2010)."""
-    places: dict[str, int] = {}
-    for p, _ in named.values():
-        places[p.effect.name] = places.get(p.effect.name, 0) + 1
-    found = [
-        Hypothesis(key, True, tuple(items), float(np.log(ODDS_OF_NAMES / len(places) / places[p.effect.name])), p)
-        for key, (p, items) in named.items()
-    ]
+def pool(named: Mapping[str, tuple[Placed, list[Item]]], by_words: Curves, there: Sequence[Placed]) -> list[Hypothesis]:
+    """Hypotheses with their prior odds: shared by the effects, and by the places of each (Scott and Berger 2010).
+
+    What is ``there`` in the model counts as one of an effect's places that has it.
+    """
+    names = [p.effect.name for p, _ in named.values()]
+    odds = ODDS_OF_NAMES / max(len(set(names)), 1)
+    found = []
+    for key, (p, items) in named.items():
+        name = p.effect.name
+        have = sum(x.effect.name == name for x in there)
+        n = have + names.count(name)
+        logs = [log_share_of_places(k, n) for k in range(1, n + 1)]
+        steps = (float(np.log(odds)) + logs[0], *(b - a for a, b in pairwise(logs)))[have:]
+        found.append(Hypothesis(key, True, tuple(items), steps[0], p, name, steps[1:]))
     each = float(np.log(ODDS_OF_CURVES / max(len(by_words), 1)))
     return found + [
         Hypothesis(f"curve.{c}.{words}", False, (item,), each, item.label) for (c, words), item in by_words.items()
     ]
+
+
+def log_share_of_places(k: int, n: int) -> float:
+    """Log probability that an effect which is there is at k certain ones of its n places.
+
+    It is at one alone, each as likely; or every place has it at a rate of which nothing is known but that it is not
+    zero: ∫ρ^k (1 - ρ)^(n-k) dρ = k! (n - k)! / (n + 1)!.
+    """
+    every = factorial(k) * factorial(n - k) / factorial(n + 1) * (n + 1) / n
+    return float(np.log(ELSEWHERE * every + (1 - ELSEWHERE) * (k == 1) / n))
 
 
 def _items(along: Along, p: Placed, by_words: Curves, columns: Columns) -> list[Item]:
