@@ -32,13 +32,21 @@ FACTORS = (0.5, 2.0)
 def move(monkeypatch, name: str, factor: float) -> None:
     """A number times a factor wherever it was imported to."""
     value = getattr(deciding, name)
-    moved: Any = tuple(factor * x for x in value) if isinstance(value, tuple) else factor * value
+    moved: Any = (factor * np.array(value)).tolist() if isinstance(value, tuple) else factor * value
     moved = int(moved) if isinstance(value, int) else moved
     for module in [m for n, m in sys.modules.items() if n.startswith("snarelab.identification")]:
         own = getattr(module, name, None)
         if own is not None:
-            made = np.array(moved) if isinstance(own, np.ndarray) else moved
-            monkeypatch.setattr(module, name, Zone(*moved) if isinstance(own, Zone) else made)
+            monkeypatch.setattr(module, name, _as(own, moved))
+
+
+def _as(own: Any, moved: Any) -> Any:
+    """A number as a module holds it: an array, one zone or several, or as it is."""
+    if isinstance(own, Zone):
+        return Zone(*moved)
+    if isinstance(own, tuple):
+        return tuple(_as(x, y) for x, y in zip(own, moved, strict=True))
+    return np.array(moved) if isinstance(own, np.ndarray) else moved
 
 
 def planted(size: float) -> Explained:
@@ -212,12 +220,12 @@ def test_what_adds_the_same_is_alike(monkeypatch):
 @pytest.mark.parametrize("constant", ["STICKS", "SETTLES"])
 def test_where_a_joint_sticks_and_where_its_friction_settles(monkeypatch, constant):
     """Of a peak of 2: below 0.08 and 0.2; of a travel of 100, for 0.5 and 1.2 after it stood."""
-    edge, after = {"STICKS": (0.08, 50), "SETTLES": (0.2, 120)}[constant]
+    edge, after, at = {"STICKS": (0.08, 50, 0), "SETTLES": (0.2, 120, None)}[constant]
     speeds = [1.0, 1.9 * edge, 1.01 * edge, 0.99 * edge, 0.6 * edge, 0.4 * edge, 1.0]
     stood = np.concatenate([np.zeros(5), np.ones(400)])
 
     def told():
-        zone = getattr(rest, constant)
+        zone = getattr(rest, constant) if at is None else getattr(rest, constant)[at]
         return len(near_rest(speeds, Zone(zone.speed, 0.0))), len(near_rest(stood, zone, 100.0)) - 5
 
     assert told() == (3, pytest.approx(after, abs=1))
@@ -299,7 +307,7 @@ def test_a_level_that_wanders_must_show(monkeypatch):
     for k in range(1, n):
         walk[k] = decay * walk[k - 1] + np.sqrt(1 - decay**2) * rng.normal()
     nothing = np.zeros(n)
-    run = Run(step, (slice(0, n),), nothing, nothing, nothing, 0.0)
+    run = Run(step, (slice(0, n),), nothing, (nothing,), nothing, 0.0)
     t = step * np.arange(n)
     x = np.stack([np.sin(2 * np.pi * 0.21 * t), np.cos(2 * np.pi * 0.34 * t)], 1) * np.sqrt(2)
 

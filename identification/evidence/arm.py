@@ -136,13 +136,15 @@ def _runs(
         row = []
         for c, (peak, travel) in enumerate(zip(peaks, travels, strict=True)):
             m = e.motion
-            sticks = settles = np.zeros(len(e.measured))
-            level = 0.0
+            settles = np.zeros(len(e.measured))
+            sticks, level = (settles,) * len(STICKS), 0.0
             # On a suspension nothing hangs still, and nothing is asked of a floating base.
             if not isinstance(model.tree, Rig) and c >= n_carriers(model.tree):
-                sticks, settles = (share(m, c, z, max(peak, 1e-12), travel) for z in (STICKS, SETTLES))
+                *sticks, settles = (share(m, c, z, max(peak, 1e-12), travel) for z in (*STICKS, SETTLES))
                 level = _level(found.assembly, found.theta, train, residuals, c, peak, scale[c])
-            row.append(Run(m.period * m.thinning, m.band_segments(), encoder_noise(e, c), sticks, settles, level))
+            row.append(
+                Run(m.period * m.thinning, m.band_segments(), encoder_noise(e, c), tuple(sticks), settles, level)
+            )
         made.append(row)
     return made
 

@@ -97,8 +97,11 @@ def pool(named: Mapping[str, tuple[Placed, list[Item]]], by_words: Curves, there
         name = p.effect.name
         have = sum(x.effect.name == name for x in there)
         n = have + names.count(name)
+        # Joints are made alike; a sensor's fault, or a wrong mass, is an accident of one place.
         logs = [log_share_of_places(k, n) for k in range(1, n + 1)]
         steps = (float(np.log(odds)) + logs[0], *(b - a for a, b in pairwise(logs)))[have:]
+        if p.effect.at != "joint":
+            steps = (float(np.log(odds / n)),)
         found.append(Hypothesis(key, True, tuple(items), steps[0], p, name, steps[1:]))
     each = float(np.log(ODDS_OF_CURVES / max(len(by_words), 1)))
     return found + [

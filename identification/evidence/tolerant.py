@@ -1,9 +1,10 @@
 """The search with what the evidence chooses beside it: the masses' tolerance, and each channel's noise."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 from ..deciding import TOLERANCES
+from ..nuisance.noise import Noise
 from .arm import Weighed
 from .evidence import Projected
 from .search import Search, Slot, Taken
@@ -33,16 +34,24 @@ def searched(
     tolerances = TOLERANCES if masses.stop > masses.start else TOLERANCES[:1]
     best = max((_best(weighed, recordings, barred, x) for x in tolerances), key=lambda b: b.value)
     for c in range(len(weighed.noises)):
-        evidence = weighed.evidence
-        others = [replace(weighed.noises[c], wander=0.0)] if weighed.noises[c].wander else []
-        if any(c in evidence.reached(evidence.items[t.item]) for t in best.taken):
-            others.append(weighed.bare(c))
-        for noise in others:
-            other = weighed.with_noise(c, noise)
+        for noise in _others(weighed, c, best):
+            other = weighed.with_noise(c, noise(weighed.noises[c]))
             tried = _best(other, recordings, barred, best.tolerance, best.taken)
             if tried.value > best.value:
                 weighed, best = other, tried
     return weighed, best.search, best.search.answer(), best.tolerance
+
+
+def _others(weighed: Weighed, c: int, best: _Best) -> list[Callable[[Noise], Noise]]:
+    """Changes of a channel's noise that are worth a try, one after the other."""
+    own, evidence = weighed.noises[c], weighed.evidence
+    changes: list[Callable[[Noise], Noise]] = [lambda x: replace(x, wander=0.0)] if own.wander else []
+    widths = range(len(weighed.runs[0][c].sticks))
+    changes += [lambda x, k=k: replace(x, width=k) for k in widths if k != own.width]
+    if any(c in evidence.reached(evidence.items[t.item]) for t in best.taken):
+        bare = weighed.bare(c)
+        changes.append(lambda x: replace(bare, width=x.width))
+    return changes
 
 
 def _best(

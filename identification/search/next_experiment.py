@@ -159,7 +159,8 @@ def rivals(model: Model, diagnosis: Diagnosis) -> list[tuple[Placed, Placed]]:
             continue  # of two encoders no torque says which is off
         placed = [p for p in model.effects if (p.effect.name, p.at) == (finding.name, finding.at)]
         for rival in sorted(finding.rivals, key=lambda r: -r.probability):
-            if placed:
+            # No motion parts an effect from what holds it and more.
+            if placed and finding.name not in get_effect(rival.name).contains:
                 pair = placed[0], Placed(get_effect(rival.name), rival.at)
                 (likely if rival.separable else open_).append(pair)
     return open_[:PAIRS] or likely[:1]
