@@ -6,13 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..deciding import BASELINE, BASELINE_OWN, BASELINE_SHAPE, DISCREPANCY, LAW_ERROR
+from ..deciding import BASELINE, BASELINE_OWN, BASELINE_SHAPE, BENDS, DISCREPANCY, LAW_ERROR
 from ..fitting.assembly import Assembly
 from ..fitting.experiment import Experiment
 from ..fitting.fit import Fit
 from ..fitting.problem import gather
 from ..nuisance.curve import SMALL
-from .hypotheses import Along, Curves, coordinate
+from ..search.refit import carry
+from .hypotheses import Along, Curves, coordinate, lagging, remembers
 from .pool import Columns
 
 Array = NDArray[np.float64]
@@ -64,6 +65,19 @@ def beside(along: Along, found: Fit, by_words: Curves, columns: Columns) -> Besi
                 index = count + np.arange(len(item.index))
                 row[c].append((index, columns.some(i, c, item.index) * (size * item.spread)))
             count += len(item.index)
+    for p in assembly.placed:
+        if not remembers(p):
+            continue
+        rest = assembly.keep([x for x in assembly.placed if x.key != p.key], found.theta)
+        left = carry(found, rest)
+        made = [e.motion.to_band(assembly.torque(e, found.theta) - rest.torque(e, left)) for e in along.instruments]
+        item = lagging(along, {c: [x[:, [c]] for x in made] for c in range(n_channels)}, columns)
+        rms = np.sqrt(np.mean(np.concatenate(made[:n]) ** 2, axis=0))
+        size = BENDS[0] * float(np.max(rms / along.scale)) * item.spread
+        for i, row in enumerate(parts):
+            for c in range(n_channels):
+                row[c].append((count + np.arange(2), columns.some(i, c, item.index) * size))
+        count += 2
     joined = [[_joined(own) for own in row] for row in parts]
     return Beside(joined, count, tolerant, baseline)
 

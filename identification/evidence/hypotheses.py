@@ -125,6 +125,8 @@ def _items(along: Along, p: Placed, by_words: Curves, columns: Columns) -> list[
     extra = None
     if len(grid) <= FINE:
         extra = by_words.get((along.assembly.joint_of(p), coordinate(p.effect) or ""))
+    # What a law with memory has wrong is mostly its lag.
+    lags = remembers(p)
     items: list[Item] = []
     for k, (v, parts) in enumerate(zip(grid, made, strict=True)):
         size = None if parts is None else _size(along, parts)
@@ -143,6 +145,8 @@ def _items(along: Along, p: Placed, by_words: Curves, columns: Columns) -> list[
             }
         index = columns.add(own)
         whole = len(v.amplitudes) == 0
+        if lags:
+            extra = lagging(along, parts, columns)
         for subset in v.subsets():
             some = reduced(v, subset)
             on = size[subset] > 1e-12
@@ -164,6 +168,30 @@ def _items(along: Along, p: Placed, by_words: Curves, columns: Columns) -> list[
     return items
 
 
+def remembers(p: Placed) -> bool:
+    """Has a law a memory that is no joint's own: a sling's carriage, a tank, a late sensor?"""
+    return bool(p.effect.states) and p.effect.at != "joint"
+
+
+def lagging(along: Along, parts: Mapping[int, Sequence[Array]], columns: Columns) -> Item:
+    """What a law adds if it comes sooner or later: the first two derivatives by time of each of its columns.
+
+    The item's spreads make each as large as the law where that is as large as its channel's torque.
+    """
+    own: dict[int, list[Array]] = {}
+    for c, recordings in parts.items():
+        own[c] = []
+        for e, x in zip(along.instruments, recordings, strict=True):
+            first, second = np.zeros_like(x), np.zeros_like(x)
+            for s in e.motion.band_segments():
+                if s.stop - s.start > 2:
+                    first[s] = np.gradient(x[s], axis=0)
+                    second[s] = np.gradient(first[s], axis=0)
+            own[c].append(np.hstack([first, second]))
+    sizes = _size(along, own)
+    return Item(columns.add(own), 1 / np.maximum(sizes, 1e-12), np.zeros(len(sizes), bool))
+
+
 def _grid(assembly: Assembly, p: Placed) -> tuple[list[Variant], bool]:
     """Points of an effect's grid, and whether a slope to its neighbours may ride along with each.
 
@@ -171,8 +199,9 @@ def _grid(assembly: Assembly, p: Placed) -> tuple[list[Variant], bool]:
     """
     grid = variants(assembly, p)
     shapes = [i for i, x in enumerate(p.effect.parameters) if len(x.grid) > 1]
-    if p.effect.at != "joint" or p.effect.states or len(shapes) != 1 or not len(grid[0].amplitudes):
-        return grid[:: -(-len(grid) // MOST_GRID)], False
+    alone = len(shapes) == 1 and len(grid[0].amplitudes) > 0
+    if p.effect.at != "joint" or p.effect.states or not alone:
+        return grid[:: -(-len(grid) // MOST_GRID)], alone and p.effect.at != "joint"
     i = shapes[0]
     finer = [grid[0]]
     for a, b in pairwise(grid):
