@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...models.model import Model
-from ..deciding import ALIKE, CLASS, DRIVEN, NEARLY, ROUNDS
+from ..deciding import ALIKE, CLASS, DRIVEN, LAW_ERROR, NEARLY, ROUNDS
 from ..fitting.base_parameters import BaseParameters
 from ..fitting.experiment import Experiment, Scales
 from ..fitting.fit import Fit, fit
@@ -83,6 +83,9 @@ def search(
         news = [s for s in slots if weighed.pool[s.taken.hypothesis].named]
         if not news:
             break
+        # What adds less than the error of a law that is not fitted yet waits until it is.
+        least = LAW_ERROR**2 * max(s.gain for s in news)
+        news = [s for s in news if s.gain >= least]
         start: dict[str, float] = {}
         members = made.members([s.taken for s in slots])
         for s in news:
