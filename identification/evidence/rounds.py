@@ -83,9 +83,9 @@ def search(
         news = [s for s in slots if weighed.pool[s.taken.hypothesis].named]
         if not news:
             break
-        # What adds less than the error of a law that is not fitted yet waits until it is.
-        least = LAW_ERROR**2 * max(s.gain for s in news)
-        news = [s for s in news if s.gain >= least]
+        # What adds less than the error of laws that are not fitted yet waits until they are.
+        least = LAW_ERROR**2 * made.members([s.taken for s in slots]).value
+        news = [s for s in news if s.gain >= least] or news
         start: dict[str, float] = {}
         members = made.members([s.taken for s in slots])
         for s in news:
