@@ -6,9 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.floating.tree import n_carriers
 from ...models.model import Model, Placed
-from ...models.rig.rig import Rig
 from ..deciding import LEAST_LEVEL
 from ..fitting.assembly import Assembly
 from ..fitting.experiment import Experiment, Scales
@@ -138,8 +136,7 @@ def _runs(
             m = e.motion
             settles = np.zeros(len(e.measured))
             sticks, level = (settles,) * len(STICKS), 0.0
-            # On a suspension nothing hangs still, and nothing is asked of a floating base.
-            if not isinstance(model.tree, Rig) and c >= n_carriers(model.tree):
+            if model.tree.sticks(c):
                 *sticks, settles = (share(m, c, z, max(peak, 1e-12), travel) for z in (*STICKS, SETTLES))
                 level = _level(found.assembly, found.theta, train, residuals, c, peak, scale[c])
             row.append(

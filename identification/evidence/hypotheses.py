@@ -11,9 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...models.effect import Effect
-from ...models.floating.tree import n_carriers
 from ...models.model import Model, Placed
-from ...models.rig.rig import Rig
 from ..deciding import BENDS, ELSEWHERE, ODDS_OF_CURVES, ODDS_OF_NAMES, SLOPE
 from ..fitting.assembly import Assembly, Evaluation
 from ..fitting.experiment import Experiment, Scales
@@ -49,7 +47,7 @@ def curves(
 ) -> dict[tuple[int, str], Item]:
     """Every nameless curve of every channel, or the small ones alone, by channel and words."""
     tree, n = along.model.tree, along.n_train
-    alone = isinstance(tree, Rig) or bool(n_carriers(tree))
+    alone = not tree.stands
     found = {}
     for c, joint in enumerate(along.model.joints):
         peak, travel = max(scales[joint].speed, 1e-9), scales[joint].travel
