@@ -70,6 +70,7 @@ def weigh(
     *,
     runs: list[list[Run]] | None = None,
     search: bool = True,
+    nameless: Mapping[tuple[int, str], float] | None = None,
 ) -> Weighed:
     """Recordings under a fit.
 
@@ -88,14 +89,17 @@ def weigh(
         What the noise of every channel hangs on, as another fit has it: two models are compared under one noise.
     search : bool
         False leaves out all hypotheses: only the evidence of the fit itself is wanted.
+    nameless : mapping of (channel, words) to float, optional
+        Sizes of nameless curves that stand beside every explanation.
     """
     assembly = found.assembly
     states = [assembly.evaluate(e, found.theta) for e in instruments]
     along = Along(model, assembly, instruments, states, n_train, torque_scale(experiments[:n_train]))
     columns = Columns([len(e.measured) for e in experiments])
-    by_words = curves(along, scales, columns, small=not search)
+    nameless = nameless or {}
+    by_words = curves(along, scales, columns, small=not search, more={words for _, words in nameless})
     named = names(along, by_words, columns) if search else {}
-    others = beside(along, found, by_words, columns)
+    others = beside(along, found, by_words, columns, nameless)
     residuals = [assembly.residual(e, found.theta)[0] for e in experiments]
     if runs is None:
         runs = _runs(model, found, experiments, residuals, n_train, along.scale)

@@ -1,7 +1,7 @@
 """Named effects and nameless curves of an arm's joints as hypotheses: columns, priors, odds."""
 
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import factorial
@@ -43,9 +43,14 @@ class Along:
 
 
 def curves(
-    along: Along, scales: Mapping[str, Scales], columns: Columns, *, small: bool = False
+    along: Along,
+    scales: Mapping[str, Scales],
+    columns: Columns,
+    *,
+    small: bool = False,
+    more: Collection[str] = (),
 ) -> dict[tuple[int, str], Item]:
-    """Every nameless curve of every channel, or the small ones alone, by channel and words."""
+    """Every nameless curve of every channel, or the small ones and some more alone, by channel and words."""
     tree, n = along.model.tree, along.n_train
     alone = not tree.stands
     found = {}
@@ -55,7 +60,7 @@ def curves(
         if max(float(np.ptp(x.q[:, c])) for x in signals[:n]) < 1e-6:
             continue
         for curve in family(c, along.model.joints, signals[:n], alone):
-            if small and curve.words not in {*SMALL, *(coordinate(p.effect) for p in along.model.effects)}:
+            if small and curve.words not in {*SMALL, *more, *(coordinate(p.effect) for p in along.model.effects)}:
                 continue
             own = [e.to_band(curve.columns(x), c) for e, x in zip(along.instruments, signals, strict=True)]
             k = own[0].shape[1]

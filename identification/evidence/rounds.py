@@ -92,10 +92,10 @@ def search(
         if not news:
             break
         alone = made.scan([]).odds
-        first = max(news, key=lambda s: alone[s.taken.hypothesis])
-        if remembers(weighed.pool[first.taken.hypothesis].label):
+        leading = max(news, key=lambda s: alone[s.taken.hypothesis])
+        if remembers(weighed.pool[leading.taken.hypothesis].label):
             # What rings or lags explains little before its frequency is fitted: nothing is judged beside it.
-            news = [first]
+            news = [leading]
         start: dict[str, float] = {}
         members = made.members([s.taken for s in slots])
         for s in news:
