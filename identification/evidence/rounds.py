@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...models.model import Model
-from ..deciding import ALIKE, CLASS, DRIVEN, NEARLY, ROUNDS
+from ..deciding import ALIKE, CLASS, DRIVEN, LAW_ERROR, NEARLY, ROUNDS
 from ..fitting.base_parameters import BaseParameters
 from ..fitting.experiment import Experiment, Scales
 from ..fitting.fit import Fit, fit
@@ -83,6 +83,13 @@ def search(
         news = [s for s in slots if weighed.pool[s.taken.hypothesis].named]
         if not news:
             break
+        # What adds less than the error of laws that are not fitted yet waits until they are.
+        least = LAW_ERROR**2 * made.members([s.taken for s in slots]).value
+        error = _error_of_laws(opening, weighed)
+        large = [s for s in news if s.gain >= LAW_ERROR**2 * sum(error[c] for c in _reached(weighed, s))]
+        news = [s for s in large if s.gain >= least] or large
+        if not news:
+            break
         start: dict[str, float] = {}
         members = made.members([s.taken for s in slots])
         for s in news:
@@ -111,6 +118,24 @@ def search(
         tuple(instruments),
         tolerance,
     )
+
+
+def _error_of_laws(opening: Weighed, weighed: Weighed) -> Array:
+    """Log-likelihood that the names so far took out of each channel of the training recordings (J,).
+
+    A law that is wrong by a share of itself leaves the square of that share of it.
+    """
+    taken = np.zeros(len(weighed.noises))
+    for i in range(weighed.n_train):
+        pairs = zip(opening.evidence.channels[i], weighed.evidence.channels[i], strict=True)
+        for c, (before, now) in enumerate(pairs):
+            energy = float(before.residual @ now.covariance.solve(before.residual))
+            taken[c] += 0.5 * (energy - weighed.evidence.energy(i, c))
+    return np.maximum(taken, 0.0)
+
+
+def _reached(weighed: Weighed, slot: Slot) -> list[int]:
+    return weighed.evidence.reached(weighed.evidence.items[slot.taken.item])
 
 
 def _as_names(search: Search, slots: Sequence[Slot]) -> list[Slot]:

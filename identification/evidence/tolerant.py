@@ -3,6 +3,8 @@
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from ..deciding import TOLERANCES
 from ..nuisance.noise import Noise
 from .arm import Weighed
@@ -46,8 +48,9 @@ def _others(weighed: Weighed, c: int, best: _Best) -> list[Callable[[Noise], Noi
     """Changes of a channel's noise that are worth a try, one after the other."""
     own, evidence = weighed.noises[c], weighed.evidence
     changes: list[Callable[[Noise], Noise]] = [lambda x: replace(x, wander=0.0)] if own.wander else []
-    widths = range(len(weighed.runs[0][c].sticks))
-    changes += [lambda x, k=k: replace(x, width=k) for k in widths if k != own.width]
+    sticks = [np.concatenate([row[c].sticks[k] for row in weighed.runs]) for k in range(len(weighed.runs[0][c].sticks))]
+    others = [k for k, x in enumerate(sticks) if not np.array_equal(x, sticks[own.width])]
+    changes += [lambda x, k=k: replace(x, width=k) for k in others]
     if any(c in evidence.reached(evidence.items[t.item]) for t in best.taken):
         bare = weighed.bare(c)
         changes.append(lambda x: replace(bare, width=x.width))
