@@ -47,11 +47,21 @@ def report_on(
     channels = [channel(model.tree, c) for c in range(model.tree.n_joints)]
     findings = tuple(_finding(n, decided, final, channels) for n in best.names)
     fits = _fits(model, found.first, final, train, held)
-    loud = sorted({r.channel for r in decided.rest})
+    left = decided.left
+    again = {c: b for c, b in left.bursts.items() if b.again}
+    loud = sorted({r.channel for r in left.curves} | set(again))
+
+    def size(c: int, share: float) -> str:
+        return percent(float(np.sqrt(share)) * fits[c].train.relative_after)
+
     said = [
         f"on {channels[r.channel]}, a smooth curve over {r.over} still explains {percent(r.explained)} of the residual "
-        f"({percent(float(np.sqrt(r.explained)) * fits[r.channel].train.relative_after)} of the channel's torque)"
-        for r in decided.rest
+        f"({size(r.channel, r.explained)} of the channel's torque)"
+        for r in left.curves
+    ] + [
+        f"on {channels[c]}, {percent(b.share)} of the residual comes in bursts, at {b.frequency:.2g} Hz where it is "
+        f"strongest ({size(c, b.share)} of the channel's torque)"
+        for c, b in again.items()
     ]
     description = "; ".join(said)
     if findings:
@@ -69,6 +79,12 @@ def report_on(
         f"foretold no better with it: not named"
         for n in decided.rejected
         if n.placed.key not in named
+    ]
+    notes += [
+        f"on {channels[c]}, {percent(b.share)} of the residual stands in one window and has not come again: a knock, "
+        "or an outlier"
+        for c, b in left.bursts.items()
+        if not b.again
     ]
     notes += noise + _excitation(train)
     candidates = tuple(

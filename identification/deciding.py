@@ -55,6 +55,14 @@ SETTLES = (0.10, 0.012)
 LEAST_LEVEL = 0.03
 """What a joint may hold at rest at least [share of the channel's RMS torque]."""
 
+# Bursts.
+BURST_WINDOW = 0.5
+"""Windows of the residual whose strengths are compared [s]."""
+BURST_LOUD = 3.0
+"""Times the median window's mean square from which on a window is out of the ordinary."""
+BURST_SHARE = 0.2
+"""Share of the residual's energy above that which makes it bursts."""
+
 # The answer.
 GATE = 1.0
 """What a name must gain on the held-out recordings [standard errors over blocks of time]."""

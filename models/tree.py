@@ -113,6 +113,15 @@ class Tree:
         return len(self.joints)
 
     @property
+    def stands(self) -> bool:
+        """Whether it stands on ground that no joint moves: a joint at rest feels nothing of the others there."""
+        return True
+
+    def sticks(self, joint: int) -> bool:
+        """Whether dry friction can hold a joint where it is."""
+        return self.stands
+
+    @property
     def bodies(self) -> tuple[tuple[Joint, int, float, float], ...]:
         """Of every link: what moves it, and by which freedom: (joint, index, multiplier, offset), parents first."""
         own = [(joint, i, 1.0, 0.0) for i, joint in enumerate(self.joints)]

@@ -6,9 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.floating.tree import n_carriers
 from ...models.model import Model, Placed
-from ...models.rig.rig import Rig
 from ..deciding import LEAST_LEVEL
 from ..fitting.assembly import Assembly
 from ..fitting.experiment import Experiment, Scales
@@ -72,6 +70,7 @@ def weigh(
     *,
     runs: list[list[Run]] | None = None,
     search: bool = True,
+    nameless: Mapping[tuple[int, str], float] | None = None,
 ) -> Weighed:
     """Recordings under a fit.
 
@@ -90,14 +89,17 @@ def weigh(
         What the noise of every channel hangs on, as another fit has it: two models are compared under one noise.
     search : bool
         False leaves out all hypotheses: only the evidence of the fit itself is wanted.
+    nameless : mapping of (channel, words) to float, optional
+        Sizes of nameless curves that stand beside every explanation.
     """
     assembly = found.assembly
     states = [assembly.evaluate(e, found.theta) for e in instruments]
     along = Along(model, assembly, instruments, states, n_train, torque_scale(experiments[:n_train]))
     columns = Columns([len(e.measured) for e in experiments])
-    by_words = curves(along, scales, columns, small=not search)
+    nameless = nameless or {}
+    by_words = curves(along, scales, columns, small=not search, more={words for _, words in nameless})
     named = names(along, by_words, columns) if search else {}
-    others = beside(along, found, by_words, columns)
+    others = beside(along, found, by_words, columns, nameless)
     residuals = [assembly.residual(e, found.theta)[0] for e in experiments]
     if runs is None:
         runs = _runs(model, found, experiments, residuals, n_train, along.scale)
@@ -138,8 +140,7 @@ def _runs(
             m = e.motion
             settles = np.zeros(len(e.measured))
             sticks, level = (settles,) * len(STICKS), 0.0
-            # On a suspension nothing hangs still, and nothing is asked of a floating base.
-            if not isinstance(model.tree, Rig) and c >= n_carriers(model.tree):
+            if model.tree.sticks(c):
                 *sticks, settles = (share(m, c, z, max(peak, 1e-12), travel) for z in (*STICKS, SETTLES))
                 level = _level(found.assembly, found.theta, train, residuals, c, peak, scale[c])
             row.append(

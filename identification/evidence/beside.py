@@ -1,6 +1,6 @@
 """What always stands beside an explanation: the baseline's parameters, the tolerance of the masses, small curves."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,8 +38,10 @@ class Beside:
         return weight
 
 
-def beside(along: Along, found: Fit, by_words: Curves, columns: Columns) -> Beside:
-    """All of it for some recordings under a fit."""
+def beside(
+    along: Along, found: Fit, by_words: Curves, columns: Columns, nameless: Mapping[tuple[int, str], float]
+) -> Beside:
+    """All of it for some recordings under a fit; ``nameless`` curves have a size of their own."""
     assembly, n, n_channels = found.assembly, along.n_train, len(along.scale)
     blocks = [assembly.residual(e, found.theta)[1] for e in along.instruments]
     baseline = [
@@ -59,7 +61,7 @@ def beside(along: Along, found: Fit, by_words: Curves, columns: Columns) -> Besi
         count = tolerant.stop
     sizes = _small(found, baseline[:n], along.scale)
     for (c, words), item in by_words.items():
-        size = sizes.get((c, words), 0.0)
+        size = float(np.hypot(sizes.get((c, words), 0.0), nameless.get((c, words), 0.0)))
         if size > 0:
             for i, row in enumerate(parts):
                 index = count + np.arange(len(item.index))

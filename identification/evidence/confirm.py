@@ -1,11 +1,12 @@
 """Confirm on the held-out recordings what a search named, by the same evidence.
 
 With an effect and without it the rest is fitted again, and both models foretell the held-out recordings: the log
-density of these given the training recordings (Dawid 1984), every nuisance integrated out anew.
+density of these given the training recordings (Dawid 1984), every nuisance integrated out anew. The nameless curves
+that the search ended with stand beside both, so that what only stands in for one of them is not missed.
 A name stays if that density falls without it by more than it scatters over blocks of time.
 """
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,10 +19,7 @@ from ..fitting.fit import Fit, channel_rms
 from ..search.refit import without
 from .arm import weigh
 from .evidence import Projected
-from .found import Found, Name, Remainder
-from .members import Members
-from .rounds import share_of_residual
-from .tolerant import searched
+from .found import Found, Name
 
 Array = NDArray[np.float64]
 
@@ -118,7 +116,16 @@ def foretold(
     n = len(train)
     noise = found.weighed
     weighed = weigh(
-        model, own, [*train, *held], found.instruments, n, scales, noise.noises, runs=noise.runs, search=False
+        model,
+        own,
+        [*train, *held],
+        found.instruments,
+        n,
+        scales,
+        noise.noises,
+        runs=noise.runs,
+        search=False,
+        nameless=found.nameless,
     )
     weight = weighed.beside.weight(found.tolerance)
     fitted_by = Projected(weighed.evidence, range(n), weight)
@@ -165,58 +172,3 @@ def _missed(
     worst = c[int(np.argmax(rms[c] / measured[c] - with_it[c] / measured[c]))]
     trial = float(with_it[worst] / measured[worst]), float(rms[worst] / measured[worst])
     return Missed(whole.density - other.density, scatter(0.5 * (other.blocks - whole.blocks)), trial, rest)
-
-
-def remainders(found: Found, train: Sequence[Experiment], held: Sequence[Experiment]) -> tuple[Remainder, ...]:
-    """Nameless curves of the last search that the held-out recordings confirm."""
-    n, search, slots = len(train), found.search, found.slots
-    evidence = search.on.evidence
-    both = Projected(evidence, range(n + len(held)), found.weighed.beside.weight(found.tolerance))
-
-    def told(some: Sequence[int]) -> tuple[float, Array]:
-        taken = [(slots[k].taken.item, slots[k].taken.size) for k in some]
-        own, all_of_it = Members(search.on, taken), Members(both, taken)
-        mean = [(item, own.of(item)) for item, _ in taken]
-        always = search.on.beside(mean)
-        pairs = [(evidence.items[item], a) for item, a in mean]
-        parts = [blocks(evidence.left(n + i, always, pairs), e) for i, e in enumerate(held)]
-        return all_of_it.value - own.value, np.concatenate(parts)
-
-    kept = list(range(len(slots)))
-    made: dict[int, Remainder] = {}
-    while kept:
-        density, whole = told(kept)
-        made = {}
-        members = Members(search.on, [(slots[k].taken.item, slots[k].taken.size) for k in kept])
-        for k in kept:
-            item = slots[k].taken.item
-            if found.weighed.pool[slots[k].taken.hypothesis].named:
-                continue
-            other, rest = told([x for x in kept if x != k])
-            error = scatter(0.5 * (rest - whole))
-            c, curve = evidence.items[item].label
-            explained = share_of_residual(search, item, members.of(item))
-            made[k] = Remainder(c, curve.words, slots[k].gain, explained, (density - other) / max(error, 1e-12))
-        weak = min(made, key=lambda k: made[k].held, default=None)
-        if weak is None or made[weak].held > GATE:
-            break
-        kept.remove(weak)
-        made = {}
-    return tuple(sorted(made.values(), key=lambda r: -r.explained))
-
-
-def left_over(
-    best: Confirmed,
-    scales: Mapping[str, Scales],
-    train: Sequence[Experiment],
-    held: Sequence[Experiment],
-    barred: Collection[str],
-) -> tuple[Remainder, ...]:
-    """What the confirmed model still leaves to nameless curves."""
-    if best.rejected:
-        n = len(train)
-        own = best.found
-        weighed = weigh(best.model, best.fit, [*train, *held], own.instruments, n, scales, own.weighed.noises)
-        weighed, made, slots, tolerance = searched(weighed, range(n), barred)
-        best = replace(best, found=replace(own, weighed=weighed, search=made, slots=tuple(slots), tolerance=tolerance))
-    return remainders(best.found, train, held)

@@ -76,3 +76,13 @@ class Found:
     search: Search
     instruments: tuple[Experiment, ...]
     tolerance: float
+
+    @property
+    def nameless(self) -> dict[tuple[int, str], float]:
+        """Sizes of the nameless curves of the last search, by channel and words."""
+        pool = self.weighed.pool
+        return {
+            (pool[s.taken.hypothesis].label[0], pool[s.taken.hypothesis].label[1].words): s.taken.size
+            for s in self.slots
+            if not pool[s.taken.hypothesis].named
+        }

@@ -1,7 +1,7 @@
 """Named effects and nameless curves of an arm's joints as hypotheses: columns, priors, odds."""
 
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import factorial
@@ -11,9 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...models.effect import Effect
-from ...models.floating.tree import n_carriers
 from ...models.model import Model, Placed
-from ...models.rig.rig import Rig
 from ..deciding import BENDS, ELSEWHERE, ODDS_OF_CURVES, ODDS_OF_NAMES, SLOPE
 from ..fitting.assembly import Assembly, Evaluation
 from ..fitting.experiment import Experiment, Scales
@@ -45,11 +43,16 @@ class Along:
 
 
 def curves(
-    along: Along, scales: Mapping[str, Scales], columns: Columns, *, small: bool = False
+    along: Along,
+    scales: Mapping[str, Scales],
+    columns: Columns,
+    *,
+    small: bool = False,
+    more: Collection[str] = (),
 ) -> dict[tuple[int, str], Item]:
-    """Every nameless curve of every channel, or the small ones alone, by channel and words."""
+    """Every nameless curve of every channel, or the small ones and some more alone, by channel and words."""
     tree, n = along.model.tree, along.n_train
-    alone = isinstance(tree, Rig) or bool(n_carriers(tree))
+    alone = not tree.stands
     found = {}
     for c, joint in enumerate(along.model.joints):
         peak, travel = max(scales[joint].speed, 1e-9), scales[joint].travel
@@ -57,7 +60,7 @@ def curves(
         if max(float(np.ptp(x.q[:, c])) for x in signals[:n]) < 1e-6:
             continue
         for curve in family(c, along.model.joints, signals[:n], alone):
-            if small and curve.words not in {*SMALL, *(coordinate(p.effect) for p in along.model.effects)}:
+            if small and curve.words not in {*SMALL, *more, *(coordinate(p.effect) for p in along.model.effects)}:
                 continue
             own = [e.to_band(curve.columns(x), c) for e, x in zip(along.instruments, signals, strict=True)]
             k = own[0].shape[1]

@@ -17,6 +17,7 @@ from ..search.refit import assemble, refitted
 from ..search.rest import fitted
 from .arm import Weighed, weigh
 from .found import Found, Name, Trial
+from .hypotheses import remembers
 from .members import Members, log_bayes
 from .rival import RivalOdds
 from .search import Search, Slot, Taken
@@ -90,6 +91,11 @@ def search(
         news = [s for s in large if s.gain >= least] or large
         if not news:
             break
+        alone = made.scan([]).odds
+        leading = max(news, key=lambda s: alone[s.taken.hypothesis])
+        if remembers(weighed.pool[leading.taken.hypothesis].label):
+            # What rings or lags explains little before its frequency is fitted: nothing is judged beside it.
+            news = [leading]
         start: dict[str, float] = {}
         members = made.members([s.taken for s in slots])
         for s in news:
