@@ -53,11 +53,11 @@ def diagnose(
     recordings : sequence of path
         Fitted and searched.
     holdout : path
-        For the proof only: nothing that is fitted or chosen before step 6 depends on it.
+        Confirms what the others named; nothing is fitted to it, and no search sees it.
     progress : callable
         Told in a few words what is under way.
     seed : int
-        Of bootstraps and nulls.
+        Of random starts, and of bootstraps over link encoders and captures.
     jobs : int or None
         Processes in which captures are simulated; None: one a core, at most four. For captures only.
     anyway : bool

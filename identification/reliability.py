@@ -1,6 +1,7 @@
-"""How often a name was right at a given margin: a frequency counted on a bank of simulated arms, not a softmax.
+"""How often a name was right: frequencies counted on simulated arms with known answers, not a softmax.
 
-``reliability.json`` beside this file holds the curve, and the command that made it.
+``reliability.json`` beside this file holds what was counted, by which command: a logistic map for names of torques, and
+a curve over the margin for those of link encoders and captures.
 """
 
 import json

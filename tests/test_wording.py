@@ -1,19 +1,23 @@
 """The words of a diagnosis: shares, lists, the experiment that is proposed, and the first sentence."""
 
+from contextlib import contextmanager
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from snarelab.identification import reliability
 from snarelab.identification.diagnosis import ChannelFit, Misfit
+from snarelab.identification.nuisance.noise import Noise
 from snarelab.identification.wording import (
     evidence_sentence,
     experiment_sentence,
     from_to,
     listed,
     named,
+    noise_words,
     percent,
     verdict_sentence,
 )
@@ -112,11 +116,48 @@ def test_without_a_name_it_is_the_worst_channel_that_is_told():
 def test_reliability_is_linear_between_its_knots_and_level_beyond(margin, right, tmp_path, monkeypatch):
     (tmp_path / "reliability.json").write_text('{"margin": [0.5, 0.7, 0.8], "probability": [0.6, 0.8, 0.9]}')
     monkeypatch.setattr(reliability, "__file__", str(tmp_path / "reliability.py"))
-    reliability._curve.cache_clear()
-    try:
+    with forgotten():
         assert reliability.probability(margin) == pytest.approx(right, rel=1e-12)
+
+
+@contextmanager
+def forgotten():
+    """What was read of the stored file is read anew, and not kept."""
+    both = reliability._curve, reliability._stored
+    for cached in both:
+        cached.cache_clear()
+    try:
+        yield
     finally:
-        reliability._curve.cache_clear()
+        for cached in both:
+            cached.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("gain", "held", "odds"),
+    [
+        (0.0, 1.0, np.exp(-1)),
+        (np.e - 1, 1.0, np.exp(-0.5)),  # half a unit for each of log(1 + gain)
+        (0.0, 4.0, np.exp(-1) * 16),  # odds grow with the square of what the held-out recordings gain
+        (-3.0, 1.0, np.exp(-1)),
+        (0.0, -7.0, np.exp(-1) * 1e-6),  # what they lose counts as next to nothing gained
+    ],
+)
+def test_how_often_a_name_of_torques_is_right_is_logistic_in_both_evidences(gain, held, odds, tmp_path, monkeypatch):
+    (tmp_path / "reliability.json").write_text('{"logit": [-1.0, 0.5, 2.0]}')
+    monkeypatch.setattr(reliability, "__file__", str(tmp_path / "reliability.py"))
+    with forgotten():
+        assert reliability.of_name(gain, held) == pytest.approx(odds / (1 + odds), rel=1e-12)
+
+
+def test_what_a_noise_is_made_of_is_told_with_sizes_and_times():
+    """Of the encoders the RMS over all recordings, of any length: √((3 · 4 + 5 · 0) / 8) = √1.5 here."""
+    noise = Noise(0.0123, 0.2, 0.345, 4.0, 40.0, 9.0)
+    told = noise_words("tau.joint1", "N*m", noise, [np.full(3, 2.0), np.zeros(5)])
+    assert told == (
+        "noise of tau.joint1: 0.012 N·m from sample to sample, 0.2 N·m over 0.34 s, a wander of 4 N·m over 40 s "
+        "and 1.2 N·m of the encoders"
+    )
 
 
 @pytest.mark.parametrize(

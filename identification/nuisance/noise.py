@@ -1,6 +1,6 @@
 """The noise of one channel: white, coloured, wandering, of the encoders, and what a joint holds near rest.
 
-    K = w² I + a² e^(-|d|/τa) + v² e^(-|d|/τv) + encoders + diag((s F)²) + diag((s' g)²)
+    K = w² I + a² e^(-|d|/τa) + v² e^(-|d|/τv) + encoders + s F (I + e^(-|d|/τh)) s F + diag((s' g)²)
 
 The scales are those of highest marginal likelihood beside everything that could explain the residual: beside the
 baseline alone the noise would learn the missing physics, and then hide it.

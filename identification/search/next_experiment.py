@@ -1,4 +1,4 @@
-"""The next experiment: a motion that parts what the recordings so far cannot part (step 7 of a diagnosis).
+"""The next experiment: a motion that parts what the recordings so far cannot part.
 
 T-optimality (Atkinson and Fedorov 1975): of two rivals A and B, both fitted to what there is, the best motion is the
 one along which A's torque stays furthest from B's after B has fitted itself to it. Motions are finite Fourier series
