@@ -3,7 +3,8 @@
 With an effect and without it the rest is fitted again, and both models foretell the held-out recordings: the log
 density of these given the training recordings (Dawid 1984), every nuisance integrated out anew. The nameless curves
 that the search ended with stand beside both, so that what only stands in for one of them is not missed.
-A name stays if that density falls without it by more than it scatters over blocks of time.
+A name stays if that density falls without it by more than it scatters over blocks of time, and if what is missed is
+more than any model has wrong.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...models.model import Model
-from ..deciding import BLOCK, GATE
+from ..deciding import BLOCK, DISCREPANCY, GATE
 from ..fitting.experiment import Experiment, Scales
 from ..fitting.fit import Fit, channel_rms
 from ..search.refit import without
@@ -48,6 +49,17 @@ class Missed:
     def sure(self) -> float:
         """The gain in units of its scatter."""
         return self.gain / max(self.scatter, 1e-12)
+
+    @property
+    def size(self) -> float:
+        """RMS torque that is missed, by what it adds to the error [share of the channel's RMS torque]."""
+        with_it, without_it = self.trial
+        return float(np.sqrt(max(without_it**2 - with_it**2, 0.0)))
+
+    @property
+    def told(self) -> bool:
+        """Whether it is missed beyond its scatter, and as more than any model has wrong."""
+        return self.sure > GATE and self.size >= DISCREPANCY
 
 
 @dataclass(frozen=True)
@@ -92,8 +104,8 @@ def confirm(
         missed[key] = _missed(left[key], model, final, whole, found, train, held, scales)
         if any(k not in missed for k in left):
             continue
-        weakest = min(left, key=lambda k: missed[k].sure)
-        if missed[weakest].sure <= GATE and weakest not in stale:
+        weakest = min(left, key=lambda k: (missed[k].told, missed[k].sure))
+        if not missed[weakest].told and weakest not in stale:
             rejected.append(left.pop(weakest))
             weak[weakest] = missed.pop(weakest)
             final = weak[weakest].fit

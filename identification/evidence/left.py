@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..deciding import GATE
+from ..deciding import DISCREPANCY, GATE
 from ..fitting.experiment import Experiment, Scales
 from ..nuisance.bursts import Bursts, Left, bursts
 from .arm import weigh
@@ -32,9 +32,10 @@ def remainders(found: Found, train: Sequence[Experiment], held: Sequence[Experim
     """Nameless curves of the last search that the held-out recordings confirm."""
     n, search, slots = len(train), found.search, found.slots
     evidence = search.on.evidence
+    J = len(found.weighed.scale)
     both = Projected(evidence, range(n + len(held)), found.weighed.beside.weight(found.tolerance))
 
-    def told(some: Sequence[int]) -> tuple[float, Array]:
+    def beside(some: Sequence[int]) -> tuple[float, Array]:
         taken = [(slots[k].taken.item, slots[k].taken.size) for k in some]
         own, all_of_it = Members(search.on, taken), Members(both, taken)
         mean = [(item, own.of(item)) for item, _ in taken]
@@ -46,14 +47,14 @@ def remainders(found: Found, train: Sequence[Experiment], held: Sequence[Experim
     kept = list(range(len(slots)))
     made: dict[int, Remainder] = {}
     while kept:
-        density, whole = told(kept)
+        density, whole = beside(kept)
         made = {}
         members = Members(search.on, [(slots[k].taken.item, slots[k].taken.size) for k in kept])
         for k in kept:
             item = slots[k].taken.item
             if found.weighed.pool[slots[k].taken.hypothesis].named:
                 continue
-            other, rest = told([x for x in kept if x != k])
+            other, rest = beside([x for x in kept if x != k])
             error = scatter(0.5 * (rest - whole))
             c, curve = evidence.items[item].label
             explained = share_of_residual(search, item, members.of(item))
@@ -63,7 +64,14 @@ def remainders(found: Found, train: Sequence[Experiment], held: Sequence[Experim
             break
         kept.remove(weak)
         made = {}
-    return tuple(sorted(made.values(), key=lambda r: -r.explained))
+    # What is less than any model has wrong is not told.
+    rms = np.sqrt([np.mean(np.concatenate([row[c].residual for row in evidence.channels[:n]]) ** 2) for c in range(J)])
+    told = [
+        r
+        for r in made.values()
+        if np.sqrt(r.explained) * rms[r.channel] >= DISCREPANCY * found.weighed.scale[r.channel]
+    ]
+    return tuple(sorted(told, key=lambda r: -r.explained))
 
 
 def left_over(
@@ -103,7 +111,8 @@ def _bursts(found: Found, train: Sequence[Experiment]) -> dict[int, Bursts]:
             left = own.residual - own.columns @ always[own.index]
             for item, amplitudes in mean:
                 left = left - evidence.contribution(i, c, evidence.items[item], amplitudes)
-            parts.append(Left(left, left * own.covariance.solve(left), e.motion.period * e.motion.thinning))
+            step = e.motion.period * e.motion.thinning
+            parts.append(Left(left, left * own.covariance.solve(left), found.weighed.runs[i][c].settles == 0, step))
         one = bursts(parts)
         if one is not None:
             told[c] = one

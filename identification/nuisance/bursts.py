@@ -23,10 +23,12 @@ FEWEST = 12
 
 @dataclass(frozen=True)
 class Left:
-    """What is left of one channel of one recording: residual (n,) [T], its part of e' K⁻¹ e (n,), period [s]."""
+    """What is left of one channel of one recording: residual (n,) [T], its part of e' K⁻¹ e (n,), whether a sample is
+    far from rest (n,), period [s]."""
 
     residual: Array
     energy: Array
+    moves: NDArray[np.bool_]
     step: float
 
 
@@ -43,15 +45,17 @@ class Bursts:
 def bursts(channel: Sequence[Left]) -> Bursts | None:
     """Whether one channel's residual comes in bursts: `BURST_SHARE` of it above `BURST_LOUD` times the median window.
 
-    It comes again if as much is left without the loudest window: what was there once, as a knock is, could not be held
-    to any law of the arm's.
+    Windows count that are at least half in motion, and by that half. It comes again if as much is left without the
+    loudest window: what was there once, as a knock is, could not be held to any law of the arm's.
     """
     strength, parts = [], []
     for own in channel:
         length = max(round(BURST_WINDOW / own.step), 2)
         for k in range(0, len(own.residual) - length + 1, length):
-            strength.append(float(np.mean(own.energy[k : k + length])))
-            parts.append((own.residual[k : k + length], 1 / own.step))
+            moves = own.moves[k : k + length]
+            if np.mean(moves) >= 0.5:
+                strength.append(float(np.mean(own.energy[k : k + length][moves])))
+                parts.append((own.residual[k : k + length], 1 / own.step))
     if len(strength) < FEWEST:
         return None
     z = np.maximum(np.array(strength), 0.0)
@@ -60,6 +64,8 @@ def bursts(channel: Sequence[Left]) -> Bursts | None:
         return None
     once = int(np.argmax(z))
     f, power = periodogram(parts[once][0], parts[once][1], window="hann", nfft=1024)
+    if f[np.argmax(power)] < 1 / BURST_WINDOW:
+        return None  # no window holds a period of it
     again = _share(np.delete(over, once), np.delete(z, once)) > BURST_SHARE
     return Bursts(share, float(f[np.argmax(power)]), again)
 
