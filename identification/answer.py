@@ -68,10 +68,10 @@ def report_on(
         remainder = f" Part of what is left on {listed([channels[c] for c in loud])} has no name." if loud else ""
     else:
         remainder = f" {description[:1].upper()}{description[1:]}." if description else ""
-    noise = [
-        noise_words(channels[c], fits[c].unit, x, [row[c].encoder for row in found.weighed.runs])
+    noise = {
+        channels[c]: noise_words(fits[c].unit, x, [row[c].encoder for row in found.weighed.runs])
         for c, x in enumerate(found.weighed.noises)
-    ]
+    }
     named = {n.placed.key for n in best.names}
     notes = [f"{Path(e.motion.path).name}: {note}" for e in (*train, *held) for note in e.motion.notes]
     notes += [
@@ -86,7 +86,7 @@ def report_on(
         for c, b in left.bursts.items()
         if not b.again
     ]
-    notes += noise + _excitation(train)
+    notes += [f"noise of {c}: {words}" for c, words in noise.items()] + _excitation(train)
     candidates = tuple(
         Candidate(t.placed.effect.name, t.placed.at, t.explained, t.odds, t.placed.key in named)
         for t in found.trials
@@ -99,7 +99,9 @@ def report_on(
         explained = [(e.measured - e.motion.to_band(final.assembly.torque(e, final.theta))) * spoken for e in train]
     return Diagnosis(
         decided.verdict,
-        verdict_sentence(findings, [f for c, f in enumerate(fits) if findings or not loud or c in loud], remainder),
+        verdict_sentence(
+            findings, [f for c, f in enumerate(fits) if findings or not loud or c in loud], remainder, noise
+        ),
         description,
         model.name,
         findings,

@@ -1,6 +1,6 @@
 """The words of a diagnosis: verdict, evidence and experiments, as a test engineer would say them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,7 +52,7 @@ def experiment_sentence(placed: Placed, rival: Placed) -> str:
     return own.format(at=placed.at.removeprefix("tau.").removeprefix("q."))
 
 
-def noise_words(channel: str, unit: str, noise: Noise, encoders: Sequence[NDArray[np.float64]]) -> str:
+def noise_words(unit: str, noise: Noise, encoders: Sequence[NDArray[np.float64]]) -> str:
     """What a channel's noise is made of, with sizes and times."""
     u = unit.replace("*", "·")
     heard = float(np.sqrt(np.mean(np.concatenate(encoders) ** 2)))
@@ -62,11 +62,13 @@ def noise_words(channel: str, unit: str, noise: Noise, encoders: Sequence[NDArra
         f"a wander of {noise.wander:.2g} {u} over {noise.wander_time:.2g} s",
         f"{heard:.2g} {u} of the encoders",
     ]
-    return f"noise of {channel}: {listed(parts)}"
+    return listed(parts)
 
 
-def verdict_sentence(findings: Sequence[Finding], fit: Sequence[ChannelFit], remainder: str) -> str:
-    """The first sentence of the report."""
+def verdict_sentence(
+    findings: Sequence[Finding], fit: Sequence[ChannelFit], remainder: str, noise: Mapping[str, str] | None = None
+) -> str:
+    """The first sentence of the report; ``noise`` tells what explains the rest of each channel."""
     if findings:
         worst = max(fit, key=lambda f: f.holdout.relative_before - f.holdout.relative_after)
         fall = from_to(worst.holdout.relative_before, worst.holdout.relative_after)
@@ -77,18 +79,19 @@ def verdict_sentence(findings: Sequence[Finding], fit: Sequence[ChannelFit], rem
     if remainder:
         worst = max(fit, key=lambda f: f.holdout.relative_before)
         return f"Something is missing on {worst.channel} that no effect of the vocabulary explains.{remainder}"
-    return f"The model is adequate: nothing larger than the limits listed is left out. {_rest(fit)}"
+    return f"The model is adequate: nothing larger than the limits listed is left out. {_rest(fit, noise or {})}"
 
 
-def _rest(fit: Sequence[ChannelFit]) -> str:
+def _rest(fit: Sequence[ChannelFit], noise: Mapping[str, str]) -> str:
     """What an adequate model leaves over on the channel where that stands highest above the noise."""
     worst = max(fit, key=lambda f: f.holdout.rms_before / f.noise_floor if f.noise_floor > 0 else 0.0)
     left = (
         f"What it leaves over on the held-out recording is {percent(worst.holdout.relative_before)} of {worst.channel}"
     )
-    if not worst.noise_floor > 0:
-        return f"{left}."
-    return f"{left}, {worst.holdout.rms_before / worst.noise_floor:.2g} times that channel's noise floor."
+    if worst.noise_floor > 0:
+        left += f", {worst.holdout.rms_before / worst.noise_floor:.2g} times that channel's noise floor"
+    told = f" It is noise: {noise[worst.channel]}." if worst.channel in noise else ""
+    return f"{left}.{told}"
 
 
 def named(findings: Sequence[Finding]) -> str:

@@ -101,7 +101,8 @@ def confirm(
             whole = foretold(model, final, found, train, held, scales)
             stale = set(left)
             progress(f"confirming on the held-out recordings: {len(rejected)} not missed, {len(left)} left")
-    return Confirmed(found, tuple(left.values()), tuple(rejected), weak, missed, model, final, whole)
+    names = tuple(sorted(left.values(), key=lambda n: -missed[n.placed.key].gain))
+    return Confirmed(found, names, tuple(rejected), weak, missed, model, final, whole)
 
 
 def foretold(
