@@ -13,8 +13,10 @@ from snarelab.identification.diagnosis import ChannelFit, Finding, Misfit, Step
 from snarelab.identification.evidence.confirm import Missed
 from snarelab.identification.evidence.diagnose import Decided
 from snarelab.identification.evidence.found import Name, Remainder, Trial
+from snarelab.identification.evidence.left import LeftOver
 from snarelab.identification.evidence.rival import RivalOdds
 from snarelab.identification.fitting.experiment import Experiment
+from snarelab.identification.nuisance.bursts import Bursts
 from snarelab.identification.nuisance.noise import Noise
 
 NAMES = ("joint1", "joint2", "joint3")
@@ -25,10 +27,7 @@ TREE: Any = SimpleNamespace(
 MODEL: Any = SimpleNamespace(tree=TREE, joints=NAMES, name="arm")
 COULOMB, BACKLASH, BIAS = (placed(n, "joint1") for n in ("coulomb_friction", "backlash", "sensor_bias"))
 QUIET = Noise(0.1, 0.2, 0.3, 0.4, 8.0, 0.5)
-HEARD = (
-    "noise of tau.joint1: 0.1 N·m from sample to sample, 0.2 N·m over 0.3 s, a wander of 0.4 N·m over 8 s "
-    "and 5 N·m of the encoders"
-)
+HEARD = "0.1 N·m from sample to sample, 0.2 N·m over 0.3 s, a wander of 0.4 N·m over 8 s and 5 N·m of the encoders"
 
 
 def experiment(tau, path="/data/a.csv", notes=(), **given):
@@ -58,16 +57,16 @@ def curve(channel, over, explained) -> Remainder:
     return Remainder(channel, over, 20.0, explained, 3.0)
 
 
-def decided(*, names=(), rest=(), rejected=(), missed=None, **found) -> Decided:
+def decided(*, names=(), rest=(), bursting=(), rejected=(), missed=None, **found) -> Decided:
     best: Any = SimpleNamespace(names=tuple(names), missed=missed or {}, found=SimpleNamespace(**found))
-    return Decided(best, tuple(rest), tuple(rejected))
+    return Decided(best, LeftOver(tuple(rest), dict(bursting)), tuple(rejected))
 
 
 @pytest.fixture
 def reported(monkeypatch):
     """The report on what was decided; ``relative`` is what is left of each channel's torque."""
 
-    def report(*, names=(), rest=(), rejected=(), trials=(), relative: Any = 0.1, train=None, held=()):
+    def report(*, names=(), rest=(), bursting=(), rejected=(), trials=(), relative: Any = 0.1, train=None, held=()):
         left = np.broadcast_to(relative, 3)
         both = [(Misfit(9, 9, 9, x), Misfit(9, 9, x, x / 2)) for x in left]
         fits = [ChannelFit(f"tau.{n}", u, *own, 0) for n, u, own in zip(NAMES, ("N*m", "N", "N*m"), both, strict=True)]
@@ -84,7 +83,15 @@ def reported(monkeypatch):
             noises=[replace(QUIET, white=w) for w in (0.1, 0.0123, 4.0)],
             runs=[[SimpleNamespace(encoder=np.full(4, x)) for x in row] for row in encoders],
         )
-        told = decided(names=names, rest=rest, rejected=rejected, trials=trials, weighed=weighed, first=fit([1, 1, 1]))
+        told = decided(
+            names=names,
+            rest=rest,
+            bursting=bursting,
+            rejected=rejected,
+            trials=trials,
+            weighed=weighed,
+            first=fit([1, 1, 1]),
+        )
         train = train or [experiment(np.ones((4, 3)))]
         return answer.report_on(MODEL, told, fit([3, 5, 7]), (Step("s", 1, 1),), train, held)
 
@@ -150,7 +157,7 @@ def test_with_a_finding_the_rest_is_told_by_its_channels(reported):
 def test_an_adequate_model_is_told_by_the_worst_channel(reported):
     made = reported(relative=(0.02, 0.03, 0.01))
     assert (made.verdict, made.description) == ("adequate", "")
-    assert "What it leaves over on the held-out recording is " in made.sentence
+    assert made.sentence.endswith(f" is 2 % of tau.joint1. It is noise: {HEARD}.")
     assert (made.model, made.steps, made.moved, made.traces, made.limits) == (
         "arm", (Step("s", 1, 1),), "_moved", "_traces", "_limits",
     )  # fmt: skip
@@ -172,11 +179,28 @@ def test_notes_tell_the_recordings_first_then_what_was_not_named_then_the_noise(
         "backlash at joint1 passed on the training recordings, but the held-out ones are foretold no better with it: "
         "not named",
     )
-    assert made.notes[5] == HEARD
+    assert made.notes[5] == f"noise of tau.joint1: {HEARD}"
     assert made.notes[6].startswith("noise of tau.joint2: 0.012 N from sample to sample, 0.2 N over 0.3 s,")
     assert made.notes[6].endswith("and 1 N of the encoders")
     assert made.notes[7].startswith("noise of tau.joint3: 4 N·m from sample to sample,")
     assert made.notes[8:] == ("excited",)
+
+
+@pytest.mark.parametrize("again", [True, False])
+@pytest.mark.parametrize("curves", [(), (curve(1, "speed", 0.49),)])
+def test_bursts_have_no_name_unless_they_came_once(reported, again, curves):
+    made = reported(rest=curves, bursting=[(2, Bursts(0.36, 12.345, again))], relative=0.1)
+    text = (
+        "on tau.joint3, 36 % of the residual comes in bursts, at 12 Hz where it is strongest "
+        "(6 % of the channel's torque)"
+    )
+    smooth = [words("joint2", "speed", "49 %", "7 %")] * len(curves)
+    assert made.description == "; ".join([*smooth, *[text] * again])
+    assert made.verdict == ("unknown_effect" if again or curves else "adequate")
+    knock = "on tau.joint3, 36 % of the residual stands in one window and has not come again: a knock, or an outlier"
+    assert (knock in made.notes) is not again
+    (residual,) = cast(Any, made.location)
+    assert np.flatnonzero(residual[0]).tolist() == [1] * len(curves) + [2] * again
 
 
 def test_candidates_are_what_explains_anything_by_itself(reported):

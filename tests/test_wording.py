@@ -104,6 +104,8 @@ def test_without_a_name_it_is_the_worst_channel_that_is_told():
         "The model is adequate: nothing larger than the limits listed is left out. "
         "What it leaves over on the held-out recording is 30 % of tau.joint1."
     )
+    told = verdict_sentence([], FITS, "", {"tau.joint1": "5 N·m from sample to sample", "tau.joint2": "none"})
+    assert told.endswith("is 30 % of tau.joint1. It is noise: 5 N·m from sample to sample.")
     noisy = replace(FITS[1], noise_floor=0.8)
     assert verdict_sentence([], [FITS[0], noisy], "").endswith(
         "is 25 % of tau.joint2, 1.2 times that channel's noise floor."
@@ -153,10 +155,9 @@ def test_how_often_a_name_of_torques_is_right_is_logistic_in_both_evidences(gain
 def test_what_a_noise_is_made_of_is_told_with_sizes_and_times():
     """Of the encoders the RMS over all recordings, of any length: √((3 · 4 + 5 · 0) / 8) = √1.5 here."""
     noise = Noise(0.0123, 0.2, 0.345, 4.0, 40.0, 9.0)
-    told = noise_words("tau.joint1", "N*m", noise, [np.full(3, 2.0), np.zeros(5)])
+    told = noise_words("N*m", noise, [np.full(3, 2.0), np.zeros(5)])
     assert told == (
-        "noise of tau.joint1: 0.012 N·m from sample to sample, 0.2 N·m over 0.34 s, a wander of 4 N·m over 40 s "
-        "and 1.2 N·m of the encoders"
+        "0.012 N·m from sample to sample, 0.2 N·m over 0.34 s, a wander of 4 N·m over 40 s and 1.2 N·m of the encoders"
     )
 
 
