@@ -22,7 +22,7 @@ from pathlib import Path
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 
-from bench.kills import alive
+from bench.killed import alive
 from bench.oscillator_fmu import build
 from bench.results import write_result
 
