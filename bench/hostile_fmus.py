@@ -22,6 +22,7 @@ from pathlib import Path
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 
+from bench.fmu_models import redescribed
 from bench.killed import alive
 from bench.oscillator_fmu import build
 from bench.results import write_result
@@ -167,20 +168,13 @@ def _memory(process: int) -> float:
     return 0.0
 
 
-def _rewritten(source: Path, target: Path, change: Callable[[str], str]) -> None:
-    """A copy with another model description."""
-    with zipfile.ZipFile(source) as old, zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as new:
-        for entry in old.infolist():
-            data = old.read(entry)
-            changed = change(data.decode()).encode() if entry.filename == "modelDescription.xml" else data
-            new.writestr(entry.filename, changed)
-
-
 def _with_variables(make: Callable[[], str]) -> Callable[[Path, Path], None]:
     """More variables in a sound FMU of FMI 3.0."""
 
     def change(folder: Path, target: Path) -> None:
-        _rewritten(folder / "left3.fmu", target, lambda t: t.replace("</ModelVariables>", f"{make()}</ModelVariables>"))
+        redescribed(
+            folder / "left3.fmu", target, lambda t: t.replace("</ModelVariables>", f"{make()}</ModelVariables>")
+        )
 
     return change
 
@@ -193,18 +187,18 @@ def _array(name: str, reference: int, size: str) -> str:
 
 
 def _wrong_reference(folder: Path, target: Path) -> None:
-    _rewritten(folder / "left2.fmu", target, lambda t: t.replace('valueReference="12"', 'valueReference="4000000000"'))
+    redescribed(folder / "left2.fmu", target, lambda t: t.replace('valueReference="12"', 'valueReference="4000000000"'))
 
 
 def _bomb(folder: Path, target: Path) -> None:
-    _rewritten(folder / "left2.fmu", target, lambda t: t)
+    redescribed(folder / "left2.fmu", target, lambda t: t)
     with zipfile.ZipFile(target, "a", zipfile.ZIP_DEFLATED) as archive, archive.open("resources/zeros", "w") as entry:
         for _ in range(300):
             entry.write(bytes(1 << 20))
 
 
 def _other_binary(folder: Path, target: Path) -> None:
-    _rewritten(folder / "left2.fmu", target, lambda t: t.replace('canGetAndSetFMUstate="true"', ""))
+    redescribed(folder / "left2.fmu", target, lambda t: t.replace('canGetAndSetFMUstate="true"', ""))
     with zipfile.ZipFile(target) as old:
         entries = {e.filename: old.read(e) for e in old.infolist()}
     with zipfile.ZipFile(target, "w") as new:
