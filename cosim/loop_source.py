@@ -68,22 +68,29 @@ static double combine(const double *weights, const double *const *known, long n,
 
 /* What is held of outputs from one to another: over the step, and over its halves where any unit takes these. */
 static void hold(const Plan *p, const double *rows, const double *const *known, double *held, long from, long to) {
-    for (long part = 0; part < (p->halves ? 3 : 1); part++)
+    for (long i = from; i < to; i++) held[i] = combine(rows, known, p->n_points, i);
+    if (!p->halves) return;
+    for (long part = 1; part < 3; part++)
         for (long i = from; i < to; i++) held[part * p->n_out + i] = combine(rows + 3 * part, known, p->n_points, i);
 }
 
 /* A unit's step on what is held, in one or in halves; call says which function failed. */
 static int advance(const Plan *p, const Unit *u, double time, const double *held, double *input, long *call) {
     int bad;
-    double size = u->halves ? 0.5 * p->size : p->size;
+    double size = p->size;
+    if (u->halves) {
+        size *= 0.5;
+        *call = 0;
+        if ((bad = set(p, u, held + p->n_out, input))) return bad;
+        *call = 1;
+        if ((bad = step(u, time, size))) return bad;
+        time += size;
+        held += 2 * p->n_out;
+    }
     *call = 0;
-    if ((bad = set(p, u, u->halves ? held + p->n_out : held, input))) return bad;
+    if ((bad = set(p, u, held, input))) return bad;
     *call = 1;
-    if ((bad = step(u, time, size)) || !u->halves) return bad;
-    *call = 0;
-    if ((bad = set(p, u, held + 2 * p->n_out, input))) return bad;
-    *call = 1;
-    return step(u, time + size, size);
+    return step(u, time, size);
 }
 
 /* Rows (n, 1 + n_out) of time and outputs; the rows before the first are the past. Number of good steps. */

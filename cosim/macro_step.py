@@ -11,7 +11,7 @@ first step is therefore iterated, on the line between its ends.
 
 import math
 from contextlib import suppress
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,8 +25,7 @@ from .sweep import Sweep
 from .system import System
 
 
-@dataclass(frozen=True)
-class Taken:
+class Taken(NamedTuple):
     """A step that is good enough.
 
     Parameters
@@ -99,7 +98,9 @@ class MacroStep:
         while True:
             try:
                 outputs = self._trial(time, size, states, starter)
-                error = self._error(outputs, size) if self._control else 0.0
+                if self._control is None:
+                    return Taken(outputs, size, None)
+                error = self._error(outputs, size)
             except StepError as failure:
                 if self._control is None or size <= self._control.smallest:
                     if states:
@@ -110,9 +111,6 @@ class MacroStep:
                 reason = str(failure)
             else:
                 reason = f"inputs off by {error:.2g} times the tolerance"
-            if self._control is None:
-                assert outputs is not None
-                return Taken(outputs, size, None)
             degree = min(self._hold.degree, len(self.past) - 1)
             wanted = self._control.next_size(size, error, degree, rejected=error > 1)
             if outputs is not None and (error <= 1 or size <= self._control.smallest):

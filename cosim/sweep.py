@@ -220,15 +220,17 @@ class Sweep:
         source, factor, offset, mean, still = self._reading[i]
         jumps = self._jumps[i]
         participant, order = self._participants[i], self._orders[i]
-        values = [factor * row[source] + offset for row in (held if order == HALVES else held[:1])]
-        for value in values if len(jumps) else ():
-            value[jumps] = factor[jumps] * start[source[jumps]] + offset[jumps]
+        values = factor * held[0][source] + offset
+        if len(jumps):
+            values[jumps] = factor[jumps] * start[source[jumps]] + offset[jumps]
         if order == HALVES:
-            participant.set_input_halves(*values)
-            mean[:] = 0.5 * (values[0] + values[1])
+            second = factor * held[1][source] + offset
+            second[jumps] = values[jumps]
+            participant.set_input_halves(values, second)
+            mean[:] = 0.5 * (values + second)
             return
-        participant.set_inputs(values[0])
-        mean[:] = values[0]
+        participant.set_inputs(values)
+        mean[:] = values
         if participant.input_order and not self._hold.middle:
             slopes = [factor * row[source] for row in held[1 : order + 1]]
             for slope in slopes if len(jumps) else ():

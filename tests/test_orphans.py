@@ -190,7 +190,7 @@ step = 1e-3
 stop = 1000.0
 [participants.left]
 fmu = "left2.fmu"
-parameters = { fault = 2, fault_time = 20.0 }
+parameters = {{ fault = 2, fault_time = {fault_time} }}
 [participants.right]
 fmu = "right2.fmu"
 [connections]
@@ -200,27 +200,36 @@ fmu = "right2.fmu"
 """
 
 
-@pytest.mark.parametrize("more", [[], ["--same-process"]])
-def test_a_killed_run_leaves_its_rows_and_nothing_else(halves, tmp_path, more):
-    """The FMU hangs at 20 s, after the first report on any machine; the run is killed while it steps, or then."""
-    (halves / "hanging.toml").write_text(RUN)
+@pytest.mark.parametrize(
+    ("fault_time", "more"),
+    [(20.0, []), (0.002, []), (20.0, ["--same-process"])],
+    ids=["steps", "hangs", "same-process"],
+)
+def test_a_killed_run_leaves_its_rows_and_nothing_else(halves, tmp_path, fault_time, more):
+    """The FMU hangs at 20 s, after the first report on any machine, or at once; the kill comes as it steps, or then."""
+    system = tmp_path / "system.toml"
+    system.write_text(RUN.format(fault_time=fault_time).replace('fmu = "', f'fmu = "{halves}/'))
+    hangs = fault_time < 1.0
     (tmp_path / "tmp").mkdir()
-    environment = {**os.environ, "TMPDIR": str(tmp_path / "tmp"), "SNARELAB_KILLS": f"run-{os.getpid()}-{len(more)}"}
-    command = [sys.executable, "-m", "snarelab.cli", "cosim", str(halves / "hanging.toml"), "--out", "run.csv", *more]
+    mark = f"run-{os.getpid()}-{fault_time}-{len(more)}"
+    environment = {**os.environ, "TMPDIR": str(tmp_path / "tmp"), "SNARELAB_KILLS": mark}
+    command = [sys.executable, "-m", "snarelab.cli", "cosim", str(system), "--out", "run.csv", *more]
     run = subprocess.Popen(command, cwd=tmp_path, env=environment, start_new_session=True)
     rows = tmp_path / "unfinished-run.csv"
     until(rows.exists)
-    if not more:  # the loop in C comes to the hanging step before it reports
+    if hangs:
+        time.sleep(2.0)  # the journal stands at the first step; the third one hangs
+    elif not more:  # the loop in C comes to the hanging step before it reports
         until(lambda: rows.stat().st_size > 200)
     assert list((tmp_path / "tmp").iterdir())
     run.kill()
     run.wait()
     until(lambda: not alive(environment["SNARELAB_KILLS"]), 10.0)
     until(lambda: not list((tmp_path / "tmp").iterdir()), 5.0)
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["tmp", "unfinished-run.csv"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["system.toml", "tmp", "unfinished-run.csv"]
     table = pd.read_csv(rows)
     assert {"time", "left.x [m]", "right.force [N]"} <= set(table)
-    assert more or (len(table) > 1 and table["time"].is_monotonic_increasing)
+    assert more or hangs or (len(table) > 1 and table["time"].is_monotonic_increasing)
 
 
 def test_temporary_folders_are_gone_with_a_killed_process(tmp_path):
