@@ -115,6 +115,23 @@ def test_a_step_that_is_off_is_repeated_shorter_and_at_the_smallest_it_is_taken(
     assert run.evaluations == run.steps + run.rejected == 3
 
 
+@pytest.mark.parametrize(
+    ("error", "degree", "rejected", "size"),
+    [
+        (0.25, 0, False, 0.2),  # 0.36, but never more than twice the last one
+        (0.81, 1, False, 0.1),
+        (0.729, 2, False, 0.1),
+        (4.0, 1, True, 0.045),
+        (1e9, 1, True, 0.02),  # a fifth at least
+        (1e-9, 1, True, 0.1),  # not larger when it is repeated
+        (0.0, 2, False, 0.2),
+    ],
+)
+def test_the_next_step_follows_the_order_of_the_error(error, degree, rejected, size):
+    """0.9 of the step at which an error of order degree + 1 would be 1."""
+    assert StepControl().next_size(0.1, error, degree, rejected) == pytest.approx(size)
+
+
 def test_an_iteration_is_counted_and_ends_where_outputs_are_what_was_assumed():
     """Two forces and speeds that follow each other: at least two evaluations a step, and the masses' sum is kept."""
     given = Iteration(tolerance=1e-10)

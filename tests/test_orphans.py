@@ -134,6 +134,17 @@ def test_ctrl_c_is_the_importers_and_reset_revives(tmp_path, version):
     slave.close()
 
 
+def test_a_host_is_in_a_session_of_its_own_before_its_python_runs(talking, tmp_path, monkeypatch):
+    """Ctrl-C while it starts would end it else: a wrapper of the interpreter notes process, group and session."""
+    wrapper, noted = tmp_path / "python", tmp_path / "noted"
+    wrapper.write_text(f"#!/bin/sh\ncut -d' ' -f1,5,6 /proc/$$/stat > {noted}\nexec {sys.executable} \"$@\"\n")
+    wrapper.chmod(0o755)
+    monkeypatch.setenv("SNARELAB_PYTHON", str(wrapper))
+    Slave(talking, tmp_path / "x", {"u": 1.0}).close()
+    process, group, session = noted.read_text().split()
+    assert process == group == session
+
+
 @pytest.fixture(scope="module")
 def hostile(tmp_path_factory):
     return build(tmp_path_factory.mktemp("hostile"), "left", 2, defined=("HOSTILE",))
