@@ -62,6 +62,7 @@ def error_figure(panels: Sequence[Panel], slope: str = "order") -> bytes:
             panel.legend(loc="lower right", fontsize=7)
             plain_ticks(panel, x)
         axes[0].set_ylabel("largest position error [m]")
+        axes[0].set_ylim(bottom=0.03 * min(min(errors) for *_, curves in panels for errors in curves.values()))
         picture = svg(figure)
         plt.close(figure)
     return picture
