@@ -6,6 +6,7 @@ import signal
 import sys
 import time
 from types import SimpleNamespace
+from typing import Any
 
 import fmpy
 import numpy as np
@@ -258,7 +259,8 @@ def test_hang_and_crash_of_a_participant_in_its_own_process(files, fault, said):
 def test_own_process_gives_the_same_bits_rolls_back_and_ends(files, fmi):
     left = OwnProcess(Fmu, files["left", fmi])
     apart = System({"left": left, "right": Fmu(files["right", fmi])}, CONNECTIONS)
-    for options in ({}, {"hold": "quadratic"}, {"iterate": True, "scheme": "gauss_seidel"}):
+    kinds: list[dict[str, Any]] = [{}, {"hold": "quadratic"}, {"iterate": True, "scheme": "gauss_seidel"}]
+    for options in kinds:
         ours = Master(apart, 1e-2, **options).run(0.3).recording
         with Master(system(files, fmi), 1e-2, **options) as master:
             assert ours.equals(master.run(0.3).recording)
