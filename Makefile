@@ -43,9 +43,10 @@ fuzz: .venv/installed ## broken files at every reader, SECONDS for each
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt '.[fuzz]'
 	$(BIN)/python tests/fuzz --seconds $(SECONDS)
 
-kills: .venv/installed ## two hundred runs, and as many importers of FMUs, killed at random: nothing lost that was reported, nothing left
+kills: .venv/installed ## runs, importers of FMUs and `snarelab cosim`, two hundred each, killed at random: nothing lost that was reported, nothing left; resumed
 	$(BIN)/python bench/kills.py
-	$(BIN)/python bench/importer_kills.py
+	$(BIN)/python bench/importer_kills.py c python
+	$(BIN)/python bench/importer_kills.py cosim
 
 hostile: .venv/installed ## forty FMUs that crash, hang, fork and lie: each ends in one line
 	$(BIN)/python bench/hostile_fmus.py
