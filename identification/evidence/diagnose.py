@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 from ...models.model import Model
 from ..deciding import SECOND_CHOICES
@@ -23,8 +24,8 @@ class Decided:
     rejected: tuple[Name, ...]
 
     @property
-    def verdict(self) -> str:
-        """``missing_physics``, ``unknown_effect`` or ``adequate``."""
+    def verdict(self) -> Literal["missing_physics", "unknown_effect", "adequate"]:
+        """By what is named and what is left."""
         if self.best.names:
             return "missing_physics"
         nameless = self.left.curves or any(b.again for b in self.left.bursts.values())
