@@ -146,7 +146,7 @@ def _finding(n: Name, decided: Decided, final: Fit, every: Sequence[str]) -> Fin
         )
         for r in n.rivals
     )
-    sentence = evidence_sentence(placed, n.explained, [every[c] for c in n.channels], *missed.trial)
+    sentence = evidence_sentence(placed, [every[c] for c in n.channels], *missed.trial)
     return Finding(placed.effect.name, placed.at, missed.sure, n.share * scale, parameters, sentence, rivals, n.gain)
 
 

@@ -26,20 +26,19 @@ def from_to(before: float, after: float) -> str:
     return f"from {percent(before, digits)} to {percent(after, digits)}"
 
 
-def evidence_sentence(
-    placed: Placed, explained: float, channels: Sequence[str], relative_with: float, relative_without: float
-) -> str:
+def evidence_sentence(placed: Placed, channels: Sequence[str], relative_with: float, relative_without: float) -> str:
     """What an effect explains, and what happens on the held-out recording when it is taken out again."""
     where = " and ".join(channels) if len(channels) < 3 else f"{len(channels)} channels"
     what = placed.effect.sentence
+    explained = 1 - (relative_with / relative_without) ** 2 if relative_without > relative_with else 0.0
     return (
-        f"{what[:1].upper()}{what[1:]}: it explains {_part(explained)} what the model so far left over on {where}; "
-        f"taking it out again raises the error on the held-out recording {from_to(relative_with, relative_without)}."
+        f"{what[:1].upper()}{what[1:]}: it explains {_part(explained)} what the model without it leaves over on "
+        f"{where}; taking it out again raises the error on the held-out recording {from_to(relative_with, relative_without)}."
     )
 
 
 def _part(share: float) -> str:
-    """A share of what was left; another effect that is fitted beside it can make one's own share more than all."""
+    """A share of what was left."""
     return "all of" if share > 0.995 else f"{percent(share)} of"
 
 

@@ -70,9 +70,9 @@ def test_the_rivals_experiment_is_proposed_where_it_is_another(own, other, text)
     ("channels", "where"), [(["a"], "a"), (["a", "b"], "a and b"), (["a", "b", "c"], "3 channels")]
 )
 def test_evidence_tells_what_is_explained_where_and_what_happens_without(channels, where):
-    assert evidence_sentence(placed("joint1", ""), 0.42, channels, 0.031, 0.26) == (
-        f"Friction that rubs: it explains 42 % of what the model so far left over on {where}; "
-        "taking it out again raises the error on the held-out recording from 3.1 % to 26 %."
+    assert evidence_sentence(placed("joint1", ""), channels, 0.08, 0.1) == (
+        f"Friction that rubs: it explains 36 % of what the model without it leaves over on {where}; "
+        "taking it out again raises the error on the held-out recording from 8 % to 10 %."
     )
 
 
@@ -185,6 +185,6 @@ def test_what_is_less_likely_than_not_is_said_last_and_so():
 
 
 def test_nothing_explains_more_than_all():
-    assert "it explains all of what the model so far left over on a;" in evidence_sentence(
-        placed("joint1", ""), 1.18, ["a"], 0.031, 0.26
+    assert "it explains all of what the model without it leaves over on a;" in evidence_sentence(
+        placed("joint1", ""), ["a"], 0.001, 0.26
     )

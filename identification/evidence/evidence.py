@@ -193,6 +193,7 @@ class Projected:
         self.beside_all = solve_triangular(self._low, beside, lower=True)
         self.score_all = score - self.beside_all.T @ self._seen
         self._crossed: dict[int, Array] = {}
+        self._left: dict[int, float] = {}
         self.groups = self._grouped()
         self._at = {int(x): (g, row) for g in self.groups for row, x in enumerate(g.numbers)}
 
@@ -217,6 +218,17 @@ class Projected:
             positive = np.stack([x.positive for x in items])
             made.append(Group(np.array(numbers), index, spread, positive, whole, curvature, score))
         return made
+
+    def left(self, c: int) -> float:
+        """e' K⁻¹ e of a channel of all these recordings, e what is left by all that stands beside, at its mean."""
+        if c not in self._left:
+            always, total = self.beside([]), 0.0
+            for i in self.recordings:
+                own = self.evidence.channels[i][c]
+                e = own.residual - own.columns @ always[own.index]
+                total += float(e @ own.covariance.solve(e))
+            self._left[c] = total
+        return self._left[c]
 
     def cross(self, number: int) -> Array:
         """C_item' S⁻¹ C of an item, in units of its spread, with every column (k, m)."""

@@ -21,14 +21,13 @@ class Name:
     """An effect that the search named.
 
     ``gain`` is its log Bayes factor on the training recordings, ``share`` its posterior share among all that could
-    stand in its place, ``explained`` the share of its channels' residual energy [0 to 1] that it explains.
+    stand in its place.
     """
 
     placed: Placed
     channels: tuple[int, ...]
     gain: float
     share: float
-    explained: float
     rivals: tuple[RivalOdds, ...]
 
 

@@ -201,8 +201,7 @@ def _name(
     start = {f"{placed.key}.{p.name}": float(v) for p, v in zip(placed.effect.parameters, values, strict=True)}
     channels = tuple(weighed.evidence.reached(item))
     rivals = _rivals(search, slot, amplitudes)
-    explained = share_of_residual(search, slot.taken.item, amplitudes)
-    return Name(placed, channels, slot.gain, float(slot.shares[slot.taken.hypothesis]), explained, rivals), start
+    return Name(placed, channels, slot.gain, float(slot.shares[slot.taken.hypothesis]), rivals), start
 
 
 def _rivals(search: Search, slot: Slot, amplitudes: Array) -> tuple[RivalOdds, ...]:
@@ -238,10 +237,10 @@ def likeness(search: Search, own: int, amplitudes: Array, energy: float, other: 
 
 
 def share_of_residual(search: Search, item: int, amplitudes: Array) -> float:
-    """Share of the whitened residual of its channels that an item explains [0 to 1]."""
+    """Share that an item explains of what stands beside everything leaves of its channels, whitened [0 to 1]."""
     on = search.on
     reached = on.evidence.reached(on.evidence.items[item])
-    energy = sum(on.evidence.energy(i, c) for i in on.recordings for c in reached)
+    energy = sum(on.left(c) for c in reached)
     gained = 2 * float(amplitudes @ on.score(item)) - float(amplitudes @ on.own(item) @ amplitudes)
     return float(np.clip(gained / max(energy, 1e-300), 0.0, 1.0))
 
