@@ -31,9 +31,10 @@ def evidence_sentence(placed: Placed, channels: Sequence[str], relative_with: fl
     where = " and ".join(channels) if len(channels) < 3 else f"{len(channels)} channels"
     what = placed.effect.sentence
     explained = 1 - (relative_with / relative_without) ** 2 if relative_without > relative_with else 0.0
+    told = f"it explains {_part(explained)} what the model without it leaves over on {where}"
     return (
-        f"{what[:1].upper()}{what[1:]}: it explains {_part(explained)} what the model without it leaves over on "
-        f"{where}; taking it out again raises the error on the held-out recording {from_to(relative_with, relative_without)}."
+        f"{what[:1].upper()}{what[1:]}: {told}; "
+        f"taking it out again raises the error on the held-out recording {from_to(relative_with, relative_without)}."
     )
 
 
