@@ -23,6 +23,7 @@ from .data_fault import contradict, data_fault
 from .diagnosis import Diagnosis, Step
 from .fitting.assembly import Assembly
 from .fitting.base_parameters import base_parameters
+from .fitting.constants import notes_on, settled, with_constants
 from .fitting.experiment import Experiment, demand_apart, load_experiments, scales, with_silence
 from .fitting.fit import Fit, channel_rms, fit
 from .fitting.recorded import read_all, with_recorded_joints
@@ -96,12 +97,14 @@ def diagnose(
     checks = early_checks(model, [*read, held])
     if contradict(checks) and not anyway:
         return Answer(data_fault(model, checks), model)
+    given = model
+    model, (*read, held), said = with_constants(model, [*read, held], len(recordings))
     train = with_silence(load_experiments(model, recordings, body, datasets=read))
     band = min(e.motion.band for e in train)
     locked = with_silence(load_experiments(model, [holdout], body, band, datasets=[held]))
     checks = run_checks(model, [*read, held], [*train, *locked], checks, progress)
     if contradict(checks) and not anyway:
-        return Answer(data_fault(model, checks, [*train, *locked]), model)
+        return Answer(data_fault(model, checks, [*train, *locked]), given)
     base = base_parameters(body) if model.inertia == "free" else None
     best = confirm(search(model, base, scales(train), train, progress=progress, seed=seed), train, locked, progress)
     last, rejected = best, {t.judged.placed.key: t for t in best.rejected}
@@ -135,7 +138,8 @@ def diagnose(
     )
     if links:
         diagnosis, after = with_links(diagnosis, after, links, compared)
-    return Answer(replace(diagnosis, checks=checks, notes=(*model.tree.notes, *diagnosis.notes)), after)
+    notes = (*model.tree.notes, *said, *notes_on(final), *diagnosis.notes)
+    return Answer(replace(diagnosis, checks=checks, notes=notes), settled(after))
 
 
 def _steps(

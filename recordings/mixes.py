@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import InputError, nearest
 from .columns import Columns, split_header
-from .signals import Signal
+from .signals import FREE, Signal
 
 
 def with_mixes(columns: Columns, signals: Mapping[str, Signal]) -> tuple[Columns, dict[str, Signal]]:
@@ -121,6 +121,8 @@ def read_signal(path: Path, name: str, entry: object) -> Signal:
     gain = fields.get("gain")
     if isinstance(gain, bool) or not isinstance(gain, int | float | str | None):
         raise InputError(f"{path}: [signals] {name} gain = {gain!r}; allowed is a number or a scalar's name")
+    if gain == FREE and not name.startswith("tau."):
+        raise InputError(f"{path}: [signals] {name} gain = {FREE!r}; only a torque's constant can be identified")
     offset, rate = fields.get("offset", 0.0), fields.get("rate")
     if not _number(offset):
         raise InputError(f"{path}: [signals] {name} offset = {offset!r}; allowed is a number, in the column's unit")

@@ -13,7 +13,7 @@ from ..files import bounded_memory
 from . import csv_table, hdf5, matlab
 from .columns import Columns, check_count, split_header
 from .mixes import with_mixes
-from .signals import FORMS, JointKind, Signal, default_unit, is_signal, joint_of
+from .signals import FORMS, FREE, JointKind, Signal, default_unit, is_signal, joint_of
 from .timebase import UNIFORM, sampling
 from .units import convert, fits, parse_unit
 
@@ -124,7 +124,7 @@ def read_recording(
     idle = [f"{name} is left out, no fit needs it: {fault}" for name, fault in faults.items()]
     dataset = xr.Dataset(variables, {"time": ("time", time, {"unit": "s", "column": time_header})})
     used = {"time": time_header} | {name: raw[name][0] if raw[name] else header for name, header in headers.items()}
-    gains = {signal.gain for signal in signals.values() if isinstance(signal.gain, str)}
+    gains = {signal.gain for signal in signals.values() if isinstance(signal.gain, str) and signal.gain != FREE}
     left_out = _left_out(columns, used, gains | {gain.rpartition("[")[0] for gain in gains})
     return dataset.assign_attrs(path=str(path), notes=[*columns.notes, *idle, *left_out, *_quality(dataset)])
 
@@ -252,7 +252,8 @@ def _in_unit(
     signal: Signal | None,
 ) -> np.ndarray:
     if signal is not None and signal.gain is not None:
-        gain = columns.scalar(signal.gain, name) if isinstance(signal.gain, str) else float(signal.gain)
+        given = 1.0 if signal.gain == FREE else signal.gain
+        gain = columns.scalar(given, name) if isinstance(given, str) else float(given)
         if not math.isfinite(gain) or gain == 0.0:
             raise InputError(
                 f"{columns.path}: gain {signal.gain!r} of [signals] {name!r} is {gain}; a number but 0 is wanted"
