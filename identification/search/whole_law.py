@@ -68,5 +68,5 @@ def _least_height(name: str, at: str, closing: Screening) -> float:
     limits = [x.value for x in closing.limits if (x.name, x.at) == (name, at)]
     if not own or not limits:
         return 0.0
-    (columns,) = own[0].everywhere(own[0].variant).values()
+    columns, *_ = own[0].everywhere(own[0].variant).values()  # of an axis the first joint's, as `_height` has it
     return min(limits) * float(np.max(np.abs(np.concatenate(columns))))
