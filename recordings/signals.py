@@ -55,6 +55,8 @@ class Signal:
         Instead of ``column``, for time: samples a second [Hz] of a recording that has no clock.
     nothing : bool
         Of a torque: nothing drives the joint, it is zero.
+    file : str, optional
+        Another file, from the recording's folder, that the column stands in; it has a row for each of the recording's.
     """
 
     column: str | int
@@ -64,6 +66,7 @@ class Signal:
     offset: float = 0.0
     rate: float | None = None
     nothing: bool = False
+    file: str | None = None
 
     @property
     def parts(self) -> Mapping[str | int, float]:

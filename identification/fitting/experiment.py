@@ -19,6 +19,7 @@ from ...models.rig.kinematics import sling_map
 from ...models.rig.rig import Rig
 from ...models.rigid_body import RigidBody
 from ...recordings.condition import Motion, condition
+from ...recordings.part import part_of
 from .floating_terms import as_carriers, twist_noise, wheel_impulse, with_base, with_twist
 from .recorded import read_all, read_motion
 
@@ -262,9 +263,12 @@ def _without_gaps_in(tensions: Mapping[str, Array], dataset: xr.Dataset) -> xr.D
 
 def demand_apart(recordings: Sequence[str | Path], holdout: str | Path) -> None:
     """Refuse a held-out recording that is fitted too (InputError)."""
-    held = Path(holdout)
-    for fitted in map(Path, recordings):
-        same = held.resolve() == fitted.resolve()
+    part = part_of(holdout)
+    for one in map(part_of, recordings):
+        held, fitted = part.file, one.file
+        same = part.overlaps(one)
+        if not same and held.resolve() == fitted.resolve():
+            continue  # another part of one file
         if same or _is_copy(held, fitted):
             copy = "" if same else f", byte for byte {fitted}"
             raise InputError(
