@@ -26,15 +26,14 @@ from ..models.floating.arm import FloatingArm
 from ..models.floating.tree import FloatingTree, floating_tree, n_carriers
 from ..models.model import Model, Placed
 from ..models.rig.rig import Rig
+from .accelerations import Joints, accelerations_of
 from .base import Base
 from .equations import Equations, Ledger
 from .placed_laws import PlacedLaws, identifier, summed
 from .rigid_arm import Rigid, body_outputs, rigid
 from .sensors import read_sensors
 from .suspension import PLACES, rig_reach, rig_signals
-from .symbolic import root, solved_symmetric
-
-_NEWTON = 6  # friction in proportion to |load| is piecewise linear: it is met after two or three
+from .symbolic import root
 
 
 @dataclass(frozen=True)
@@ -120,7 +119,10 @@ class _Writer:
         motion, hidden = (q, qd), self._hidden(start_q, start_qd)
         on_rig, rig_rates = self._rig(q_link, qd_link, start_link, start_qd)
         friction = self._friction(motion, now, hidden)
-        accelerations, load = self._solved(now, friction, springy, springs, on_rig)
+        on_joints = Joints(
+            friction, self.free, self.linear, self._across(springy), on_rig, self.tau, springs, tuple(springy)
+        )
+        accelerations, load = accelerations_of(now, base, on_joints)
         link_qdd = accelerations[base.size :]
         qdd = ca.SX(link_qdd)
         for j, p in springy.items():
@@ -219,9 +221,7 @@ class _Writer:
             taken += rig_reach(rig, p, q) @ laws.law(p, signals | states)
         return taken, rates
 
-    def _signals(
-        self, p: Placed, motion: tuple[ca.SX, ca.SX], qdd: ca.SX, load: ca.SX, now: Rigid
-    ) -> dict[str, ca.SX]:
+    def _signals(self, p: Placed, motion: tuple[ca.SX, ca.SX], qdd: ca.SX, load: ca.SX, now: Rigid) -> dict[str, ca.SX]:
         """What a law at a joint or an axis reads, of the joints' accelerations and loads (J,)."""
         here, base = self.laws.place_of(p), self.base.size
         along = {"q": motion[0], "qd": motion[1], "qdd": qdd}
@@ -246,43 +246,6 @@ class _Writer:
         slopes = [ca.jacobian(taken, x) for x in (qdd, load)]
         self.free = [s for s in ca.symvar(ca.veccat(taken, *slopes)) if s.name() not in _names(qdd, load)]
         return ca.Function("friction", [qdd, load, *self.free], [taken, *slopes])
-
-    def _solved(
-        self, now: Rigid, friction: ca.Function, springy: dict, springs: ca.SX, on_rig: ca.SX
-    ) -> tuple[ca.SX, ca.SX]:
-        """Accelerations (base and J,) and rigid-body torque (J,)."""
-        size, base = now.inertia.shape[0], self.base.size
-        at_base = ca.SX.sym("acceleration", base)
-        given = self.base.wrench(at_base)
-        by_base = ca.jacobian(given, at_base)
-        steps = 1 if self.linear and not any(ca.which_depends(given, at_base, 2, False)) else _NEWTON
-        found = ca.SX(size, 1)
-        for _ in range(steps):
-            force = now.inertia @ found + now.terms
-            load = force[base:]
-            taken, by_qdd, by_load = friction(found[base:], load, *self.free)
-            residual, matrix = ca.SX(force), ca.SX(now.inertia)
-            if base:
-                here = ca.densify(found[:base])
-                residual[:base] -= ca.substitute(given, at_base, here)
-                matrix[:base, :base] -= ca.substitute(by_base, at_base, here)
-            if self._across(springy):
-                # Friction in proportion to the load of an axis ties its joints: (1 + d friction / d load) is no diagonal.
-                rest = load + on_rig + taken - self.tau
-                tied = not by_load.is_zero()
-                share = ca.inv(ca.SX.eye(self.n) + by_load) if tied else ca.SX.eye(self.n)
-                residual[base:] = share @ rest
-                matrix[base:, base:] += share @ by_qdd
-                found = found - (ca.solve(matrix, residual) if tied else solved_symmetric(matrix, residual))
-                continue
-            for j in range(self.n):
-                if j in springy:
-                    residual[base + j] = load[j] + on_rig[j] - springs[j]
-                else:
-                    residual[base + j] = (load[j] + on_rig[j] + taken[j] - self.tau[j]) / (1 + by_load[j, j])
-                    matrix[base + j, base + j] += by_qdd[j, j] / (1 + by_load[j, j])
-            found = found - solved_symmetric(matrix, residual)
-        return found, now.inertia[base:, :] @ found + now.terms[base:]
 
     def _across(self, springy: dict[int, Placed]) -> bool:
         """Whether an effect acts along several joints at once; InputError beside a springy joint."""

@@ -153,7 +153,9 @@ class PlacedLaws:
 
 def summed(weights: np.ndarray, x: ca.SX) -> ca.SX:
     """Weights (J,) times x (J,): one number, without what counts for nothing."""
-    return sum((x[int(j)] if weights[j] == 1 else float(weights[j]) * x[int(j)] for j in np.flatnonzero(weights)), ca.SX(0))
+    return sum(
+        (x[int(j)] if weights[j] == 1 else float(weights[j]) * x[int(j)] for j in np.flatnonzero(weights)), ca.SX(0)
+    )
 
 
 def identifier(name: str) -> str:

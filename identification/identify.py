@@ -17,8 +17,8 @@ from ..models.rigid_body import RigidBody
 from ..models.snare.setup import SnareTree
 from .fitting.assembly import Assembly
 from .fitting.base_parameters import INERTIAL, BaseParameters, base_parameters
-from .fitting.constants import notes_on, settled, with_constants
 from .fitting.consistent_inertia import ConsistentInertia, consistent_inertia
+from .fitting.constants import notes_on, settled, with_constants
 from .fitting.experiment import Experiment, demand_apart, load_experiments, scales, with_silence
 from .fitting.fit import Fit, channel_rms, fit
 from .fitting.friction_curve import friction_curves, identifiable

@@ -24,6 +24,7 @@ from ..recordings.condition import Motion, condition
 from .fitting.assembly import Assembly
 from .fitting.experiment import Experiment, scales, without_torque
 from .fitting.floating_terms import outside, told, wheel_impulse, with_base, with_twist
+from .fitting.recorded import read_motion
 
 Array = NDArray[np.float64]
 

@@ -1,7 +1,7 @@
 """Places for joint effects: a joint, or an axis along a combination of joints, such as a motor of a coupled wrist.
 
-With w = along · q, an effect's law reads w, its rates and the load back · load, and gives a torque f along w; by virtual
-work the joints feel ``along * f``. ``back`` is how the joints move where w alone moves, along · back = 1.
+With w = along · q, an effect's law reads w, its rates and the load back · load, and gives a torque f along w; by
+virtual work the joints feel ``along * f``. ``back`` is how the joints move where w alone moves, along · back = 1.
 """
 
 from collections.abc import Mapping, Sequence
@@ -112,7 +112,9 @@ def _axis(path: Path, name: str, entry: Any, joints: Sequence[_Joint]) -> Axis:
     if name in kinds:
         raise InputError(f"{path}: [axes] {name!r} is a joint's name; give the axis one of its own")
     good = isinstance(entry, dict) and any(entry.values())
-    if not good or any(isinstance(x, bool) or not isinstance(x, int | float) or not np.isfinite(x) for x in entry.values()):
+    if not good or any(
+        isinstance(x, bool) or not isinstance(x, int | float) or not np.isfinite(x) for x in entry.values()
+    ):
         raise InputError(f"{path}: [axes] {name} = {entry!r}; allowed is {{ joint = factor, ... }}, not all zero")
     for joint in entry:
         if joint not in kinds:

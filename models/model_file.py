@@ -283,8 +283,8 @@ def _signals(
         signals[name] = read_signal(path, name, entry)
         if joint in motors and signals[name].gain == FREE:
             raise InputError(
-                f"{path}: [signals] {name} gain = {FREE!r}; a constant is identified at a joint: mix the motors' columns "
-                "there, as in columns = { c5 = 45.0, c6 = 32.0 }"
+                f"{path}: [signals] {name} gain = {FREE!r}; a constant is identified at a joint: mix the motors' "
+                "columns there, as in columns = { c5 = 45.0, c6 = 32.0 }"
             )
     return signals
 

@@ -33,12 +33,15 @@ def read_servo(path: Path, raw: Mapping[str, Any], joints: Sequence[str]) -> dic
             raise InputError(f"{path}: [servo] {joint!r} is no joint that moves here; there are {', '.join(joints)}")
         if not isinstance(entry, dict) or entry.get("kind") != "position":
             raise InputError(
-                f"{path}: [servo] {joint} = {entry!r}; allowed is {{ kind = 'position', stiffness = ..., damping = ... }}"
+                f"{path}: [servo] {joint} = {entry!r}; allowed is {{ kind = 'position', stiffness = ..., "
+                "damping = ... }"
             )
         extra = sorted(set(entry) - {"kind", "stiffness", "damping"})
         if extra:
             raise InputError(f"{path}: [servo] {joint} has {extra[0]!r}; allowed are kind, stiffness, damping")
-        gains = [_gain(path, joint, key, entry.get(key, usual)) for key, usual in (("stiffness", FREE), ("damping", 0.0))]
+        gains = [
+            _gain(path, joint, key, entry.get(key, usual)) for key, usual in (("stiffness", FREE), ("damping", 0.0))
+        ]
         found[joint] = Servo(*gains)
     return found
 

@@ -37,7 +37,11 @@ class Transmission:
         kind = next(joint.kind for joint in joints if joint.name == self.joints[0])
         rows, columns = np.linalg.inv(self.matrix), self.matrix.T
         return tuple(
-            Axis(motor, *({j: float(x) for j, x in zip(self.joints, own[m], strict=True) if x} for own in (rows, columns)), kind)
+            Axis(
+                motor,
+                *({j: float(x) for j, x in zip(self.joints, own[m], strict=True) if x} for own in (rows, columns)),
+                kind,
+            )
             for m, motor in enumerate(self.motors)
         )
 
@@ -85,7 +89,9 @@ def read_transmission(path: Path, raw: Mapping[str, Any], joints: Sequence[Joint
             raise InputError(f"{path}: [transmission] {key} = {names!r}; allowed is a list of names, each once")
     for joint in moved:
         if joint not in kinds:
-            raise InputError(f"{path}: [transmission] {joint!r} is no joint that moves here; there are {', '.join(kinds)}")
+            raise InputError(
+                f"{path}: [transmission] {joint!r} is no joint that moves here; there are {', '.join(kinds)}"
+            )
     for motor in motors:
         if motor in kinds:
             raise InputError(f"{path}: [transmission] {motor!r} is a joint's name; give the motor one of its own")
@@ -103,10 +109,16 @@ def read_transmission(path: Path, raw: Mapping[str, Any], joints: Sequence[Joint
         )
     size = np.linalg.svd(matrix, compute_uv=False)
     if size[-1] < SINGULAR * size[0]:
-        raise InputError(f"{path}: [transmission] matrix is singular: the motors cannot move the joints apart; correct it")
+        raise InputError(
+            f"{path}: [transmission] matrix is singular: the motors cannot move the joints apart; correct it"
+        )
     return Transmission(tuple(motors), tuple(moved), matrix)
 
 
 def transmission_fields(given: Transmission) -> dict[str, object]:
     """The table that `read_transmission` reads back."""
-    return {"motors": list(given.motors), "joints": list(given.joints), "matrix": [[float(x) for x in r] for r in given.matrix]}
+    return {
+        "motors": list(given.motors),
+        "joints": list(given.joints),
+        "matrix": [[float(x) for x in r] for r in given.matrix],
+    }

@@ -74,8 +74,8 @@ class Tree:
     """Joints and links of a fixed-base tree; ``links[i]`` is moved by ``joints[i]``, parents stand before children.
 
     Behind the joints' links stand those of the ``followers``, in their order. ``notes`` are what a reader of the
-    robot's file did that a user should know, ``weightless`` the joints that are held because they move no mass, ``axes``
-    places for effects along combinations of joints.
+    robot's file did that a user should know, ``weightless`` the joints that are held because they move no mass,
+    ``axes`` places for effects along combinations of joints.
 
     Raises
     ------

@@ -40,8 +40,8 @@ def with_files(
             others[signal.file] = other = load(path)
             if _rows(other) != rows:
                 raise InputError(
-                    f"{path}: has {_rows(other)} rows and {columns.path.name} {rows}; [signals] {name!r} takes a row of "
-                    "each for one sample: they must have as many"
+                    f"{path}: has {_rows(other)} rows and {columns.path.name} {rows}; [signals] {name!r} takes a row "
+                    "of each for one sample: they must have as many"
                 )
         other, weights = others[signal.file], {}
         for column, weight in signal.parts.items():

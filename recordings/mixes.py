@@ -117,7 +117,9 @@ def read_signal(path: Path, name: str, entry: object) -> Signal:
         raise InputError(f"{path}: [signals] {name} rate = {rate!r}; allowed is, for time, a positive number of hertz")
     file = fields.get("file")
     if file is not None and (not isinstance(file, str) or not file or rate is not None):
-        raise InputError(f"{path}: [signals] {name} file = {file!r}; allowed is a file's name, from the recording's folder")
+        raise InputError(
+            f"{path}: [signals] {name} file = {file!r}; allowed is a file's name, from the recording's folder"
+        )
     weights = {k: float(w) for k, w in columns.items()}
     frequency = None if rate is None else float(rate)
     return Signal(column, fields.get("unit"), gain, weights, float(offset), frequency, file=file)

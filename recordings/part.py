@@ -48,7 +48,11 @@ def part_of(path: str | Path) -> Part:
     if match is None or plain.exists():
         return Part(plain)
     start, stop = match["start"], match["stop"]
-    found = Part(Path(match["file"]), -np.inf if start is None else float(start), np.inf if stop is None else float(stop))
+    found = Part(
+        Path(match["file"]), -np.inf if start is None else float(start), np.inf if stop is None else float(stop)
+    )
     if found.start >= found.stop:
-        raise InputError(f"{path}: the part from {found.start:g} s to {found.stop:g} s is empty; write it as FILE@FROM:TO")
+        raise InputError(
+            f"{path}: the part from {found.start:g} s to {found.stop:g} s is empty; write it as FILE@FROM:TO"
+        )
     return found

@@ -1,7 +1,7 @@
 """The names a recording's columns can have, and their SI default units.
 
-``time``; of a joint ``q qd qdd q_link tau command temp``; ``tension.<sling>``; of a body ``pos quat vel omega``; of a wrench
-sensor ``force torque``; ``angle.ring``.
+``time``; of a joint ``q qd qdd q_link tau command temp``; ``tension.<sling>``; of a body ``pos quat vel omega``; of a
+wrench sensor ``force torque``; ``angle.ring``.
 """
 
 from collections.abc import Iterable, Mapping

@@ -25,10 +25,11 @@ TIE, TIE_VISCOUS, TIE_INERTIA = 5.0, 4.0, 0.3
 MATRIX = np.array([[1.0, 0.0], [-1.0, 1.0]])
 """Motor 3 turns with joints 2 and 3: q3 = motor3 - motor2."""
 JOINT_LAWS = '"viscous_friction", "coulomb_friction"'
-AT_MOTOR = [f'{{ name = "{name}", at = "motor3" }}' for name in ("viscous_friction", "coulomb_friction", "rotor_inertia")]
+AT_MOTOR = [
+    f'{{ name = "{name}", at = "motor3" }}' for name in ("viscous_friction", "coulomb_friction", "rotor_inertia")
+]
 TRANSMISSION = (
-    '[transmission]\nmotors = ["motor2", "motor3"]\njoints = ["joint2", "joint3"]\n'
-    "matrix = [[1.0, 0.0], [-1.0, 1.0]]\n"
+    '[transmission]\nmotors = ["motor2", "motor3"]\njoints = ["joint2", "joint3"]\nmatrix = [[1.0, 0.0], [-1.0, 1.0]]\n'
 )
 
 
@@ -83,7 +84,9 @@ def test_a_coupled_motors_friction_and_inertia_are_found_beside_the_joints_own(t
 
 def test_joints_alone_cannot_say_what_a_coupled_motor_does(tied, wrist):
     _, result = tied
-    alone = snarelab.identify(write(wrist, "", JOINT_LAWS, "alone.toml"), wrist / "train.csv", holdout=wrist / "holdout.csv")
+    alone = snarelab.identify(
+        write(wrist, "", JOINT_LAWS, "alone.toml"), wrist / "train.csv", holdout=wrist / "holdout.csv"
+    )
     for c in ("tau.joint2", "tau.joint3"):
         assert result.fit[c]["holdout"]["relative"] < 0.7 * alone.fit[c]["holdout"]["relative"]
 
@@ -196,7 +199,11 @@ def test_an_arm_moves_as_another_engine_says_with_effects_at_an_axis(tmp_path, l
 
 
 def test_an_inverse_fmu_reads_what_simulate_says(tmp_path):
-    values = {"coulomb_friction.tie.level": 4.0, "load_dependent_friction.tie.coefficient": 0.25, "speed_scale.tie": 1.0}
+    values = {
+        "coulomb_friction.tie.level": 4.0,
+        "load_dependent_friction.tie.coefficient": 0.25,
+        "speed_scale.tie": 1.0,
+    }
     effects = '[{ name = "coulomb_friction", at = "tie" }, { name = "load_dependent_friction", at = "tie" }]'
     path = write_model(tmp_path, "arm", 3, effects, values, seed=8)
     path.write_text(path.read_text() + "[axes]\ntie = { joint2 = 1.0, joint3 = 2.0 }\n")
@@ -230,8 +237,14 @@ WRONG = [
     ("axes = 3", "[axes] must be a table"),
     ("[transmission]\nmotors = ['m']", "has motors = [names]"),
     ("[transmission]\nmotors = ['m', 'm']\njoints = ['joint1', 'joint2']\nmatrix = [[1, 0], [0, 1]]", "each once"),
-    ("[transmission]\nmotors = ['m', 'n']\njoints = ['joint1', 'joint9']\nmatrix = [[1, 0], [0, 1]]", "'joint9' is no joint"),
-    ("[transmission]\nmotors = ['m', 'joint3']\njoints = ['joint1', 'joint2']\nmatrix = [[1, 0], [0, 1]]", "joint's name"),
+    (
+        "[transmission]\nmotors = ['m', 'n']\njoints = ['joint1', 'joint9']\nmatrix = [[1, 0], [0, 1]]",
+        "'joint9' is no joint",
+    ),
+    (
+        "[transmission]\nmotors = ['m', 'joint3']\njoints = ['joint1', 'joint2']\nmatrix = [[1, 0], [0, 1]]",
+        "joint's name",
+    ),
     ("[transmission]\nmotors = ['m', 'n']\njoints = ['joint1', 'joint2']\nmatrix = [[1, 0]]", "2 rows, a joint each"),
     ("[transmission]\nmotors = ['m', 'n']\njoints = ['joint1', 'joint2']\nmatrix = [[1, 1], [1, 1]]", "singular"),
     (f"{TRANSMISSION}[axes]\nmotor2 = {{ joint1 = 1.0 }}", "is an axis and a motor"),

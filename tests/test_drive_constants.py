@@ -109,7 +109,7 @@ def commands(tmp_path_factory):
 
 
 def servos(joints, damping):
-    gains = f"stiffness = \"free\", damping = {damping}"
+    gains = f'stiffness = "free", damping = {damping}'
     return "[servo]\n" + "".join(f'"{j}" = {{ kind = "position", {gains} }}\n' for j in joints)
 
 
@@ -190,7 +190,7 @@ def test_a_servo_without_its_command_asks_for_it(currents):
 
 
 def test_a_constant_that_no_motion_tells_is_asked_for(tmp_path):
-    joints, (table,) = recorded(tmp_path, "a", 6.0)
+    _, (table,) = recorded(tmp_path, "a", 6.0)
     table["tau.joint1"] = 0.0
     table.to_csv(tmp_path / "run.csv", index=False)
     model = model_file(tmp_path, '[signals]\n"tau.joint1" = { column = "tau.joint1", gain = "free" }')

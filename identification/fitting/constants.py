@@ -80,7 +80,10 @@ def with_constants(
     # First among the sensors: what else a channel does, it does to the reading.
     effects = (*added, *model.effects)
     model = replace(model, effects=effects, values={**model.values, **values}, signals=signals, servo=servos)
-    scaled = [d.assign({f"tau.{j}": (d[f"tau.{j}"] * k).assign_attrs(d[f"tau.{j}"].attrs) for j, k in nominal.items()}) for d in datasets]
+    scaled = [
+        d.assign({f"tau.{j}": (d[f"tau.{j}"] * k).assign_attrs(d[f"tau.{j}"].attrs) for j, k in nominal.items()})
+        for d in datasets
+    ]
     return model, scaled, tuple(notes)
 
 
@@ -109,7 +112,11 @@ def notes_on(found: Fit) -> tuple[str, ...]:
         if slot.name != _CONSTANT.get(slot.effect):
             continue
         known = f"± {std:.2g} " if np.isfinite(std) else ""
-        rest = "the other torques and the masses fitted to them" if found.assembly.base is not None else "the model's masses"
+        rest = (
+            "the other torques and the masses fitted to them"
+            if found.assembly.base is not None
+            else "the model's masses"
+        )
         text = (
             f"{slot.effect} at {slot.at}: {slot.name} {value:.4g} {known}{slot.unit} rests on {rest}: were all masses "
             "larger by a factor, and friction with them, it would be larger by the same"

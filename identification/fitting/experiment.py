@@ -12,8 +12,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...models.floating.tree import CARRIERS, FloatingTree, channel, n_carriers
 from ...models.axes import place
+from ...models.floating.tree import CARRIERS, FloatingTree, channel, n_carriers
 from ...models.model import Model
 from ...models.rig.kinematics import sling_map
 from ...models.rig.rig import Rig

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...errors import InputError
 from ..fitting.assembly import Evaluation
 from ..fitting.experiment import Experiment
 from ..fitting.fit import Fit
@@ -36,10 +37,15 @@ class Reading:
     states: Sequence[Evaluation]
 
     def columns(self, variant: Variant) -> dict[int, Parts]:
-        """What a variant adds to each channel it reaches: one array (n_band, k) a recording."""
+        """What a variant adds to each channel it reaches: one array (n_band, k) a recording; nothing where its law
+        cannot be followed along one of them, as a spring whose link has no inertia."""
         per: dict[int, Parts] = {}
         for e, state in zip(self.experiments, self.states, strict=True):
-            for channel, columns in candidate_columns(self.found.assembly, e, state, variant):
+            try:
+                found = candidate_columns(self.found.assembly, e, state, variant)
+            except InputError:
+                return {}
+            for channel, columns in found:
                 per.setdefault(channel, []).append(columns)
         return per
 

@@ -94,10 +94,11 @@ def screen(
         Told how far it is.
     """
     along = readings(found, experiments, instruments)
-    pool = [
-        [(v, source(along, p.effect).columns(v)) for v in variants(found.assembly, p)]
+    every = [
+        [(v, own) for v in variants(found.assembly, p) if (own := source(along, p.effect).columns(v))]
         for p in _told(library(model), "simulating each effect at each place", progress)
     ]
+    pool = [options for options in every if options]
     if noise is None:
         noise = learn(along.measured.experiments, along.measured.residuals(), _saturated(along, pool))
     ground = grounds(along, noise, seed)

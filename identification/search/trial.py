@@ -134,6 +134,9 @@ class _Judge:
         Where no point gains anything, as where friction would have to be negative, it is the grid's middle.
         """
         best: tuple[float, float, int, NDArray[np.int_], Array, Case] | None = None
+        options = [(v, own) for v, own in options if own]
+        if not options:
+            return None
         middle = len(options) // 2
         cases = sorted(enumerate(samples.cases(options)), key=lambda numbered: abs(numbered[0] - middle))
         for subset in options[0][0].subsets():
