@@ -100,8 +100,8 @@ def find_recording(name: str) -> Path:
     ``pos_read_data.csv`` and ``curr_data.csv`` of the TX40; the cart's runs, as ``cartTest2/0m05.csv``.
 
     Looks in the folder ``emps``, ``kuka_kr300``, ``bam/xl330``, ``tx40`` or ``cart`` of ``$SNARELAB_RECORDINGS``,
-    then of ``../shared/recordings``, then fetches the file from its publisher into the user's cache folder. Raises InputError
-    when it cannot be had, when its SHA-256 is not the published file's, and for another name.
+    then of ``../shared/recordings``, then fetches the file from its publisher into the user's cache folder. Raises
+    InputError when it cannot be had, when its SHA-256 is not the published file's, and for another name.
     """
     if name not in SHA256:
         raise InputError(

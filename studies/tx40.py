@@ -67,8 +67,8 @@ def sections(answer: Answer) -> list[Section]:
             "What the makers say",
             [
                 "Motor 6 turns with joint 5 and joint 6, so that its friction and its rotor load both: their "
-                "configuration has fvm6 = 0.616 N·m·s/rad, fsm6 = 1.95 N·m and Iam6 = 0.00964 kg·m². Zeros of joints 2 and 3 are a "
-                "quarter turn off, and currents count as torques of the motors.",
+                "configuration has fvm6 = 0.616 N·m·s/rad, fsm6 = 1.95 N·m and Iam6 = 0.00964 kg·m². Zeros "
+                "of joints 2 and 3 are a quarter turn off, and currents count as torques of the motors.",
                 "The model file has the motors, the ratios and these zeros. The positions are radians of the motor, "
                 "not degrees: the first sample of joint 2 is 50.265, which is π/2 times its ratio of 32.",
             ],
