@@ -108,7 +108,7 @@ def read_axes(path: Path, raw: Mapping[str, Any], joints: Sequence[_Joint]) -> t
 
 
 def _axis(path: Path, name: str, entry: Any, joints: Sequence[_Joint]) -> Axis:
-    kinds = {joint.name: joint.kind for joint in joints}
+    kinds: dict[str, Literal["revolute", "prismatic"]] = {joint.name: joint.kind for joint in joints}
     if name in kinds:
         raise InputError(f"{path}: [axes] {name!r} is a joint's name; give the axis one of its own")
     good = isinstance(entry, dict) and any(entry.values())

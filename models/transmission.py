@@ -35,15 +35,12 @@ class Transmission:
     def axes(self, joints: Sequence[Joint]) -> tuple[Axis, ...]:
         """Each motor as a place for effects."""
         kind = next(joint.kind for joint in joints if joint.name == self.joints[0])
-        rows, columns = np.linalg.inv(self.matrix), self.matrix.T
-        return tuple(
-            Axis(
-                motor,
-                *({j: float(x) for j, x in zip(self.joints, own[m], strict=True) if x} for own in (rows, columns)),
-                kind,
-            )
-            for m, motor in enumerate(self.motors)
-        )
+
+        def by_joint(row: Array) -> dict[str, float]:
+            return {joint: float(x) for joint, x in zip(self.joints, row, strict=True) if x}
+
+        ways = zip(self.motors, np.linalg.inv(self.matrix), self.matrix.T, strict=True)
+        return tuple(Axis(motor, by_joint(along), by_joint(back), kind) for motor, along, back in ways)
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """A recording of motors as one of joints; what is recorded of the joints themselves stays.

@@ -163,7 +163,7 @@ def _load(path: Path, signals: Mapping[str, Signal]) -> Columns:
 def _idle(name: str, joints: Mapping[str, JointKind]) -> bool:
     """Whether no fit of a model with these joints needs a signal."""
     family, _, joint = name.partition(".")
-    return family in ("qd", "qdd", "temp") or (joint_of(name) is not None and joint not in joints)
+    return family in ("qd", "qdd", "temp", "command") or (joint_of(name) is not None and joint not in joints)
 
 
 def _signal_headers(columns: Columns, signals: Mapping[str, Signal]) -> dict[str, str]:

@@ -35,13 +35,15 @@ def _of_joints(model: Model, path: str | Path, signals: Mapping[str, Signal]) ->
     kinds: dict[str, JointKind] = {j.name: j.kind for j in model.tree.joints}
     if model.transmission is None:
         return read_recording(path, signals, kinds)
-    own = kinds[model.transmission.joints[0]]
-    return model.transmission(read_recording(path, signals, kinds | dict.fromkeys(model.transmission.motors, own)))
+    own = kinds.get(model.transmission.joints[0], "revolute")
+    motors: dict[str, JointKind] = {motor: own for motor in model.transmission.motors}
+    return model.transmission(read_recording(path, signals, {**kinds, **motors}))
 
 
 def _with_servos(dataset: xr.Dataset, model: Model) -> xr.Dataset:
     """The recording with stiffness * (command - q) as torque of each joint that has a servo; per unit while free."""
     made = {}
+    kinds: dict[str, JointKind] = {j.name: j.kind for j in model.tree.joints}
     for joint, servo in model.servo.items():
         for name in (f"command.{joint}", f"q.{joint}"):
             if name not in dataset:
@@ -49,8 +51,7 @@ def _with_servos(dataset: xr.Dataset, model: Model) -> xr.Dataset:
                     f"{dataset.attrs['path']}: no signal {name!r}, which [servo] works out the torque from; add the "
                     "column, or map it under [signals] in the model file"
                 )
-        kind = next(j.kind for j in model.tree.joints if j.name == joint)
-        attrs = {"unit": default_unit(f"tau.{joint}", kind), "column": f"command.{joint} - q.{joint}"}
+        attrs = {"unit": default_unit(f"tau.{joint}", kinds[joint]), "column": f"command.{joint} - q.{joint}"}
         stiffness = 1.0 if servo.stiffness is None else servo.stiffness
         made[f"tau.{joint}"] = (stiffness * (dataset[f"command.{joint}"] - dataset[f"q.{joint}"])).assign_attrs(attrs)
     return dataset.assign(made)
