@@ -242,15 +242,7 @@ class Assembly:
                 continue
             j = self.joint_of(p)
             terms, by_load, sense = contributions(
-                experiment,
-                self.tree,
-                p,
-                j,
-                load,
-                tau,
-                self.speed_scale(p),
-                self.parameters(k, theta),
-                self.early_alone,
+                experiment, self.tree, p, j, load, tau, self.speed_scale(p), self.parameters(k, theta), self.early_alone
             )
             if sense is not None:
                 passed.setdefault(j, []).append(sense)
