@@ -4,7 +4,8 @@ The bar is 30 s and 700 MB on two cores for each.
 
 ``python bench/fast.py [RESULT.json]``. The arm is MuJoCo's of `bench/diagnosis.py`, recorded at 1 kHz and put on 5 kHz
 by cubic splines; what encoders and torque sensors add is drawn at 5 kHz. Each command runs in a process of its
-own, whose peak of memory and processor time the system tells. Seconds of processor time are what a busy machine leaves comparable.
+own, whose peak of memory and processor time the system tells. Seconds of processor time are what a busy machine leaves
+comparable.
 """
 
 import os

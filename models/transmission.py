@@ -15,6 +15,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..recordings.signals import JointKind
 from .axes import Axis
 from .tree import Joint
 
@@ -34,7 +35,7 @@ class Transmission:
 
     def axes(self, joints: Sequence[Joint]) -> tuple[Axis, ...]:
         """Each motor as a place for effects."""
-        kind = next(joint.kind for joint in joints if joint.name == self.joints[0])
+        kind: JointKind = next(joint.kind for joint in joints if joint.name == self.joints[0])
 
         def by_joint(row: Array) -> dict[str, float]:
             return {joint: float(x) for joint, x in zip(self.joints, row, strict=True) if x}

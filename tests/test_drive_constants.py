@@ -121,6 +121,7 @@ def test_a_servo_is_identified_from_command_and_encoder(commands):
     assert len(values) == 2 * len(joints)
     for j in joints:
         stiffness, damping = values[j, "stiffness"], values[j, "damping"]
+        assert stiffness.std is not None
         assert (stiffness.unit, damping.unit) == ("N*m/rad", "N*m*s/rad")
         assert abs(stiffness.value - STIFFNESS) < 2.5 * stiffness.std < 0.05 * STIFFNESS
         assert damping.value == pytest.approx(DAMPING + VISCOUS, rel=0.05)  # the joint's own cannot be told from it
