@@ -17,6 +17,7 @@ from .data_fault import contradict, data_fault
 from .diagnosis import Diagnosis, Step
 from .evidence.diagnose import Decided, decide
 from .fitting.base_parameters import base_parameters
+from .fitting.constants import notes_on, settled, with_constants
 from .fitting.experiment import Experiment, demand_apart, load_experiments, scales, with_silence
 from .fitting.fit import Fit, channel_rms
 from .fitting.recorded import read_all, with_recorded_joints
@@ -83,12 +84,14 @@ def diagnose(
     checks = early_checks(model, [*read, held])
     if contradict(checks) and not anyway:
         return Answer(data_fault(model, checks), model)
+    given = model
+    model, (*read, held), said = with_constants(model, [*read, held], len(recordings))
     train = with_silence(load_experiments(model, recordings, body, datasets=read))
     band = min(e.motion.band for e in train)
     locked = with_silence(load_experiments(model, [holdout], body, band, datasets=[held]))
     checks = run_checks(model, [*read, held], [*train, *locked], checks, progress)
     if contradict(checks) and not anyway:
-        return Answer(data_fault(model, checks, [*train, *locked]), model)
+        return Answer(data_fault(model, checks, [*train, *locked]), given)
     base = base_parameters(body) if model.inertia == "free" else None
     decided = decide(model, base, scales(train), train, locked, progress=progress, seed=seed)
     final = decided.best.fit
@@ -103,7 +106,8 @@ def diagnose(
     )
     if links:
         diagnosis, after = with_links(diagnosis, after, links, compared)
-    return Answer(replace(diagnosis, checks=checks, notes=(*model.tree.notes, *diagnosis.notes)), after)
+    notes = (*model.tree.notes, *said, *notes_on(final), *diagnosis.notes)
+    return Answer(replace(diagnosis, checks=checks, notes=notes), settled(after))
 
 
 def _steps(decided: Decided, final: Fit, train: Sequence[Experiment], locked: Sequence[Experiment]) -> tuple[Step, ...]:

@@ -73,7 +73,8 @@ def assembly(**scales) -> Any:
         scale=lambda _placed, x: scales.get(x.relative_to, 1.0),
         bounds=lambda _placed, x: (10 * x.low, 10 * x.high),
         joint_of=lambda _: 1,
-        speed_scales=[5.0, 7.0],
+        speed_scale=lambda _: 7.0,
+        place_of=lambda _: Made(channels=(1,)),
         tree=None,
         early_alone=False,
     )
@@ -191,7 +192,7 @@ def test_columns_of_the_amplitudes_or_the_whole_law_in_the_band(asked):
     np.testing.assert_array_equal(found, [[13.0], [23.0]])
     assert [call[-1] for call in calls] == [False, True]  # amplitudes are columns of the law's derivative
     _, joint, load, reading, speed, parameters, early_alone, _ = calls[0]
-    assert (joint, load.tolist(), reading.tolist(), speed, early_alone) == (1, [1, 2], [8, 9], 7.0, False)
+    assert (joint, load[:, 1].tolist(), reading[:, 1].tolist(), speed, early_alone) == (1, [1, 2], [8, 9], 7.0, False)
     assert parameters.tolist() == [0.0, 0.0]
 
 
@@ -224,7 +225,7 @@ def test_columns_that_nothing_changes_are_kept(asked, name, amplitudes, by_load,
     assert len(calls) == (2 if asked_twice else 1)
     np.testing.assert_array_equal(one[0][1], two[0][1])
     if not asked_twice:
-        assert two[0][0] == 1  # the joint's own channel
+        assert two[0][0] == one[0][0]
         for other in (variant(name, [1]), variant(name, [0], [1.0, 0.0])):
             candidate_columns(own, e, now, other)
         assert len(calls) == 3

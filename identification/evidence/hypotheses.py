@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from ...errors import InputError
 from ...models.effect import Effect
 from ...models.model import Model, Placed
 from ..deciding import BENDS, ELSEWHERE, ODDS_OF_CURVES, ODDS_OF_NAMES, SLOPE
@@ -136,6 +137,8 @@ def _items(along: Along, p: Placed, by_words: Curves, columns: Columns) -> list[
         if parts is None or size is None or not np.any(size > 1e-12):
             continue
         n, own = len(size), parts
+        # A curve over a joint's own coordinate says nothing of an axis.
+        bent = extra if set(parts) == {along.assembly.joint_of(p)} else None
         neighbours = [x for x in (made[max(k - 1, 0)], made[min(k + 1, len(grid) - 1)]) if x is not None]
         if between and len(neighbours) == 2:
             steps = min(k + 1, len(grid) - 1) - max(k - 1, 0)
@@ -149,7 +152,7 @@ def _items(along: Along, p: Placed, by_words: Curves, columns: Columns) -> list[
         index = columns.add(own)
         whole = len(v.amplitudes) == 0
         if lags:
-            extra = lagging(along, parts, columns)
+            bent = lagging(along, parts, columns)
         for subset in v.subsets():
             some = reduced(v, subset)
             on = size[subset] > 1e-12
@@ -161,13 +164,13 @@ def _items(along: Along, p: Placed, by_words: Curves, columns: Columns) -> list[
             if len(index) > n:
                 at, spread = np.concatenate([at, index[n + subset]]), np.tile(spread, 2)
                 positive = np.concatenate([positive, np.zeros(len(subset), bool)])
-            if extra is None or whole:
+            if bent is None or whole:
                 items.append(Item(at, spread, positive, whole, some))
                 continue
-            free = np.zeros(len(extra.index), bool)
+            free = np.zeros(len(bent.index), bool)
             for bend in BENDS:
-                bent = np.concatenate([at, extra.index]), np.concatenate([spread, bend * extra.spread])
-                items.append(Item(*bent, np.concatenate([positive, free]), whole, some))
+                more = np.concatenate([at, bent.index]), np.concatenate([spread, bend * bent.spread])
+                items.append(Item(*more, np.concatenate([positive, free]), whole, some))
     return items
 
 
@@ -218,7 +221,11 @@ def _made(along: Along, v: Variant) -> dict[int, list[Array]] | None:
     """Columns of a point by channel, one array a recording; None where the law cannot be simulated there."""
     parts: dict[int, list[Array]] = {}
     for e, s in zip(along.instruments, along.states, strict=True):
-        for c, x in candidate_columns(along.assembly, e, s, v):
+        try:
+            found = candidate_columns(along.assembly, e, s, v)
+        except InputError:
+            return None  # a spring whose link has no inertia: no candidate ends a run
+        for c, x in found:
             parts.setdefault(c, []).append(x)
     complete = all(len(x) == len(along.instruments) for x in parts.values())
     finite = all(np.isfinite(x).all() for own in parts.values() for x in own)

@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 from ...models.effect import Parameter
 from ...models.effects import effects
 from ...models.floating.tree import n_carriers
-from ...models.model import Model, Placed, places
+from ...models.model import Model, Placed, all_places
 from ..fitting.assembly import Assembly, Evaluation
 from ..fitting.effect_terms import contributions
 from ..fitting.experiment import Experiment
+from ..fitting.problem import reached
 
 Array = NDArray[np.float64]
 
@@ -74,7 +75,7 @@ def library(model: Model) -> list[Placed]:
     for effect in effects().values():
         if effect.at == "link" and model.inertia == "free":
             continue  # the identified inertia already holds whatever a link effect could add
-        spots = places(effect, model.tree)
+        spots = all_places(effect, model.tree)
         if effect.name == "sensor_delay":
             # A torque channel is late or, where the encoder is late, early: one of the two.
             arm = model.joints[n_carriers(model.tree) :]
@@ -133,13 +134,12 @@ def candidate_columns(
 ) -> list[tuple[int, Array]]:
     """What a variant adds to each channel it reaches, in the analysis band: (channel, (n_band, k))."""
     placed = variant.placed
-    joint = assembly.joint_of(placed)
     effect = placed.effect
     key = None
-    if effect.at == "joint" and not effect.states and not state.passed.get(joint):
+    if effect.at == "joint" and not effect.states and not any(state.passed.get(c) for c in reached(assembly, placed)):
         key = ("candidate", placed.key, variant.parameters.tobytes(), variant.amplitudes.tobytes())
         if key in experiment.store:
-            return [(joint, experiment.store[key])]
+            return experiment.store[key]
     terms, by_load = _terms(assembly, experiment, state, placed, variant.parameters, not len(variant.amplitudes))
     found = []
     for channel, values, columns in terms:
@@ -149,7 +149,7 @@ def candidate_columns(
                 own = passed(own)
         found.append((channel, experiment.to_band(own, channel)))
     if key is not None and by_load is None:
-        experiment.store[key] = found[0][1]
+        experiment.store[key] = found
     return found
 
 
@@ -163,9 +163,9 @@ def _terms(
 ) -> tuple[list[tuple[int, Array, Array]], Array | None]:
     """What an effect adds beside the model as evaluated, and its derivative by the joint's load."""
     joint = assembly.joint_of(placed)
-    load, reading, speed = state.load[:, joint], state.tau[:, joint], assembly.speed_scales[joint]
+    speed = assembly.speed_scale(placed)
     terms, by_load, _ = contributions(
-        experiment, assembly.tree, placed, joint, load, reading, speed, parameters, assembly.early_alone, bare
+        experiment, assembly.tree, placed, joint, state.load, state.tau, speed, parameters, assembly.early_alone, bare
     )
     return terms, by_load
 
