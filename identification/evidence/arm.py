@@ -1,5 +1,6 @@
 """The evidence of recordings of an arm: residuals along the motion as measured, columns along the motion asked for."""
 
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -115,6 +116,7 @@ def weigh(
     found_pool = tuple(pool(named, by_words, model.effects)) if search else ()
     items = [item for h in found_pool for item in h.items]
 
+    @functools.cache
     def bare(c: int) -> Noise:
         return _noise(c, along, residuals, runs, others, by_words, {}, columns)
 
