@@ -113,7 +113,7 @@ def confirm(
             whole = foretold(model, final, found, train, held, scales)
             stale = set(left)
             progress(f"confirming on the held-out recordings: {len(rejected)} not missed, {len(left)} left")
-    names = tuple(sorted(left.values(), key=lambda n: -missed[n.placed.key].gain))
+    names = tuple(sorted(left.values(), key=lambda n: -missed[n.placed.key].size))
     return Confirmed(found, names, tuple(rejected), weak, missed, model, final, whole)
 
 
