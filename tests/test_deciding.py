@@ -393,7 +393,7 @@ def test_a_payload_is_named_beyond_what_masses_are_known_to(monkeypatch):
         payload = Hypothesis("payload", True, (made.items[0],), -6.0)
         masses = Beside([], 1, slice(0, 1), [])
         weighed: Any = SimpleNamespace(beside=masses, evidence=made.evidence(), pool=(payload,), noises=())
-        return bool(tolerant.searched(weighed, (0,), ())[2])
+        return bool(tolerant.searched(weighed, (0,), (), range(len(weighed.noises)))[2])
 
     before = smallest(named)
     assert before > deciding.TOLERANCES[-1]

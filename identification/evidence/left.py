@@ -86,7 +86,9 @@ def left_over(
         n = len(train)
         own = best.found
         weighed = weigh(best.model, best.fit, [*train, *held], own.instruments, n, scales, own.weighed.noises)
-        weighed, made, slots, tolerance = searched(weighed, range(n), barred)
+        weighed, made, slots, tolerance = searched(
+            weighed, range(n), barred, {c for x in best.rejected for c in x.channels}
+        )
         best = replace(best, found=replace(own, weighed=weighed, search=made, slots=tuple(slots), tolerance=tolerance))
     return LeftOver(remainders(best.found, train, held), _bursts(best.found, train))
 

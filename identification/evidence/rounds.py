@@ -69,13 +69,14 @@ def search(
     noises = before.weighed.noises if before is not None else None
     opening: Weighed | None = None
     trials: tuple[Trial, ...] = before.trials if before is not None else ()
+    channels = set(range(train[0].measured.shape[1])) if before is None else _reached_by(before.opening, barred)
     for number in range(1, ROUNDS + 1):
         progress(f"round {number}: weighing each effect at each place")
         if number == 1 and before is not None:
             weighed = before.opening
         else:
             weighed = weigh(model, found, both, instruments, n, scales, noises)
-        weighed, made, slots, tolerance = searched(weighed, range(n), barred)
+        weighed, made, slots, tolerance = searched(weighed, range(n), barred, channels)
         opening = opening or weighed
         noises = weighed.noises
         if not trials:
@@ -103,6 +104,7 @@ def search(
             named.append(name)
             start |= own
         placed = [x.placed for x in named[-len(news) :]]
+        channels = {c for x in named[-len(news) :] for c in x.channels}
         model = model.with_effects(placed, start)
         progress("refitting with " + ", ".join(f"{p.effect.name} at {p.at}" for p in placed))
         assembly = assemble(model, base, scales)
@@ -138,6 +140,12 @@ def _error_of_laws(opening: Weighed, weighed: Weighed) -> Array:
             energy = float(before.residual @ now.covariance.solve(before.residual))
             taken[c] += 0.5 * (energy - weighed.evidence.energy(i, c))
     return np.maximum(taken, 0.0)
+
+
+def _reached_by(weighed: Weighed, keys: Collection[str]) -> set[int]:
+    """Channels that some hypotheses reach."""
+    evidence = weighed.evidence
+    return {c for h in weighed.pool if h.key in keys for x in h.items for c in evidence.reached(x)}
 
 
 def _reached(weighed: Weighed, slot: Slot) -> list[int]:

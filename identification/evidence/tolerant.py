@@ -23,19 +23,19 @@ class _Best:
 
 
 def searched(
-    weighed: Weighed, recordings: Sequence[int], barred: Collection[str]
+    weighed: Weighed, recordings: Sequence[int], barred: Collection[str], channels: Collection[int]
 ) -> tuple[Weighed, Search, list[Slot], float]:
     """The best set of explanations of some recordings, with the noise and the tolerance of the masses that go with it.
 
     Chosen before the search, a wide tolerance would take a payload in; without any, it would be named a payload. So
     with the noise: beside all that could be missing, a torque that wanders is taken for some of it; beside nothing,
     what is missing is taken for a wander. Where something is found, both are tried; and everywhere that nothing
-    wanders.
+    wanders. ``channels`` are those of which that may have changed.
     """
     masses = weighed.beside.tolerant
     tolerances = TOLERANCES if masses.stop > masses.start else TOLERANCES[:1]
     best = max((_best(weighed, recordings, barred, x) for x in tolerances), key=lambda b: b.value)
-    for c in range(len(weighed.noises)):
+    for c in sorted(channels):
         for noise in _others(weighed, c, best):
             other = weighed.with_noise(c, noise(weighed.noises[c]))
             tried = _best(other, recordings, barred, best.tolerance, best.taken)
