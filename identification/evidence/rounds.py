@@ -69,14 +69,16 @@ def search(
     noises = before.weighed.noises if before is not None else None
     opening: Weighed | None = None
     trials: tuple[Trial, ...] = before.trials if before is not None else ()
-    channels = set(range(train[0].measured.shape[1])) if before is None else _reached_by(before.opening, barred)
+    channels = None if before is None else _reached_by(before.opening, barred)
     for number in range(1, ROUNDS + 1):
         progress(f"round {number}: weighing each effect at each place")
         if number == 1 and before is not None:
             weighed = before.opening
         else:
             weighed = weigh(model, found, both, instruments, n, scales, noises)
-        weighed, made, slots, tolerance = searched(weighed, range(n), barred, channels)
+        weighed, made, slots, tolerance = searched(
+            weighed, range(n), barred, range(len(weighed.noises)) if channels is None else channels
+        )
         opening = opening or weighed
         noises = weighed.noises
         if not trials:
