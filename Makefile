@@ -2,9 +2,9 @@
 PYTHON ?= python3
 BIN := .venv/bin
 SOURCES := $(shell git ls-files --cached --others --exclude-standard '*.py' '*.toml' '*.urdf' '*.csv' '*.json' '*.c' '*.h' 'fmu/c/*.txt' 2>/dev/null | grep -v -e '^tests/' -e '^bench/' -e '^proof/')
-STUDIES := emps kuka bam free-floating ground-capture zero-g-rig orbit-inspection orbit-hover orbit-abort tolerance
+STUDIES := emps kuka bam tx40 cart free-floating ground-capture zero-g-rig orbit-inspection orbit-hover orbit-abort tolerance
 
-BENCHES := torque friction_fit diagnosis floating cosim fmu snare ecos_inspection tolerance
+BENCHES := torque friction_fit diagnosis fast floating cosim fmu snare ecos_inspection tolerance
 
 .PHONY: help demo test test-slow check studies bench accuracy fuzz kills hostile mutants proof ledger fmus docs clean $(STUDIES:%=study-%)
 
@@ -43,9 +43,10 @@ fuzz: .venv/installed ## broken files at every reader, SECONDS for each
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt '.[fuzz]'
 	$(BIN)/python tests/fuzz --seconds $(SECONDS)
 
-kills: .venv/installed ## two hundred runs, and as many importers of FMUs, killed at random: nothing lost that was reported, nothing left
+kills: .venv/installed ## runs, importers of FMUs and `snarelab cosim`, two hundred each, killed at random: nothing lost that was reported, nothing left; resumed
 	$(BIN)/python bench/kills.py
-	$(BIN)/python bench/importer_kills.py
+	$(BIN)/python bench/importer_kills.py c python
+	$(BIN)/python bench/importer_kills.py cosim
 
 hostile: .venv/installed ## forty FMUs that crash, hang, fork and lie: each ends in one line
 	$(BIN)/python bench/hostile_fmus.py

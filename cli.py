@@ -247,7 +247,9 @@ def _writable(numbers: str | None, outputs: Sequence[str | None], recordings: Se
 
     ``numbers`` is where the JSON goes; only that may be ``-``, standard output.
     """
-    taken = {Path(r).resolve(): "a recording that is read" for r in recordings if r}
+    from .recordings.part import part_of
+
+    taken = {part_of(r).file.resolve(): "a recording that is read" for r in recordings if r}
     for path in (numbers if numbers != "-" else None, *outputs):
         if not path:
             continue

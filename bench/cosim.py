@@ -26,9 +26,9 @@ import fmpy
 import numpy as np
 from fmpy.fmi2 import FMU2Slave
 
-from bench.cosim_accuracy import CONNECTIONS, exact
 from bench.oscillator_fmu import build
 from bench.results import write_result
+from bench.two_masses import CONNECTIONS, exact
 from snarelab.cosim.master import Master
 from snarelab.cosim.participants.fmu import Fmu
 from snarelab.cosim.setup import Setup

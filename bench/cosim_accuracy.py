@@ -1,8 +1,7 @@
 """Two coupled oscillators: error, order and stability of every way to couple them, against the exact solution.
 
-The system is that of ``snarelab.cosim.participants.oscillator`` with its own values: two masses of 1 kg, each on
-10 N/m, joined by 3 N/m; the left one starts at 1 m. Ten seconds. The exact solution is the matrix exponential.
-As a script it draws the figures of the documentation: ``python bench/cosim_accuracy.py docs``.
+The system is that of `bench/two_masses.py`; the left mass starts at 1 m. Ten seconds. As a script it draws the figures
+of the documentation: ``python bench/cosim_accuracy.py docs``.
 """
 
 import os
@@ -12,17 +11,16 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import sys
 from collections.abc import Sequence
-from itertools import pairwise
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch
-from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
-from scipy.linalg import expm
 
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+
+from bench.two_masses import CONNECTIONS, SECONDS, Panel, error_figure, largest_error, plain_ticks, slopes
 from snarelab.cosim.iteration import Iteration
 from snarelab.cosim.master import HoldName, Master, Scheme
 from snarelab.cosim.participant import StepError
@@ -30,39 +28,22 @@ from snarelab.cosim.participants.oscillator import LeftOscillator, RightOscillat
 from snarelab.cosim.system import System
 from snarelab.report.drawing import drawing, svg
 
-CONNECTIONS = (("right.force", "left.force"), ("left.x", "right.x_left"), ("left.v", "right.v_left"))
 HOLDS: tuple[HoldName, ...] = ("constant", "midpoint", "linear", "quadratic")
 SCHEMES: tuple[Scheme, ...] = ("jacobi", "gauss_seidel")
-SECONDS = 10.0
 _CLASSES = ("#56B4E9", "#D55E00", "#000000")
-_COLOURS = ("#000000", "#D55E00", "#0072B2", "#009E73")  # Okabe & Ito (2008)
-
-
-def exact(time: np.ndarray) -> np.ndarray:
-    """Positions of both masses [m], (n_samples, 2), of evenly spaced times."""
-    rates = np.array([[0, 1, 0, 0], [-13, 0, 3, 0], [0, 0, 0, 1], [3, 0, -13, 0]], dtype=float)
-    states = np.empty((len(time), 4))
-    states[0] = 1.0, 0.0, 0.0, 0.0
-    step = expm(rates * (time[1] - time[0]))
-    for k in range(1, len(time)):
-        states[k] = step @ states[k - 1]
-    return states[:, [0, 2]]
 
 
 def error(step: float, scheme: Scheme = "jacobi", hold: HoldName = "midpoint", iterate: bool = False) -> float:
     """Largest position error [m] of either mass over ten seconds."""
     halves = {"left": LeftOscillator(), "right": RightOscillator()}
     master = Master(System(halves, CONNECTIONS), step, scheme=scheme, hold=hold, iterate=iterate)
-    recording = master.run(SECONDS).recording
-    found = np.column_stack([recording[f"{side}.x [m]"].to_numpy() for side in halves])
-    return float(np.abs(found - exact(recording["time"].to_numpy())).max())
+    return largest_error(master.run(SECONDS).recording)
 
 
 def orders(steps: Sequence[float], scheme: Scheme, hold: HoldName, iterate: bool) -> tuple[list[float], list[float]]:
     """Errors [m] at these macro steps [s], and the observed orders between them."""
     errors = [error(step, scheme, hold, iterate) for step in steps]
-    pairs = zip(pairwise(steps), pairwise(errors), strict=True)
-    return errors, [float(np.log(e1 / e2) / np.log(h1 / h2)) for (h1, h2), (e1, e2) in pairs]
+    return errors, slopes(steps, errors)
 
 
 def growth(
@@ -107,25 +88,16 @@ def growth(
 def order_figure() -> bytes:
     """Error over macro step, explicit and iterated, as SVG."""
     steps = [0.04, 0.02, 0.01, 0.005]
-    with drawing():
-        figure, axes = plt.subplots(1, 3, figsize=(8.4, 3.2), sharey=True, layout="constrained")
-        kinds: tuple[tuple[str, Scheme, bool], ...] = (
-            ("Jacobi", "jacobi", False),
-            ("Gauss-Seidel", "gauss_seidel", False),
-            ("iterated", "jacobi", True),
-        )
-        for panel, (title, scheme, iterate) in zip(axes, kinds, strict=True):
-            for hold, colour in zip(HOLDS, _COLOURS, strict=True):
-                errors, found = orders(steps, scheme, hold, iterate)
-                label = f"{hold}, order {found[-1]:.1f}"
-                panel.loglog(steps, errors, color=colour, marker="o", markersize=3, label=label)
-            panel.set(title=title, xlabel="macro step [s]")
-            panel.legend(loc="lower right", fontsize=7)
-            _plain_ticks(panel, steps)
-        axes[0].set_ylabel("largest position error [m]")
-        picture = svg(figure)
-        plt.close(figure)
-    return picture
+    kinds: tuple[tuple[str, Scheme, bool], ...] = (
+        ("Jacobi", "jacobi", False),
+        ("Gauss-Seidel", "gauss_seidel", False),
+        ("iterated", "jacobi", True),
+    )
+    panels: list[Panel] = [
+        (title, "macro step [s]", steps, {hold: orders(steps, scheme, hold, iterate)[0] for hold in HOLDS})
+        for title, scheme, iterate in kinds
+    ]
+    return error_figure(panels)
 
 
 def stability_figure() -> bytes:
@@ -146,21 +118,13 @@ def stability_figure() -> bytes:
         for panel in axes[:, 0]:
             panel.set_ylabel("mass ratio m2/m1")
         for panel in axes.flat:
-            _plain_ticks(panel, [0.01, 0.1, 1, 10])
+            plain_ticks(panel, [0.01, 0.1, 1, 10])
         words = ("stable without iteration", "stable with iteration only", "unstable")
         patches = [Patch(facecolor=colour, label=word) for colour, word in zip(_CLASSES, words, strict=True)]
         figure.legend(handles=patches, loc="outside upper center", ncols=3)
         picture = svg(figure)
         plt.close(figure)
     return picture
-
-
-def _plain_ticks(panel: Axes, at: Sequence[float]) -> None:
-    """Numbers, not powers in mathematical text, which the report's style leaves as it is typed."""
-    panel.xaxis.set_major_locator(FixedLocator(list(at)))
-    for axis in (panel.xaxis, panel.yaxis):
-        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        axis.set_minor_formatter(NullFormatter())
 
 
 def _class(stiffness: float, mass: float, scheme: Scheme, hold: HoldName) -> int:

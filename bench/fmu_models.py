@@ -136,3 +136,9 @@ def rewritten(source, target, change):
             if data is not None:
                 new.writestr(entry.filename, data)
     return target
+
+
+def redescribed(source, target, change):
+    """A copy of an FMU with ``change(text)`` as its model description."""
+    named = "modelDescription.xml"
+    return rewritten(source, target, lambda name, data: change(data.decode()).encode() if name == named else data)

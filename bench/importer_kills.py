@@ -1,17 +1,19 @@
 """Kill importers of FMUs at random moments: no process, no temporary file is left, and what was written can be read.
 
-``python bench/importer_kills.py [--kills 200] [--seed 1] [IMPORTER ...]`` over these importers, each with FMUs that
-have Python beside them (`snarelab.fmu.hosted`):
+``python bench/importer_kills.py [--kills 200] [--seed 1] [--log FILE] [KIND ...]`` over these importers, each with FMUs
+that have Python beside them (`snarelab.fmu.hosted`):
 
 - ``c``: a program without any Python in it (``tests/fmu_host.c``);
 - ``python``: FMPy's calls from Python, writing a row at each step;
-- ``cosim``: ``snarelab cosim`` with such an FMU, one in C, and one that hangs half-way.
+- ``cosim``: ``snarelab cosim`` with such an FMU and one in C, which hangs after a while.
 
 Importers run with one or more of descriptors 0 to 2 closed, as daemons do, or with all. Half the moments are drawn from
-the whole run, half from after its first step; half of the kills go to the importer, half to its process group.
+the time that a run takes to its first rows (``cosim`` reports once a second) and a second more, half from after them;
+half of the kills go to the importer, half to its process group. The FMU that hangs does so anywhere before twice the
+time of the first report, or, where the kill is to come after that, at three times. The count and its log:
+`bench/killed.py`.
 """
 
-import argparse
 import os
 import random
 import signal
@@ -19,25 +21,28 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.append(str(ROOT))
 
 import fmpy
 
-from bench.kills import ORPHANS, Lost, alive
+from bench.killed import Lost, alive, begin, main, rows_left, settle
 from bench.oscillator_fmu import build
 from snarelab.fmu.archive import open_fmu
 from snarelab.fmu.hosted import write_hosted
 from snarelab.models.c_library import find_compiler
 
 IMPORTERS = ("c", "python", "cosim")
+LOG = ROOT / "build" / "bench" / "importer_kills.jsonl"
 _CLOSED = ((), (), (2,), (0,), (0, 1, 2), (1, 2))
+_STEP = 1e-3  # s, macro step of `snarelab cosim`
 _LONG = 10_000_000  # steps: more than any run comes to
+_AFTER = 2.5  # s after the first rows within which half of the kills fall
+_PROCESSES = 5  # of the C program: itself, and for each of two instances a warden and a worker
 
 _STEPPING = """
 import sys
@@ -52,13 +57,13 @@ with open("rows.csv", "w", buffering=1) as rows:
 """
 
 _SYSTEM = """
-step = 1e-3
+step = {step}
 stop = 1000.0
 [participants.left]
 fmu = "../hosted.fmu"
 [participants.right]
 fmu = "../right2.fmu"
-parameters = { fault = 2, fault_time = 1.0 }
+parameters = {{ fault = 2, fault_time = {fault_time!r} }}
 [connections]
 "left.force" = "right.force"
 "right.x_left" = "left.x"
@@ -66,133 +71,104 @@ parameters = { fault = 2, fault_time = 1.0 }
 """
 
 
-@dataclass
-class Importers:
-    """Importers in one folder, and what became of their runs.
+class Importer:
+    """One kind of importer in one folder, killed again and again.
 
     Parameters
     ----------
+    kind : str
+        One of `IMPORTERS`.
     folder : Path
         An empty one.
     """
 
-    folder: Path
-    lengths: dict[str, float] = field(default_factory=dict)
-    outcomes: Counter[str] = field(default_factory=Counter)
-
-    def __post_init__(self) -> None:
-        """Build FMUs and programs."""
-        write_hosted("left_oscillator", self.folder / "hosted.fmu", 2)
-        build(self.folder, "right", 2)
-        archive = open_fmu(self.folder / "hosted.fmu", self.folder / "hosted")
-        host = self.folder / "fmu_host"
-        compiler, _ = find_compiler("", os.environ["PATH"])
-        headers = Path(fmpy.__file__).parent / "c-code"
-        source = ROOT / "tests" / "fmu_host.c"
-        subprocess.run([*compiler, "-DFMI=2", f"-I{headers}", "-w", str(source), "-o", str(host), "-ldl"], check=True)
-        outputs = [v.valueReference for v in archive.description.modelVariables if v.causality == "output"]
-        resources = str(self.folder / "hosted" / "resources")
-        self.commands = {
-            "c": [
-                *(str(host), str(archive.binary), archive.description.guid, resources),
+    def __init__(self, kind: str, folder: Path) -> None:
+        """Build FMUs and programs, and measure when the first step comes."""
+        self.kind, self.folder = kind, folder
+        write_hosted("left_oscillator", folder / "hosted.fmu", 2)
+        build(folder, "right", 2)
+        archive = open_fmu(folder / "hosted.fmu", folder / "hosted")
+        if kind == "c":
+            host = _compiled(folder)
+            outputs = [v.valueReference for v in archive.description.modelVariables if v.causality == "output"]
+            self.command = [
+                *(str(host), str(archive.binary), archive.description.guid, str(folder / "hosted" / "resources")),
                 *(str(len(outputs)), str(outputs[0]), str(_LONG), "0.01"),
-            ],
-            "python": [
-                *(sys.executable, "-c"),
-                _STEPPING.format(root=str(ROOT), fmu=f"{self.folder}/hosted.fmu", folder=f"{self.folder}/hosted"),
-            ],
-            "cosim": [sys.executable, "-m", "snarelab.cli", "cosim", "system.toml", "--out", "rows.csv", "-vv"],
+            ]
+        elif kind == "python":
+            script = _STEPPING.format(root=str(ROOT), fmu=f"{folder}/hosted.fmu", folder=f"{folder}/hosted")
+            self.command = [sys.executable, "-c", script]
+        else:
+            words = ["cosim", "system.toml", "--out", "rows.csv", "-vv"]
+            self.command = [sys.executable, "-m", "snarelab.cli", *words]
+        begun = time.monotonic()
+        rows, _ = self._run((), True, 0.0, False)
+        self.length, self.reached = time.monotonic() - begun, rows * _STEP
+
+    def kill(self, moments: random.Random) -> dict[str, Any]:
+        """Start one, kill it, and look at what is left."""
+        closed = moments.choice(_CLOSED) if self.kind != "cosim" else ()
+        after_first = moments.random() < 0.5
+        moment = moments.uniform(0.0, _AFTER if after_first else self.length + 1.0)
+        group = moments.random() < 0.5
+        fault_time = self.reached * (3.0 if after_first else moments.uniform(0.0, 2.0))
+        rows, took = self._run(closed, after_first, moment, group, fault_time)
+        return {
+            "outcome": "with rows" if rows else "without rows",
+            "rows": rows,
+            "closed": closed,
+            "after_first": after_first,
+            "moment": round(moment, 3),
+            "group": group,
+            "settled": round(took, 3),
         }
 
-    def kill(self, kind: str, moments: random.Random) -> None:
-        """Start one, kill it, and look at what is left."""
-        closed = moments.choice(_CLOSED) if kind != "cosim" else ()
-        if kind not in self.lengths:
-            self._run(kind, closed, None, False)
-        after_first = moments.random() < 0.5
-        moment = moments.uniform(0.0, 1.5 if after_first else self.lengths[kind] + 1.0)
-        self._run(kind, closed, (after_first, moment), moments.random() < 0.5)
+    def finish(self) -> None:
+        """Nothing is left to look at: every kill has a folder of its own."""
 
-    def _run(self, kind: str, closed: Sequence[int], when: tuple[bool, float] | None, group: bool) -> None:
-        """Run until a moment [s] of the whole or after the first step; without one, measure when that comes."""
-        mark = f"{os.getpid()}-{random.random()}"
+    def _run(
+        self, closed: Sequence[int], after_first: bool, moment: float, group: bool, fault_time: float = 1e300
+    ) -> tuple[int, float]:
+        """Run until a moment [s] of the whole or after the first step; rows, and the time until all was gone."""
+        shell = ["/bin/sh", "-c", " ".join(["exec", '"$@"', *(f"{d}>&-" for d in closed)]), "sh"]
         with tempfile.TemporaryDirectory(dir=self.folder) as name:
             here = Path(name)
-            (here / "tmp").mkdir()
-            (here / "system.toml").write_text(_SYSTEM)
-            begun = time.monotonic()
+            (here / "system.toml").write_text(_SYSTEM.format(step=_STEP, fault_time=fault_time))
             with (here / "log").open("w") as log:
-                process = subprocess.Popen(
-                    ["/bin/sh", "-c", " ".join(["exec", '"$@"', *(f"{d}>&-" for d in closed)]), "sh"]
-                    + self.commands[kind],
-                    cwd=here,
-                    env={**os.environ, "SNARELAB_KILLS": mark, "TMPDIR": f"{name}/tmp", "OMP_NUM_THREADS": "1"},
-                    stdin=subprocess.DEVNULL,
-                    stdout=subprocess.DEVNULL,
-                    stderr=log,
-                    start_new_session=True,
-                )
-                if when is None or when[0]:
-                    self._wait_for_steps(kind, here, process, mark)
-                    self.lengths.setdefault(kind, time.monotonic() - begun)
-                time.sleep(when[1] if when else 0.0)
-                if process.poll() is not None:
-                    raise Lost(f"{kind}: ended by itself with {process.returncode}: {(here / 'log').read_text()}")
+                process, mark = begin([*shell, *self.command], here, log)
+            if after_first:
+                self._wait_for_steps(here, process, mark)
+            time.sleep(moment)
+            ended = process.poll()
+            if ended is None:
                 (os.killpg if group else os.kill)(process.pid, signal.SIGKILL)
-                process.wait()
-            self._check(kind, here, mark)
+            process.wait()
+            took = settle(self.kind, mark, here / "tmp")
+            said = (here / "log").read_text()
+            if ended is not None:
+                raise Lost(f"{self.kind}: ended by itself with {ended}: {said}")
+            return rows_left(self.kind, here / "rows.csv", said), took
 
-    def _wait_for_steps(self, kind: str, here: Path, process: "subprocess.Popen[bytes]", mark: str) -> None:
+    def _wait_for_steps(self, here: Path, process: "subprocess.Popen[bytes]", mark: str) -> None:
         """Until rows are there, or with the C program its model's processes."""
-        rows = here / ("rows.csv" if kind == "python" else "unfinished-rows.csv")
+        rows = here / ("rows.csv" if self.kind == "python" else "unfinished-rows.csv")
         deadline = time.monotonic() + 120.0
-        while not (len(alive(mark)) == 5 if kind == "c" else rows.exists() and rows.stat().st_size > 100):
+        while not (len(alive(mark)) == _PROCESSES if self.kind == "c" else rows.exists() and rows.stat().st_size > 100):
             if process.poll() is not None or time.monotonic() > deadline:
-                raise Lost(f"{kind}: did not come to its first step: {(here / 'log').read_text()}")
+                process.kill()
+                raise Lost(f"{self.kind}: did not come to its first step: {(here / 'log').read_text()}")
             time.sleep(0.02)
 
-    def _check(self, kind: str, here: Path, mark: str) -> None:
-        """Nothing lives, nothing lies about, and every row that was reported is whole."""
-        deadline = time.monotonic() + ORPHANS
-        while left := [*alive(mark), *(here / "tmp").rglob("*")]:
-            if time.monotonic() > deadline:
-                raise Lost(f"{kind}: {left} {ORPHANS:g} s after the importer was killed")
-            time.sleep(0.05)
-        found = [*here.glob("*rows.csv")]
-        lines = found[0].read_text().split("\n")[:-1] if found else []
-        rows = [[float(value) for value in line.split(",")] for line in lines[1:]]
-        if any(len(row) != lines[0].count(",") + 1 for row in rows) or rows != sorted(rows):
-            raise Lost(f"{kind}: the rows cannot be read")
-        told = [line for line in (here / "log").read_text().splitlines() if " s of " in line]
-        if told and float(told[-1].split(" s of ")[0].split()[-1]) > rows[-1][0] + 1e-3:
-            raise Lost(f"{kind}: {told[-1]!r} was reported, and rows end at {rows[-1][0]} s")
-        self.outcomes[f"{kind}, with rows" if rows else kind] += 1
 
-
-def kill_all(kinds: Sequence[str], kills: int, seed: int) -> Counter[str]:
-    """Kill each its share of times; raises Lost at the first harm done."""
-    moments = random.Random(seed)
-    with tempfile.TemporaryDirectory(prefix="snarelab-importers-") as folder:
-        importers = Importers(Path(folder))
-        for number in range(kills):
-            importers.kill(kinds[number % len(kinds)], moments)
-        return importers.outcomes
-
-
-def main() -> int:
-    """Read the arguments; 1 where harm was done."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("importers", nargs="*", metavar="IMPORTER", default=IMPORTERS)
-    parser.add_argument("--kills", type=int, default=200)
-    parser.add_argument("--seed", type=int, default=1)
-    given = parser.parse_args()
-    try:
-        print(dict(kill_all(given.importers or IMPORTERS, given.kills, given.seed)))
-    except Lost as harm:
-        print(harm, file=sys.stderr)
-        return 1
-    return 0
+def _compiled(folder: Path) -> Path:
+    """The importer in C."""
+    host = folder / "fmu_host"
+    compiler, _ = find_compiler("", os.environ["PATH"])
+    headers = Path(fmpy.__file__).parent / "c-code"
+    source = ROOT / "tests" / "fmu_host.c"
+    subprocess.run([*compiler, "-DFMI=2", f"-I{headers}", "-w", str(source), "-o", str(host), "-ldl"], check=True)
+    return host
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(__doc__ or "", IMPORTERS, Importer, LOG))

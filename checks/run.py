@@ -6,6 +6,7 @@ from pathlib import Path
 import xarray as xr
 
 from ..errors import InputError
+from ..identification.fitting.constants import with_constants
 from ..identification.fitting.experiment import Experiment, load_experiments, with_silence
 from ..identification.fitting.recorded import read_all, with_recorded_joints
 from ..models.docking.bench_setup import DockingTree
@@ -36,6 +37,7 @@ def check(
     found = early_checks(model, datasets)
     if any(f.fault for f in found):
         return found
+    model, datasets, _ = with_constants(model, datasets, len(datasets))
     experiments = with_silence(load_experiments(model, recordings, RigidBody(model.tree), datasets=datasets))
     return run_checks(model, datasets, experiments, found, progress)
 

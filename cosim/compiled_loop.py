@@ -14,157 +14,12 @@ import numpy as np
 
 from ..models.c_library import load_library
 from ..models.compiled import CompilerNotice
+from . import loop_source
 from .fmi_calls import CompiledCalls
 from .sweep import Plan, Sweep
 from .system import Layout, System
 
-_SOURCE = r"""
-#include <math.h>
-#include <stddef.h>
-#pragma STDC FP_CONTRACT OFF
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC optimize("fp-contract=off")
-#endif
-typedef struct {
-    long fmi;
-    void *component, *set, *get, *step;
-    const unsigned *in_references, *out_references;
-    long n_in_references, n_out_references, n_in, n_out, first_in, first_out, follows;
-} Unit;
-typedef struct {
-    const Unit *units;
-    const long *visits, *source;
-    const double *factor, *offset, *before, *after;
-    long n_units, n_visits, n_out, n_points, sequential;
-    double origin, size;
-} Plan;
-typedef int (*Set2)(void *, const unsigned *, size_t, const double *);
-typedef int (*Set3)(void *, const unsigned *, size_t, const double *, size_t);
-typedef int (*Get2)(void *, const unsigned *, size_t, double *);
-typedef int (*Get3)(void *, const unsigned *, size_t, double *, size_t);
-typedef int (*Step2)(void *, double, double, int);
-typedef int (*Step3)(void *, double, double, _Bool, _Bool *, _Bool *, _Bool *, double *);
-
-static int set(const Plan *p, const Unit *u, const double *y, double *input) {
-    if (!u->n_in) return 0;
-    for (long i = 0; i < u->n_in; i++) {
-        long j = u->first_in + i;
-        input[i] = p->factor[j] * y[p->source[j]] + p->offset[j];
-    }
-    int status = u->fmi == 2
-        ? ((Set2)u->set)(u->component, u->in_references, u->n_in_references, input)
-        : ((Set3)u->set)(u->component, u->in_references, u->n_in_references, input, u->n_in);
-    return status > 1 ? status : 0;
-}
-
-static int get(const Unit *u, double *y) {
-    if (!u->n_out) return 0;
-    int status = u->fmi == 2
-        ? ((Get2)u->get)(u->component, u->out_references, u->n_out_references, y + u->first_out)
-        : ((Get3)u->get)(u->component, u->out_references, u->n_out_references, y + u->first_out, u->n_out);
-    return status > 1 ? status : 0;
-}
-
-static int step(const Unit *u, double time, double size) {
-    if (u->fmi == 2) {
-        int status = ((Step2)u->step)(u->component, time, size, 0);
-        return status > 1 ? status : 0;
-    }
-    _Bool event = 0, end = 0, early = 0;
-    double reached = 0;
-    int status = ((Step3)u->step)(u->component, time, size, 0, &event, &end, &early, &reached);
-    return status > 1 ? status : end ? -1 : 0;
-}
-
-static double combine(const double *weights, const double *const *known, long n, long i) {
-    double total = weights[0] * known[0][i];
-    for (long k = 1; k < n; k++) total += weights[k] * known[k][i];
-    return total;
-}
-
-/* Rows (n, 1 + n_out) of time and outputs; the rows before the first are the past. Number of good steps. */
-__attribute__((visibility("default")))
-long snarelab_cosim_run(const Plan *p, double *rows, long first, long n, double *held, double *input, long *failure) {
-    long width = 1 + p->n_out;
-    for (long s = 0; s < n; s++) {
-        double *row = rows + s * width, *y = row + 1;
-        double time = row[-width], next = p->origin + (double)(first + s + 1) * p->size;
-        const double *past[4], *later[4];
-        for (long k = 0; k < 3; k++) past[k] = y - (k + 1) * width, later[k + 1] = past[k];
-        later[0] = y;
-        for (long i = 0; i < p->n_out; i++) held[i] = combine(p->before, past, p->n_points, i);
-        long *call = failure + 1, *unit = failure + 2;
-        int bad = 0;
-        if (p->sequential) {
-            for (long i = 0; i < p->n_out; i++) y[i] = combine(p->before + 3, past, p->n_points, i);
-            for (*unit = 0; *unit < p->n_units; ++*unit) {
-                const Unit *u = p->units + *unit;
-                *call = 0;
-                if ((bad = set(p, u, held, input))) goto failed;
-                *call = 1;
-                if ((bad = step(u, time, p->size))) goto failed;
-                *call = 0;
-                if (u->follows && (bad = set(p, u, y, input))) goto failed;
-                *call = 2;
-                if ((bad = get(u, y))) goto failed;
-                for (long i = u->first_out; i < u->first_out + u->n_out; i++)
-                    held[i] = combine(p->after, later, p->n_points, i);
-            }
-        } else {
-            for (*unit = 0; *unit < p->n_units; ++*unit) {
-                *call = 0;
-                if ((bad = set(p, p->units + *unit, held, input))) goto failed;
-                *call = 1;
-                if ((bad = step(p->units + *unit, time, p->size))) goto failed;
-            }
-            *call = 2;
-            for (*unit = 0; *unit < p->n_units; ++*unit)
-                if ((bad = get(p->units + *unit, y))) goto failed;
-        }
-        for (long v = 0; v < p->n_visits; v++) {
-            *unit = p->visits[v];
-            *call = 0;
-            if ((bad = set(p, p->units + *unit, y, input))) goto failed;
-            *call = 2;
-            if ((bad = get(p->units + *unit, y))) goto failed;
-        }
-        for (long i = 0; i < p->n_out; i++)
-            if (!isfinite(y[i])) {
-                *call = 3;
-                goto failed;
-            }
-        row[0] = next;
-        continue;
-    failed:
-        failure[0] = bad;
-        return s;
-    }
-    return n;
-}
-"""
 _CALLS = ("Set", "DoStep", "Get", "finite")
-
-
-class _Unit(ctypes.Structure):
-    _fields_ = (
-        ("fmi", ctypes.c_long),
-        *((name, ctypes.c_void_p) for name in ("component", "set", "get", "step")),
-        ("in_references", ctypes.c_void_p),
-        ("out_references", ctypes.c_void_p),
-        *(
-            (name, ctypes.c_long)
-            for name in ("n_in_references", "n_out_references", "n_in", "n_out", "first_in", "first_out", "follows")
-        ),
-    )
-
-
-class _Plan(ctypes.Structure):
-    _fields_ = (
-        *((name, ctypes.c_void_p) for name in ("units", "visits", "source", "factor", "offset", "before", "after")),
-        *((name, ctypes.c_long) for name in ("n_units", "n_visits", "n_out", "n_points", "sequential")),
-        ("origin", ctypes.c_double),
-        ("size", ctypes.c_double),
-    )
 
 
 class CompiledLoop:
@@ -193,12 +48,12 @@ class CompiledLoop:
         size: float,
     ) -> None:
         """Build, or find in the cache, and lay out."""
-        self._entry = load_library(_SOURCE).snarelab_cosim_run
+        self._entry = load_library(loop_source.SOURCE).snarelab_cosim_run
         self._entry.restype = ctypes.c_long
-        self._calls, self.n_points = calls, len(plan.after)
-        units = (_Unit * len(calls))()
+        self._calls, self.n_points = calls, len(plan.end)
+        units = (loop_source.Unit * len(calls))()
         for i, c in enumerate(calls):
-            units[i] = _Unit(
+            units[i] = loop_source.Unit(
                 c.fmi,
                 c.component,
                 c.set,
@@ -213,6 +68,7 @@ class CompiledLoop:
                 layout.input_slices[i].start,
                 layout.output_slices[i].start,
                 i in plan.follow,
+                i in plan.halves,
             )
         n_out = len(layout.outputs)
         self._arrays = [
@@ -220,16 +76,15 @@ class CompiledLoop:
             layout.source.astype(np.int_),
             layout.factor.astype(float),
             layout.offset.astype(float),
-            np.array([[*row, *[0.0] * (3 - len(row))] for row in plan.before]),
-            np.array(plan.after),
-            np.zeros(n_out),
+            *(_rows(rows) for rows in (plan.before, [plan.end], plan.after)),
+            np.zeros(3 * n_out),
             np.zeros(len(layout.inputs)),
             np.zeros(3, dtype=np.int_),
         ]
-        self._held, self._input, self._failure = self._arrays[6:]
-        pointers = [array.ctypes.data for array in self._arrays[:6]]
+        self._held, self._input, self._failure = self._arrays[7:]
+        pointers = [array.ctypes.data for array in self._arrays[:7]]
         self._units = units
-        self._plan = _Plan(
+        self._plan = loop_source.Plan(
             ctypes.addressof(units),
             *pointers,
             len(calls),
@@ -237,6 +92,7 @@ class CompiledLoop:
             n_out,
             self.n_points,
             plan.sequential,
+            bool(plan.halves),
             0.0,
             size,
         )
@@ -269,6 +125,11 @@ class CompiledLoop:
         )
         status, call, unit = map(int, self._failure)
         return (done, "", 0, 0) if done == n else (done, _CALLS[call], unit, status)
+
+
+def _rows(weights: Sequence[tuple[float, ...]]) -> np.ndarray:
+    """Rows of three, which C counts on."""
+    return np.array([[*row, *[0.0] * (3 - len(row))] for row in weights])
 
 
 def compiled_loop(system: System, sweep: Sweep, size: float) -> CompiledLoop | None:

@@ -1,17 +1,12 @@
-"""The co-simulation master: who steps when, on which inputs, and what is done when a step is not good enough.
+"""The co-simulation master: one macro step after another to a time, and the record of them.
 
 ``jacobi`` steps all participants side by side on what was known at the start of the macro step. ``gauss_seidel`` steps
-them one after another, each on what the earlier ones have just found. Either is explicit, or is iterated: participants
-go back to the start of the step until the outputs that were assumed at its end are those that come out.
-
-At the start one value is known, and no parabola. An input that is held there is off by its slope times the step, which
-leaves an error of order H² in all that follows. Where the hold has more to lose, and all participants can restore, the
-first step is therefore iterated, on the line between its ends.
+them one after another, each on what the earlier ones have just found (`snarelab.cosim.sweep`). Either is explicit, or
+is iterated, or is repeated smaller (`snarelab.cosim.macro_step`).
 """
 
 import math
 from collections.abc import Callable
-from contextlib import suppress
 from types import TracebackType
 from typing import Literal, Self
 
@@ -21,8 +16,9 @@ from ..errors import InputError, nearest
 from .compiled_loop import CompiledLoop, compiled_loop
 from .energy import BondEnergy
 from .feedthrough import FeedThrough
-from .hold import combine, end_weights, hold_named
-from .iteration import Iteration, NotConverged, QuasiNewton
+from .hold import hold_named
+from .iteration import Iteration
+from .macro_step import MacroStep
 from .participant import Participant, StepError
 from .record import Event, Record, Run
 from .step_control import StepControl
@@ -81,36 +77,25 @@ class Master:
         self.system, self.size, self._control = system, float(step), control
         self._hold = hold_named(hold)
         self._participants = list(system.participants.values())
-        iteration = (iterate if isinstance(iterate, Iteration) else Iteration()) if iterate else None
-        self._repeats = iteration is not None or control is not None
-        if self._repeats:
-            self._check_rollback("iterate" if iterate else "control")
         self._fixed = [name for name, p in system.participants.items() if not p.can_vary_step]
-        if self._fixed and control is not None:
-            raise InputError(f"{system.name}: control varies the step, and {self._fixed[0]} cannot; leave control out")
-        self._solver = QuasiNewton(iteration) if iteration else None
+        iteration = (iterate if isinstance(iterate, Iteration) else Iteration()) if iterate else None
+        self._step = MacroStep(system, self._hold, iteration, control)
         self._bonds = BondEnergy(system)
-        self._magnitudes = control.given_magnitudes(system.layout.outputs) if control else np.zeros(0)
         for name, participant in system.participants.items():
             participant.initialize(start, system.parameters_of(name))
         self._feed = FeedThrough(system, solve_loops)
         self._sweep = Sweep(system, self._hold, self._feed, sequential=scheme == "gauss_seidel")
-        layout = system.layout
-        sudden = [layout.variables[name].discrete for name in layout.outputs]
-        self._coupled = np.array([k for k in np.unique(layout.source[layout.factor != 0]) if not sudden[k]], np.intp)
         self._eventful = [
             (name, p) for name, p in system.participants.items() if type(p).next_event is not Participant.next_event
         ]
         self._origin, self._count = float(start), 0
         self.time = float(start)
-        self.log: list[Event] = []
-        self.steps = self.rejected = self.evaluations = 0
-        self._past: list[np.ndarray] = [self._first_outputs()]  # newest first, as many as the hold reads
-        self._sizes: list[float] = []  # of the steps between them
-        self._largest = np.abs(self._past[0])
+        self.log = self._step.log
+        self.steps = 0
+        self._step.begin(self._sweep, self._first_outputs())
         self._loop: CompiledLoop | Literal[False] | None = None  # not looked for yet
         self.record = Record(system)
-        self.record.add(self.time, self._past[0], self._bonds.residual)
+        self.record.add(self.time, self._step.past[0], self._bonds.residual)
 
     def step(self) -> float:
         """Take one macro step; the time [s] reached.
@@ -152,7 +137,7 @@ class Master:
             for _, participant in self._eventful:
                 left = min(left, participant.next_event(self.time) - self.time)
             cut = left < self.size * (1 - _SAME)
-            self._advance(left if cut else self.size, keep_size=cut)
+            self._advance(left if cut else self.size, usual=self.size if cut else None)
             if progress:
                 progress(self.time)
 
@@ -169,12 +154,22 @@ class Master:
             tuple(self._feed.loops),
         )
 
+    @property
+    def rejected(self) -> int:
+        """Steps that were repeated smaller."""
+        return self._step.rejected
+
+    @property
+    def evaluations(self) -> int:
+        """How often the participants have stepped altogether."""
+        return self._step.evaluations
+
     def value(self, name: str) -> float:
         """An output ``participant.variable`` now [its unit]; InputError with the nearest where there is none."""
         outputs = self.system.layout.outputs
         if name not in outputs:
             raise InputError(f"no output {name!r}; nearest is {nearest(name, outputs)!r}")
-        return float(self._past[0][outputs.index(name)])
+        return float(self._step.past[0][outputs.index(name)])
 
     def close(self) -> None:
         """Close all participants."""
@@ -189,44 +184,10 @@ class Master:
         """Close."""
         self.close()
 
-    def _advance(self, size: float, keep_size: bool = False) -> None:
-        """One accepted macro step of at most this size."""
-        starter = self._starter()
-        states = [p.save() for p in self._participants] if self._repeats or starter else []
-        while True:
-            try:
-                outputs = self._trial(size, states, starter)
-                error = self._error(outputs, size) if self._control else 0.0
-            except StepError as failure:
-                if self._control is None or size <= self._control.smallest:
-                    if states:
-                        with suppress(StepError):  # what failed may be past putting back; its own fault is told
-                            self._restore(states)
-                    raise StepError(f"{failure}; last good step ended at {self.time:.9g} s") from failure
-                error, outputs = math.inf, None
-                reason = str(failure)
-            else:
-                reason = f"inputs off by {error:.2g} times the tolerance"
-            if self._control is None:
-                break
-            degree = min(self._hold.degree, len(self._past) - 1)
-            wanted = self._control.next_size(size, error, degree, rejected=error > 1)
-            if error <= 1 or size <= self._control.smallest:
-                if error > 1:
-                    self.log.append(Event(self.time, size, f"accepted at the smallest step: {reason}"))
-                self.size = max(wanted, self.size) if keep_size else wanted
-                break
-            self.rejected += 1
-            self.log.append(Event(self.time, size, f"rejected: {reason}; repeated with {wanted:.3g} s"))
-            self._restore(states)
-            size, keep_size = wanted, False
-        assert outputs is not None
-        self._accept(outputs, size)
-
     def _take_compiled(self, n: int) -> bool:
         """Up to as many equal steps by the compiled loop; False where it cannot take them."""
-        points = self._hold.degree + 1
-        if self._repeats or self._bonds.names or len(self._past) < points or set(self._sizes) - {self.size}:
+        points, step = self._hold.degree + 1, self._step
+        if step.repeats or self._bonds.names or len(step.past) < points or set(step.sizes) - {self.size}:
             return False
         if self._loop is None:
             self._loop = compiled_loop(self.system, self._sweep, self.size) or False
@@ -236,10 +197,10 @@ class Master:
         done, call, unit, status = self._loop(rows, self._origin, self._count)
         if done:
             self.steps += done
-            self.evaluations += done
+            step.evaluations += done
             self._count += done
             self.record.count += done
-            self._past = [rows[done + k, 1:].copy() for k in reversed(range(points))]
+            step.past = [rows[done + k, 1:].copy() for k in reversed(range(points))]
             self.time = float(rows[points - 1 + done, 0])
         if call:
             self._explain(call, unit, status, rows[points + done, 1:])
@@ -256,81 +217,21 @@ class Master:
             named = failure if call == "finite" else self._sweep.failure(unit, self.time, failure)
             raise StepError(f"{named}; last good step ended at {self.time:.9g} s") from None
 
-    def _starter(self) -> QuasiNewton | None:
-        """A solver for the first step, where a held input would cost the hold its order."""
-        plain = self._solver is None and self._control is None
-        if not plain or self.steps or self._hold.degree < 2 or not all(p.can_restore for p in self._participants):
-            return None
-        return QuasiNewton(Iteration())
-
-    def _trial(self, size: float, states: list[object], starter: QuasiNewton | None) -> np.ndarray:
-        """Outputs (n_outputs,) at the end of a step, by one sweep or by iteration."""
-        if starter is not None:
-            try:
-                return self._iterated(starter, size, states)
-            except NotConverged as error:
-                self.log.append(Event(self.time, size, f"the start was not iterated ({error}): inputs were held"))
-                self._restore(states)
-        if self._solver is None:
-            self.evaluations += 1
-            return self._sweep(self.time, size, self._past, self._sizes)
-        try:
-            return self._iterated(self._solver, size, states)
-        except NotConverged as error:
-            raise StepError(
-                f"{self.system.name}: the iteration of the step at {self.time:.9g} s did not converge ({error}); "
-                "take smaller steps"
-            ) from None
-
-    def _iterated(self, solver: QuasiNewton, size: float, states: list[object]) -> np.ndarray:
-        """Outputs at the end of a step that are those assumed there; raises NotConverged."""
-        guess = self._predicted(size)
-        fresh, reached = True, guess
-
-        def sweep_from(assumed: np.ndarray) -> np.ndarray:
-            nonlocal fresh, reached
-            if not fresh:
-                self._restore(states)
-            fresh = False
-            self.evaluations += 1
-            ahead = guess.copy()
-            ahead[self._coupled] = assumed
-            reached = self._sweep(self.time, size, self._past, self._sizes, ahead)
-            return reached[self._coupled]
-
-        scale = np.maximum(self._largest, np.abs(guess))[self._coupled]
-        scale[scale == 0] = 1.0
-        solver.solve(sweep_from, guess[self._coupled], scale)
-        return reached
-
-    def _predicted(self, size: float) -> np.ndarray:
-        """Where the hold's polynomial puts the outputs at the end of a step."""
-        return combine(end_weights(self._sweep.nodes(size, self._sizes)), self._past)
-
-    def _error(self, outputs: np.ndarray, size: float) -> float:
-        """Distance of the coupled outputs from what was predicted, in tolerances."""
-        assert self._control is not None
-        chosen = self._coupled
-        off = np.abs(outputs - self._predicted(size))[chosen]
-        magnitude = np.where(self._magnitudes > 0, self._magnitudes, np.maximum(self._largest, np.abs(outputs)))[chosen]
-        magnitude[magnitude == 0] = 1.0
-        return float(np.max(off / magnitude, initial=0.0)) / self._control.tolerance
-
-    def _accept(self, outputs: np.ndarray, size: float) -> None:
-        before = self._past[0]
+    def _advance(self, size: float, usual: float | None = None) -> None:
+        """One accepted macro step [s] of at most this size, cut from the usual one where that is given."""
+        taken = self._step.take(self.time, size, usual)
+        if taken.wanted is not None:
+            self.size = taken.wanted
+        outputs, size = taken.outputs, taken.size
         if self._bonds.names:
-            self._bonds.add(before, outputs, self._sweep.mean_inputs, size)
+            self._bonds.add(self._step.past[0], outputs, self._sweep.mean_inputs, size)
         if self._control is None and size == self.size:
             self._count += 1
             self.time = self._origin + self._count * size
         else:
             self.time += size
             self._origin, self._count = self.time, 0
-        self._past.insert(0, outputs)
-        self._sizes.insert(0, size)
-        del self._past[self._hold.degree + 1 :], self._sizes[self._hold.degree :]
-        if self._repeats:
-            np.maximum(self._largest, np.abs(outputs), out=self._largest)
+        self._step.remember(taken)
         self.steps += 1
         for name, participant in self._eventful:
             self.log += [Event(self.time, size, f"{name}: {text}") for text in participant.events()]
@@ -344,15 +245,3 @@ class Master:
         self._feed.settle(self.time, outputs)
         self._sweep.check(self.time, outputs)
         return outputs
-
-    def _restore(self, states: list[object]) -> None:
-        for participant, state in zip(self._participants, states, strict=True):
-            participant.restore(state)
-
-    def _check_rollback(self, wish: str) -> None:
-        stuck = [name for name, p in self.system.participants.items() if not p.can_restore]
-        if stuck:
-            raise InputError(
-                f"{self.system.name}: {wish} repeats steps, and {', '.join(stuck)} cannot save and restore; "
-                f"leave {wish} out, or use a participant that can"
-            )

@@ -62,14 +62,16 @@ class Participant(ABC):
     ``state = save()`` and ``restore(state)`` give exactly the same future, bit for bit, also in another instance of the
     same participant; `can_restore` says whether they exist. A step that fails raises `StepError` and leaves the
     participant so that `restore` still works. `input_order` is how many derivatives of the inputs a step follows,
-    `can_vary_step` whether steps may differ in size, `start_limit` how long `initialize` may take at least [s] however
-    little a step is given, and `unread` which inputs hold no number, with their type: they keep their start values.
+    `can_halve` whether it takes other inputs for the second half of a step, `can_vary_step` whether steps may differ
+    in size, `start_limit` how long `initialize` may take at least [s] however little a step is given, and `unread`
+    which inputs hold no number, with their type: they keep their start values.
     """
 
     name: str
     variables: tuple[Variable, ...]
     can_restore: bool = False
     input_order: int = 0
+    can_halve: bool = False
     can_vary_step: bool = True
     start_limit: float = 60.0
     unread: Mapping[str, str] = MappingProxyType({})
@@ -93,6 +95,10 @@ class Participant(ABC):
         is not called after one, inputs are those of the step's middle.
         """
         raise NotImplementedError(f"{self.name}: takes no input derivatives")  # optional: given if `input_order` > 0
+
+    def set_input_halves(self, first: np.ndarray, second: np.ndarray) -> None:
+        """Every input over the first and over the second half of the next step, in place of `set_inputs`."""
+        raise NotImplementedError(f"{self.name}: takes no inputs by halves")  # optional: given if `can_halve`
 
     def begin(self, time: float, size: float) -> None:
         """Start a step that `finish` waits for; the default takes the whole step here, as nothing runs beside it."""

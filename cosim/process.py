@@ -83,7 +83,8 @@ class OwnProcess(Participant):
         except StepError as error:
             self._end()
             raise InputError(str(error)) from None
-        self.name, self.variables, self.can_restore, self.input_order, self.can_vary_step, start, self.unread = facts
+        self.name, self.variables, self.can_restore, self.input_order, self.can_halve, self.can_vary_step = facts[:6]
+        start, self.unread = facts[6:]
         self._timeout = max(timeout, start)
         self._shown = np.zeros(len(self.names("output")))
         self._inputs: tuple[np.ndarray, ...] | None = None
@@ -101,6 +102,10 @@ class OwnProcess(Participant):
         """Keep the slopes for the next message."""
         assert self._inputs is not None
         self._inputs = (self._inputs[0], first.copy(), second.copy())
+
+    def set_input_halves(self, first: np.ndarray, second: np.ndarray) -> None:
+        """Keep both for the next message."""
+        self._inputs = (first.copy(), second.copy())
 
     def begin(self, time: float, size: float) -> None:
         """Start the step there."""
@@ -237,7 +242,7 @@ def _serve(descriptor: int) -> None:
                 make, arguments, keywords = pickle.loads(content)
                 participant = make(*arguments, **keywords)
                 p = participant
-                able = p.can_restore, p.input_order, p.can_vary_step
+                able = p.can_restore, p.input_order, p.can_halve, p.can_vary_step
                 answer = "done", (p.name, p.variables, *able, p.start_limit, dict(p.unread))
             elif what == "close":
                 states.clear()
@@ -261,7 +266,9 @@ def _act(participant: Participant, what: str, content: Any) -> np.ndarray:
         participant.initialize(*content)
         return participant.outputs()
     inputs, *step = content if what == "step" else (content,)
-    if inputs is not None:
+    if inputs is not None and len(inputs) == 2:
+        participant.set_input_halves(*inputs)
+    elif inputs is not None:
         participant.set_inputs(inputs[0])
         if len(inputs) > 1:
             participant.set_input_derivatives(*inputs[1:])

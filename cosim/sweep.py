@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .feedthrough import FeedThrough
-from .hold import Hold, combine, end_weights, weights
+from .hold import HALVES, Hold, combine, end_weights, weights
 from .participant import Participant, StepError
 from .system import System
 
@@ -20,17 +20,24 @@ class Plan:
         Participants to be brought up to date after a step, in order.
     follow : tuple of int
         Participants with direct feed-through.
-    before : pair of tuples of float
-        The hold's weights where the newest value is that of the step's start: for what is held, and for the step's end.
-    after : tuple of float
-        The weights for what is held where the newest value is that of the step's end.
+    halves : tuple of int
+        Participants that take other inputs for the second half of a step.
+    before : tuple of tuples of float
+        The hold's weights where the newest value is that of the step's start: for what is held over the step, and, if
+        anyone takes halves, over each of them.
+    end : tuple of float
+        The weights of the value at the step's end, where the newest one is that of its start.
+    after : tuple of tuples of float
+        As `before`, where the newest value is that of the step's end.
     sequential : bool
     """
 
     visits: tuple[int, ...]
     follow: tuple[int, ...]
-    before: tuple[tuple[float, ...], tuple[float, ...]]
-    after: tuple[float, ...]
+    halves: tuple[int, ...]
+    before: tuple[tuple[float, ...], ...]
+    end: tuple[float, ...]
+    after: tuple[tuple[float, ...], ...]
     sequential: bool
 
 
@@ -51,7 +58,7 @@ class Sweep:
         self._system, self._layout, self._hold, self._feed = system, system.layout, hold, feed
         self._participants = list(system.participants.values())
         self._sequential = sequential
-        self._orders = tuple(0 if hold.middle else min(p.input_order, hold.degree) for p in self._participants)
+        self._orders = tuple(_order(p, hold) for p in self._participants)
         self._follow = [
             i
             for i, p in enumerate(self._participants)
@@ -115,12 +122,16 @@ class Sweep:
 
     def plan(self, size: float) -> Plan | None:
         """What a compiled loop needs; None where it could not do the same."""
-        if any(self._orders) or self._feed.loops or any(len(jumps) for jumps in self._jumps):
+        if any(order > 0 for order in self._orders) or self._feed.loops or any(len(jumps) for jumps in self._jumps):
             return None
         back, ahead = (tuple(start - k for k in range(self._hold.degree + 1)) for start in (0.0, 1.0))
-        before = weights(self._hold, back, size, 0)[0], end_weights(back)
+        halves = tuple(i for i, order in enumerate(self._orders) if order == HALVES)
+        before, after = (
+            tuple(row for order in ((0, HALVES) if halves else (0,)) for row in weights(self._hold, nodes, size, order))
+            for nodes in (back, ahead)
+        )
         visits = tuple(visit for visit in self._feed.order if isinstance(visit, int))
-        return Plan(visits, tuple(self._follow), before, weights(self._hold, ahead, size, 0)[0], self._sequential)
+        return Plan(visits, tuple(self._follow), halves, before, end_weights(back), after, self._sequential)
 
     def failure(self, i: int, time: float, error: Exception) -> StepError:
         """What participant ``i`` did not manage in the step from a time [s]."""
@@ -208,10 +219,16 @@ class Sweep:
         """
         source, factor, offset, mean, still = self._reading[i]
         jumps = self._jumps[i]
+        participant, order = self._participants[i], self._orders[i]
         values = factor * held[0][source] + offset
         if len(jumps):
             values[jumps] = factor[jumps] * start[source[jumps]] + offset[jumps]
-        participant, order = self._participants[i], self._orders[i]
+        if order == HALVES:
+            second = factor * held[1][source] + offset
+            second[jumps] = values[jumps]
+            participant.set_input_halves(values, second)
+            mean[:] = 0.5 * (values + second)
+            return
         participant.set_inputs(values)
         mean[:] = values
         if participant.input_order and not self._hold.middle:
@@ -222,3 +239,12 @@ class Sweep:
             participant.set_input_derivatives(first, second)
             if slopes:
                 mean += first * (size / 2) + second * (size * size / 6)
+
+
+def _order(participant: Participant, hold: Hold) -> int:
+    """How much of a hold's polynomial a participant is given; halves where it takes no slope and the hold has more."""
+    if hold.middle:
+        return 0
+    if not participant.input_order and participant.can_halve and hold.degree > 1:
+        return HALVES
+    return min(participant.input_order, hold.degree)

@@ -1,28 +1,35 @@
 """Write what is generated: ``python docs/make_pages.py``.
 
-``effects.md`` from the effects, ``commands.md`` from the program's parser, and the README's table of what can be named.
-A test compares each with the code, so that none goes stale; ``make docs`` writes them before it builds the pages.
+``effects.md`` from the effects, ``commands.md`` from the program's parser, the README's table of what can be named, and
+the numbers that decide in ``method.md``. A test compares each with the code, so that none goes stale; ``make docs``
+writes them before it builds the pages.
 """
 
 from pathlib import Path
 
 import make_commands
+import make_deciding
 import make_effects
 
 DOCS = Path(__file__).resolve().parent
-README = DOCS.parent / "README.md"
-BEGIN, END = "<!-- effects: written by docs/make_pages.py -->\n", "<!-- end of effects -->"
+README, METHOD = DOCS.parent / "README.md", DOCS / "method.md"
 
 
 def pages() -> dict[Path, str]:
     """Each file and what should stand in it."""
-    before, rest = README.read_text(encoding="utf-8").split(BEGIN)
-    after = rest.split(END)[1]
     return {
         DOCS / "effects.md": make_effects.page(),
         DOCS / "commands.md": make_commands.page(),
-        README: before + BEGIN + make_effects.families() + END + after,
+        README: _between(README, "effects", make_effects.families()),
+        METHOD: _between(METHOD, "numbers", make_deciding.table()),
     }
+
+
+def _between(page: Path, what: str, text: str) -> str:
+    """A page with a text between its marks of what it is."""
+    begin, end = f"<!-- {what}: written by docs/make_pages.py -->\n", f"<!-- end of {what} -->"
+    before, rest = page.read_text(encoding="utf-8").split(begin)
+    return before + begin + text + end + rest.split(end)[1]
 
 
 if __name__ == "__main__":

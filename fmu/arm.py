@@ -26,15 +26,14 @@ from ..models.floating.arm import FloatingArm
 from ..models.floating.tree import FloatingTree, floating_tree, n_carriers
 from ..models.model import Model, Placed
 from ..models.rig.rig import Rig
+from .accelerations import Joints, accelerations_of
 from .base import Base
 from .equations import Equations, Ledger
-from .placed_laws import PlacedLaws, identifier
+from .placed_laws import PlacedLaws, identifier, summed
 from .rigid_arm import Rigid, body_outputs, rigid
 from .sensors import read_sensors
 from .suspension import PLACES, rig_reach, rig_signals
-from .symbolic import root, solved_symmetric
-
-_NEWTON = 6  # friction in proportion to |load| is piecewise linear: it is met after two or three
+from .symbolic import root
 
 
 @dataclass(frozen=True)
@@ -73,7 +72,7 @@ def arm_equations(
         A parameter without a value, or a springy joint whose motor has no inertia.
     """
     if arm.floating and not isinstance(model.tree, FloatingTree):
-        model = replace(model, tree=floating_tree(arm))
+        model = replace(model, tree=replace(floating_tree(arm), axes=model.tree.axes))
     return _Writer(model, arm).written(stiff, servo, [0.0] * arm.n_joints if start is None else start)
 
 
@@ -120,7 +119,10 @@ class _Writer:
         motion, hidden = (q, qd), self._hidden(start_q, start_qd)
         on_rig, rig_rates = self._rig(q_link, qd_link, start_link, start_qd)
         friction = self._friction(motion, now, hidden)
-        accelerations, load = self._solved(now, friction, springy, springs, on_rig)
+        on_joints = Joints(
+            friction, self.free, self.linear, self._across(springy), on_rig, self.tau, springs, tuple(springy)
+        )
+        accelerations, load = accelerations_of(now, base, on_joints)
         link_qdd = accelerations[base.size :]
         qdd = ca.SX(link_qdd)
         for j, p in springy.items():
@@ -184,7 +186,7 @@ class _Writer:
         """Torque of a springy joint: what its law balances the load with, ``inertia * stretch'' = load - spring``."""
         names = p.effect.states
         load = ca.SX.sym("load")
-        given = {**self.laws.signals(joint), "load": load, "inertia": ca.SX(1)}
+        given = {**self.laws.signals(p), "load": load, "inertia": ca.SX(1)}
         found = self.laws.rate(p, {**given, **dict(zip(names, (stretch, rate), strict=len(names) == 2))})
         if len(names) != 2 or not ca.is_equal(ca.simplify(ca.jacobian(found[1], load)), ca.SX(1), 2):
             raise InputError(f"{self.model.path}: {p.key} has no forward dynamics; export with --inverse")
@@ -195,9 +197,10 @@ class _Writer:
         found = []
         for p in self.laws.at("joint"):
             if p.effect.states and p.effect.acts_on == "torque":
-                j = self.laws.joint_of(p)
-                at_start = {"q": start_q[j], "qd": start_qd[j], "qdd": ca.SX(0), "load": ca.SX(0), "inertia": ca.SX(1)}
-                start = self.laws.steady(p, {**self.laws.signals(j), **at_start})
+                along = self.laws.place_of(p).along
+                at_start = {"q": summed(along, start_q), "qd": summed(along, start_qd), "inertia": ca.SX(1)}
+                at_start |= dict.fromkeys(("qdd", "load"), ca.SX(0))
+                start = self.laws.steady(p, {**self.laws.signals(p), **at_start})
                 found.append(
                     (p, {s: self.ledger.state(x) for s, x in zip(p.effect.states, ca.vertsplit(start), strict=True)})
                 )
@@ -209,7 +212,7 @@ class _Writer:
         for p in laws.at(*PLACES):
             assert isinstance(rig, Rig)
             j = laws.joint_of(p)
-            own = laws.signals(j) | {"q": q[j], "qd": qd[j]}
+            own = laws.signals(p) | {"q": q[j], "qd": qd[j]}
             signals, states = own | rig_signals(rig, p, q, qd), {}
             if p.effect.states:
                 rest = laws.steady(p, own | rig_signals(rig, p, start_q, start_qd))
@@ -218,51 +221,42 @@ class _Writer:
             taken += rig_reach(rig, p, q) @ laws.law(p, signals | states)
         return taken, rates
 
-    def _signals(self, j: int, motion: tuple[ca.SX, ca.SX], qdd: ca.SX, load: ca.SX, now: Rigid) -> dict[str, ca.SX]:
-        own = now.inertia[self.base.size + j, self.base.size + j]
-        signals = {"q": motion[0][j], "qd": motion[1][j], "qdd": qdd, "load": load, "inertia": own}
-        return self.laws.signals(j) | signals
+    def _signals(self, p: Placed, motion: tuple[ca.SX, ca.SX], qdd: ca.SX, load: ca.SX, now: Rigid) -> dict[str, ca.SX]:
+        """What a law at a joint or an axis reads, of the joints' accelerations and loads (J,)."""
+        here, base = self.laws.place_of(p), self.base.size
+        along = {"q": motion[0], "qd": motion[1], "qdd": qdd}
+        matrix = now.inertia[base:, base:]
+        across = ca.vertcat(*(summed(here.back, matrix[j, :].T) for j in range(self.n)))
+        signals = {name: summed(here.along, x) for name, x in along.items()}
+        signals |= {"load": summed(here.back, load), "inertia": summed(here.back, across)}
+        return self.laws.signals(p) | signals
 
     def _friction(self, motion: tuple[ca.SX, ca.SX], now: Rigid, hidden: list) -> ca.Function:
-        """All that joint effects take of the drive (J,), and its slopes, by acceleration and load (J,) each."""
+        """All that effects at joints and axes take of the drives (J,), and its slopes, by acceleration and load
+        (J, J) each."""
         qdd, load, taken = ca.SX.sym("qdd", self.n), ca.SX.sym("load", self.n), ca.SX(self.n, 1)
         states = {p.key: s for p, s in hidden}
         for p in self.laws.at("joint"):
             if p.effect.acts_on == "torque":
-                j = self.laws.joint_of(p)
-                taken[j] += self.laws.law(p, self._signals(j, motion, qdd[j], load[j], now) | states.get(p.key, {}))
+                law = self.laws.law(p, self._signals(p, motion, qdd, load, now) | states.get(p.key, {}))
+                here = self.laws.place_of(p)
+                for j in here.channels:
+                    taken[int(j)] += law if here.alone is not None else float(here.along[j]) * law
         self.linear = not any(ca.which_depends(taken, ca.vertcat(qdd, load), 2, False))
-        slopes = [ca.diag(ca.jacobian(taken, x)) for x in (qdd, load)]
-        self.free = [s for s in ca.symvar(ca.vertcat(taken, *slopes)) if s.name() not in _names(qdd, load)]
+        slopes = [ca.jacobian(taken, x) for x in (qdd, load)]
+        self.free = [s for s in ca.symvar(ca.veccat(taken, *slopes)) if s.name() not in _names(qdd, load)]
         return ca.Function("friction", [qdd, load, *self.free], [taken, *slopes])
 
-    def _solved(
-        self, now: Rigid, friction: ca.Function, springy: dict, springs: ca.SX, on_rig: ca.SX
-    ) -> tuple[ca.SX, ca.SX]:
-        """Accelerations (base and J,) and rigid-body torque (J,)."""
-        size, base = now.inertia.shape[0], self.base.size
-        at_base = ca.SX.sym("acceleration", base)
-        given = self.base.wrench(at_base)
-        by_base = ca.jacobian(given, at_base)
-        steps = 1 if self.linear and not any(ca.which_depends(given, at_base, 2, False)) else _NEWTON
-        found = ca.SX(size, 1)
-        for _ in range(steps):
-            force = now.inertia @ found + now.terms
-            load = force[base:]
-            taken, by_qdd, by_load = friction(found[base:], load, *self.free)
-            residual, matrix = ca.SX(force), ca.SX(now.inertia)
-            if base:
-                here = ca.densify(found[:base])
-                residual[:base] -= ca.substitute(given, at_base, here)
-                matrix[:base, :base] -= ca.substitute(by_base, at_base, here)
-            for j in range(self.n):
-                if j in springy:
-                    residual[base + j] = load[j] + on_rig[j] - springs[j]
-                else:
-                    residual[base + j] = (load[j] + on_rig[j] + taken[j] - self.tau[j]) / (1 + by_load[j])
-                    matrix[base + j, base + j] += by_qdd[j] / (1 + by_load[j])
-            found = found - solved_symmetric(matrix, residual)
-        return found, now.inertia[base:, :] @ found + now.terms[base:]
+    def _across(self, springy: dict[int, Placed]) -> bool:
+        """Whether an effect acts along several joints at once; InputError beside a springy joint."""
+        across = [p for p in self.laws.at("joint") if self.laws.place_of(p).alone is None]
+        if across and springy:
+            spring = next(iter(springy.values()))
+            raise InputError(
+                f"{self.model.path}: {across[0].key} acts along an axis, and {spring.key} is a spring: their forward "
+                "dynamics together are not written; export with --inverse"
+            )
+        return bool(across)
 
     def _motor(self, friction: ca.Function, j: int, p: Placed, spring: ca.SX) -> ca.SX:
         """Acceleration of the motor before a spring."""
@@ -270,17 +264,17 @@ class _Writer:
         load[j] = spring
         taken, by_qdd, _ = friction(ca.SX(self.n, 1), load, *self.free)
         own = f"rotor_inertia.{self.joints[j]}"
-        if by_qdd[j].is_zero() or not self.model.values.get(f"{own}.inertia", 0) > 0:
+        if by_qdd[j, j].is_zero() or not self.model.values.get(f"{own}.inertia", 0) > 0:
             raise InputError(
                 f"{self.model.path}: {p.key} leaves the motor without inertia, so its motion is not determined; add "
                 f'{{ name = "rotor_inertia", at = "{self.joints[j]}" }} to effects and a positive "{own}.inertia" to '
                 "[parameters], or export with --inverse"
             )
-        return (self.tau[j] - spring - taken[j]) / by_qdd[j]
+        return (self.tau[j] - spring - taken[j]) / by_qdd[j, j]
 
     def _hidden_rate(self, p: Placed, motion: tuple, qdd: ca.SX, load: ca.SX, now: Rigid, hidden: list) -> ca.SX:
-        j, states = self.laws.joint_of(p), dict((q.key, s) for q, s in hidden)[p.key]
-        return self.laws.rate(p, self._signals(j, motion, qdd[j], load[j], now) | states)
+        states = dict((q.key, s) for q, s in hidden)[p.key]
+        return self.laws.rate(p, self._signals(p, motion, qdd, load, now) | states)
 
     def _stiff(self, rates: list[ca.SX]) -> bool:
         """Whether 1 ms is too long for explicit Runge-Kutta, at rest or with every joint at 0.1 rad/s or m/s."""

@@ -12,7 +12,9 @@ them between samples.
 from collections.abc import Callable
 
 import casadi as ca
+import numpy as np
 
+from ..models.axes import Place
 from ..models.floating.tree import n_carriers
 from ..models.hidden_state import ros2
 from ..models.model import Model, Placed
@@ -20,7 +22,7 @@ from ..models.rig.rig import Rig
 from ..models.rigid_body import symbolic_torque
 from .base_motion import BaseMotion
 from .equations import Equations, Ledger
-from .placed_laws import PlacedLaws, identifier
+from .placed_laws import PlacedLaws, identifier, summed
 from .suspension import PLACES, rig_reach, rig_signals
 
 _Signals = dict[str, ca.SX]
@@ -151,7 +153,7 @@ class _Follower:
             j = self.first + laws.joint_of(p)
             encoder = p.effect.at == "sensor" and p.at.startswith("q.")
             signals = [
-                self._signals(p, *end) | {"load": load[j], "value": reading[j], "inertia": by_qdd[j, j]}
+                self._signals(p, *end) | {"value": reading[j]} | self._carried(p, j, load, by_qdd)
                 for end, load, reading, (_, _, by_qdd) in zip(ends, loads, readings, slopes, strict=True)
             ]
             if isinstance(rig, Rig) and p.effect.at in PLACES:
@@ -170,7 +172,9 @@ class _Follower:
                 elif isinstance(rig, Rig) and p.effect.at in PLACES:
                     change = rig_reach(rig, p, motions[k][0]) @ law
                 elif p.effect.acts_on == "torque":
-                    change[j] = law
+                    here = laws.place_of(p)
+                    for c in here.channels:
+                        change[self.first + int(c)] = law if here.alone is not None else float(here.along[c]) * law
                 else:
                     change = sum(
                         (slope[:, j] * d for slope, d in zip(slopes[k], ca.vertsplit(law), strict=True)), change
@@ -180,11 +184,27 @@ class _Follower:
 
     def _signals(self, p: Placed, t: ca.SX, u: ca.SX, memory: ca.SX) -> _Signals:
         """What an effect may read of time, inputs and the base's memory."""
-        n, j, here = self.n, self.laws.joint_of(p), ca.vertcat(self.ledger.time, self.ledger.inputs())
-        own = {name: ca.substitute(x, here, ca.vertcat(t, u)) for name, x in self.laws.signals(j).items()}
+        n, here = self.n, ca.vertcat(self.ledger.time, self.ledger.inputs())
+        own = {name: ca.substitute(x, here, ca.vertcat(t, u)) for name, x in self.laws.signals(p).items()}
         if p.effect.at == "base" and self.base is not None:
             return own | self.base.signals(u, memory)
-        return own | {"q": u[j], "qd": u[n + j], "qdd": u[2 * n + j]}
+        along = self._direction(p).along
+        return own | {name: summed(along, u[k * n : (k + 1) * n]) for k, name in enumerate(("q", "qd", "qdd"))}
+
+    def _direction(self, p: Placed) -> Place:
+        """The joint or axis whose motion an effect reads."""
+        if p.effect.at in ("joint", "sensor"):
+            return self.laws.place_of(p)
+        one = np.eye(self.n)[self.laws.joint_of(p)]
+        return Place(p.at, one, one, "revolute")
+
+    def _carried(self, p: Placed, j: int, load: ca.SX, by_qdd: ca.SX) -> _Signals:
+        """Load and inertia that a joint's law, or a sensor's, reads."""
+        if p.effect.at not in ("joint", "sensor"):
+            return {"load": load[j], "inertia": by_qdd[j, j]}
+        back, own = self.laws.place_of(p).back, by_qdd[self.first :, self.first :]
+        across = ca.vertcat(*(summed(back, own[k, :].T) for k in range(self.n)))
+        return {"load": summed(back, load[self.first :]), "inertia": summed(back, across)}
 
     def _stepped(self, p: Placed, x: ca.SX, here: _Signals, there: _Signals, h: ca.SX) -> ca.SX:
         """One step, as `snarelab.models.hidden_state` takes it between samples."""

@@ -1,10 +1,12 @@
 """Laws of a model's effects as expressions: parameters and hidden states go into the ledger, laws come out."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
 
+from ..models.axes import Place, place
 from ..models.effect import Parameter, written_unit
 from ..models.floating.tree import n_carriers
 from ..models.hidden_state import reads
@@ -39,18 +41,19 @@ class PlacedLaws:
         self._model, self._ledger = model, ledger
         self._joints = model.tree.joints[n_carriers(model.tree) :]
         self._parameters: dict[str, dict[str, ca.SX]] = {}
-        self._scales: dict[int, ca.SX] = {}
+        self._scales: dict[str, ca.SX] = {}
         self._temperatures: dict[int, ca.SX] = {}
         model.demand_values()
         for p in model.effects:
             self._parameters[p.key] = {x.name: self._parameter(p, x) for x in p.effect.parameters}
             j, read = self.joint_of(p), reads(p.effect)
-            if "speed_scale" in read and j not in self._scales:
-                name = f"speed_scale.{self._name(p)}"
+            own = self._own(p)
+            if "speed_scale" in read and own not in self._scales:
+                name = f"speed_scale.{own}"
                 words = "peak speed in the recordings that the model was fitted to; sets how sharp friction turns over"
                 limit = self._joints[j].speed
                 start = model.values.get(name, limit if 0 < limit < np.inf else 1.0)
-                self._scales[j] = ledger.parameter(name, self.unit(j, "S/s"), start, words, (1e-9, np.inf))
+                self._scales[own] = ledger.parameter(name, self.unit(j, "S/s"), start, words, (1e-9, np.inf))
             if "temperature" in read and j not in self._temperatures:
                 self._temperatures[j] = ledger.input(f"temp.{self._name(p)}", "degC", f"temperature of {self._name(p)}")
 
@@ -65,8 +68,13 @@ class PlacedLaws:
             return sling_of(self._model.tree, p.at).link
         if p.effect.at in ("link", "boom", "base"):
             return self._link_of(p) - n_carriers(self._model.tree)
-        names = [joint.name for joint in self._joints]
-        return names.index(p.at.removeprefix("tau.").removeprefix("q.").removeprefix("q_link."))
+        return int(self.place_of(p).channels[0])
+
+    def place_of(self, p: Placed) -> Place:
+        """The joint or axis, among the arm's joints, that an effect acts at or whose channel it reads."""
+        found = place(self._model.tree, p.at.removeprefix("tau.").removeprefix("q.").removeprefix("q_link."))
+        first = n_carriers(self._model.tree)
+        return replace(found, along=found.along[first:], back=found.back[first:])
 
     def _link_of(self, p: Placed) -> int:
         return [link.name for link in self._model.tree.links].index(p.at)
@@ -74,17 +82,23 @@ class PlacedLaws:
     def _name(self, p: Placed) -> str:
         return self._joints[self.joint_of(p)].name
 
+    def _own(self, p: Placed) -> str:
+        """Name of the joint, or the axis, whose speed an effect refers to."""
+        return p.at if any(axis.name == p.at for axis in self._model.tree.axes) else self._name(p)
+
     def unit(self, joint: int, unit: str, channel: str = "") -> str:
         """A unit with the joint's torque, position and channel units written out."""
         return written_unit(unit, self._joints[joint].kind, channel)
 
-    def signals(self, joint: int = -1) -> dict[str, ca.SX]:
+    def signals(self, p: Placed | None = None) -> dict[str, ca.SX]:
         """Signals that depend on the place alone: time, temperature, speed scale."""
         found = {"time": self._ledger.time}
-        if joint in self._scales:
-            found["speed_scale"] = self._scales[joint]
-        if joint in self._temperatures:
-            found["temperature"] = self._temperatures[joint]
+        if p is None:
+            return found
+        if self._own(p) in self._scales:
+            found["speed_scale"] = self._scales[self._own(p)]
+        if self.joint_of(p) in self._temperatures:
+            found["temperature"] = self._temperatures[self.joint_of(p)]
         return found
 
     def law(self, p: Placed, signals: Mapping[str, ca.SX]) -> ca.SX:
@@ -122,7 +136,7 @@ class PlacedLaws:
 
     def _parameter(self, p: Placed, x: Parameter) -> ca.SX:
         name, joint = f"{p.key}.{x.name}", self.joint_of(p)
-        scale = self._model.values.get(f"speed_scale.{self._name(p)}") if x.relative_to == "speed" else None
+        scale = self._model.values.get(f"speed_scale.{self._own(p)}") if x.relative_to == "speed" else None
         known = not x.relative_to or scale is not None
         factor = 1.0 if scale is None else scale
         low, high = (
@@ -135,6 +149,13 @@ class PlacedLaws:
             f"{x.meaning}: {p.effect.sentence}",
             (low, high),
         )
+
+
+def summed(weights: np.ndarray, x: ca.SX) -> ca.SX:
+    """Weights (J,) times x (J,): one number, without what counts for nothing."""
+    return sum(
+        (x[int(j)] if weights[j] == 1 else float(weights[j]) * x[int(j)] for j in np.flatnonzero(weights)), ca.SX(0)
+    )
 
 
 def identifier(name: str) -> str:

@@ -35,7 +35,7 @@ def read_sensors(
     readings: dict[str, tuple[ca.SX, ca.SX, str]] = {}  # by channel: now, at the start, unit
     for p in laws.at("sensor"):
         j = laws.joint_of(p)
-        channel, own = p.at.partition(".")[0], {**joints[j], **laws.signals(j)}
+        channel, own = p.at.partition(".")[0], {**joints[j], **laws.signals(p)}
         position = channel in start
         true = (own[channel], start[channel][j] if position else own[channel])
         value, first = readings.get(p.at, true)[:2]

@@ -1,6 +1,6 @@
-"""Put a search's findings into words and numbers: the `Diagnosis` that JSON, report and tests share."""
+"""Put what was decided into words and numbers: the `Diagnosis` that JSON, report and tests share."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -9,41 +9,26 @@ from numpy.typing import NDArray
 
 from ..models.floating.tree import channel, n_carriers
 from ..models.model import Model
-from .diagnosis import Candidate, ChannelFit, Diagnosis, Estimate, Finding, Misfit, Moved, Rival, Step, Trace
+from .diagnosis import Candidate, ChannelFit, Diagnosis, Estimate, Finding, Limit, Misfit, Moved, Rival, Step, Trace
+from .evidence.diagnose import Decided
+from .evidence.found import Name
 from .fitting.experiment import Experiment
 from .fitting.fit import Fit, channel_rms
 from .fitting.floating_terms import momentum_floor
-from .reliability import probability as reliability
-from .search.bursts import bursts
-from .search.candidates import has_whole_law
-from .search.choice import Taken
-from .search.forward import Found
+from .reliability import of_name
 from .search.locate import locate
-from .search.trial import MATERIAL
-from .search.whole_law import beside_whole_laws
-from .wording import evidence_sentence, experiment_sentence, listed, percent, verdict_sentence
+from .wording import evidence_sentence, experiment_sentence, listed, noise_words, percent, verdict_sentence
 
 Array = NDArray[np.float64]
-
-NAMELESS = 0.1
-"""Smooth curves that explain this share of a channel's residual, in blocks they did not see, mean a nameless effect
-..."""
-
-PLAIN = 0.5
-"""... if they also amount to `MATERIAL` of the channel's RMS torque, or if they are this much of the residual: on a
-joint that carries a lot, plain and yet a small share of it. With a whole friction law there, that may be its form."""
 
 
 def report_on(
     model: Model,
-    found: Found,
-    confirmed: Sequence[Taken],
-    doubtful: Sequence[Taken],
+    decided: Decided,
     final: Fit,
-    trials: Mapping[str, tuple[float, float]],
     steps: tuple[Step, ...],
     train: Sequence[Experiment],
-    locked: Sequence[Experiment],
+    held: Sequence[Experiment],
 ) -> Diagnosis:
     """Put everything into words and numbers.
 
@@ -51,86 +36,61 @@ def report_on(
     ----------
     model : Model
         Baseline.
-    found : Found
-        The search's result.
-    confirmed : sequence of Taken
-        What the held-out recording confirmed; the rest of ``found.taken`` goes into the notes.
-    doubtful : sequence of Taken
-        What it confirmed too, and what only stands in for something that has no name.
+    decided : Decided
+        Verdict, names, nameless curves, and what was not confirmed.
     final : Fit
         With the confirmed effects.
-    trials : mapping of str to (with, without)
-        Relative held-out error of each effect's worst channel, with the effect and with it taken out.
     steps : tuple of Step
-    train, locked : sequence of Experiment
+    train, held : sequence of Experiment
     """
+    found, best = decided.best.found, decided.best
     channels = [channel(model.tree, c) for c in range(model.tree.n_joints)]
-    findings = tuple(
-        _finding(beside_whole_laws(t, final, found.closing, train), final, trials, channels) for t in confirmed
-    )
-    fits = _fits(model, found.first, final, train, locked)
-    nameless = {c: x for c, x in found.closing.nameless.items() if x.share > NAMELESS}
-    # What a curve explains well may also come and go.
-    bursting = bursts(final, train)
-    unsteady = {c: b for c, b in bursting.items() if b.again and (c not in nameless or nameless[c].share < PLAIN)}
+    findings = tuple(_finding(n, decided, final, channels) for n in best.names)
+    fits = _fits(model, found.first, final, train, held)
+    left = decided.left
+    again = {c: b for c, b in left.bursts.items() if b.again}
+    loud = sorted({r.channel for r in left.curves} | set(again))
 
-    def size(c: int, share: float) -> float:
-        return float(np.sqrt(share)) * fits[c].train.relative_after
+    def size(c: int, share: float) -> str:
+        return percent(float(np.sqrt(share)) * fits[c].train.relative_after)
 
     said = [
-        (
-            c,
-            x.share,
-            f"on {channels[c]}, smooth curves over {x.over} still explain {percent(x.share)} of the residual in "
-            f"blocks that they were not fitted to ({percent(size(c, x.share))} of the channel's torque)",
-        )
-        for c, x in nameless.items()
+        f"on {channels[r.channel]}, a smooth curve over {r.over} still explains {percent(r.explained)} of the residual "
+        f"({size(r.channel, r.explained)} of the channel's torque)"
+        for r in left.curves
     ] + [
-        (
-            c,
-            b.share,
-            f"on {channels[c]}, {percent(b.share)} of the residual comes in bursts, at {b.frequency:.2g} Hz where "
-            f"it is strongest ({percent(size(c, b.share))} of the channel's torque)",
-        )
-        for c, b in unsteady.items()
+        f"on {channels[c]}, {percent(b.share)} of the residual comes in bursts, at {b.frequency:.2g} Hz where it is "
+        f"strongest ({size(c, b.share)} of the channel's torque)"
+        for c, b in again.items()
     ]
-    plain = {c for c, x in nameless.items() if x.share > PLAIN}
-    formed = {c for c in plain if has_whole_law(final.assembly.placed, model.joints[c])}
-    loud = {c for c, x, _ in said if size(c, x) >= MATERIAL} | (plain - formed)
-    description = "; ".join(text for c, _, text in said if c in loud)
+    description = "; ".join(said)
     if findings:
-        verdict = "missing_physics"
-        remainder = (
-            f" Part of what is left on {listed([channels[c] for c in sorted(loud)])} has no name." if loud else ""
-        )
+        remainder = f" Part of what is left on {listed([channels[c] for c in loud])} has no name." if loud else ""
     else:
-        verdict = "unknown_effect" if description else "adequate"
         remainder = f" {description[:1].upper()}{description[1:]}." if description else ""
-    named = {t.judged.placed.key for t in confirmed}
-    notes = [f"{Path(e.motion.path).name}: {note}" for e in (*train, *locked) for note in e.motion.notes]
+    noise = {
+        channels[c]: noise_words(fits[c].unit, x, [row[c].encoder for row in found.weighed.runs])
+        for c, x in enumerate(found.weighed.noises)
+    }
+    named = {n.placed.key for n in best.names}
+    notes = [f"{Path(e.motion.path).name}: {note}" for e in (*train, *held) for note in e.motion.notes]
     notes += [
-        f"{t.judged.placed.effect.name} at {t.judged.placed.at} passed on the training recordings but made the "
-        f"held-out one hardly better: not named"
-        for t in found.taken
-        if t.judged.placed.key not in named
+        f"{n.placed.effect.name} at {n.placed.at} passed on the training recordings, but the held-out ones are "
+        f"foretold no better with it: not named"
+        for n in decided.rejected
+        if n.placed.key not in named
     ]
     notes += [
-        f"{t.judged.placed.effect.name} at {t.judged.placed.at} explains some of it, but smooth curves far more: "
-        f"not named"
-        for t in doubtful
-    ]
-    notes += [f"too little to speak of: {text}" for c, _, text in said if c not in loud]
-    notes += [
-        f"on {channels[c]}, {percent(b.share)} of the residual stands in one window and has not come again: "
-        "a knock, or an outlier"
-        for c, b in bursting.items()
+        f"on {channels[c]}, {percent(b.share)} of the residual stands in one window and has not come again: a knock, "
+        "or an outlier"
+        for c, b in left.bursts.items()
         if not b.again
     ]
-    notes += _excitation(train)
+    notes += [f"noise of {c}: {words}" for c, words in noise.items()] + _excitation(train)
     candidates = tuple(
-        Candidate(j.placed.effect.name, j.placed.at, float(j.explained), float(j.score), j.placed.key in named)
-        for j in sorted(found.opening.judged, key=lambda j: -j.explained)
-        if j.explained > 0
+        Candidate(t.placed.effect.name, t.placed.at, t.explained, t.odds, t.placed.key in named)
+        for t in found.trials
+        if t.explained > 0
     )
     explained = [_explained(found.first, final, e) for e in train]
     if not findings:
@@ -138,8 +98,10 @@ def report_on(
         spoken = [c in loud for c in range(len(channels))]
         explained = [(e.measured - e.motion.to_band(final.assembly.torque(e, final.theta))) * spoken for e in train]
     return Diagnosis(
-        verdict,
-        verdict_sentence(findings, [f for c, f in enumerate(fits) if findings or not loud or c in loud], remainder),
+        decided.verdict,
+        verdict_sentence(
+            findings, [f for c, f in enumerate(fits) if findings or not loud or c in loud], remainder, noise
+        ),
         description,
         model.name,
         findings,
@@ -148,8 +110,8 @@ def report_on(
         steps,
         candidates,
         _moved(found.first, final),
-        _traces(found.first, final, train, locked),
-        found.closing.limits,
+        _traces(found.first, final, train, held),
+        _limits(decided, final),
         tuple(notes),
         train[0].motion.band,
     )
@@ -161,33 +123,41 @@ def _explained(first: Fit, final: Fit, experiment: Experiment) -> Array:
     return experiment.motion.to_band(change)
 
 
-def _finding(t: Taken, final: Fit, trials: Mapping[str, tuple[float, float]], every: Sequence[str]) -> Finding:
-    placed = t.judged.placed
+def _finding(n: Name, decided: Decided, final: Fit, every: Sequence[str]) -> Finding:
+    placed = n.placed
     parameters = {
         final.assembly.slots[i].name: Estimate(
             float(final.theta[i]), float(final.std[i]), final.assembly.slots[i].unit, bool(final.at_bound[i])
         )
         for i in final.assembly.index_of(placed)
     }
-    with_it, without_it = trials[placed.key]
-    channels = [every[c] for c in t.judged.channels]
-    # How often a name with this margin was right, counting those that cannot be told from it: they share it as the
-    # bootstrap was shared.
-    whole = t.probability + sum(r.probability for r in t.rivals if not r.separable)
-    right = reliability(whole)
+    missed = decided.best.missed[placed.key]
+    # The posterior is shared among those that cannot be told apart; how often such a name is right was counted.
+    whole = n.share + sum(r.probability for r in n.rivals if not r.separable)
+    right = of_name(n.gain, missed.sure)
+    scale = right / max(whole, 1e-12)
     rivals = tuple(
         Rival(
             r.placed.effect.name,
             r.placed.at,
-            r.probability * (right if r.separable else right / whole),
+            r.probability * (min(right, 1.0) if r.separable else scale),
             r.separable,
             experiment_sentence(placed, r.placed),
         )
-        for r in t.rivals
-        if r.probability >= 0.005 or not r.separable
+        for r in n.rivals
     )
-    sentence = evidence_sentence(placed, t.judged.explained, channels, with_it, without_it)
-    return Finding(placed.effect.name, placed.at, whole, t.probability * right / whole, parameters, sentence, rivals)
+    sentence = evidence_sentence(placed, [every[c] for c in n.channels], *missed.trial)
+    return Finding(placed.effect.name, placed.at, missed.sure, n.share * scale, parameters, sentence, rivals, n.gain)
+
+
+def _limits(decided: Decided, final: Fit) -> tuple[Limit, ...]:
+    """What would have been named beside all that was, had it been there."""
+    return tuple(
+        Limit(t.placed.effect.name, t.placed.at, p.name, t.smallest[p.name], final.assembly.unit(t.placed, p))
+        for t in decided.best.found.closing
+        for p in t.placed.effect.parameters
+        if p.name in t.smallest
+    )
 
 
 def _fits(

@@ -7,6 +7,8 @@ stay beside their solver, and what only words or pictures depend on beside those
 # Prior odds, before the recordings are looked at. Shared by the vocabulary's effects, and by the places of each.
 ODDS_OF_NAMES = 0.5
 """That one of the named effects is missing."""
+ELSEWHERE = 0.5
+"""That an effect which is there may be at any of its places, and not at a single one: joints are made alike."""
 ODDS_OF_CURVES = 0.2
 """That something without a name is."""
 
@@ -45,12 +47,21 @@ DRIVEN = 0.01
 """Largest share of a joint's snap inside the instrument's band that unexplained torque may have driven."""
 
 # Sticking.
-STICKS = (0.04, 0.005)
-"""Below this share of the peak speed, or so shortly after it (share of the travel), a joint holds any torque."""
+STICKS = ((0.04, 0.005), (0.01, 0.001))
+"""Below this share of the peak speed, or so shortly after it (share of the travel), a joint holds any torque; the
+evidence chooses one."""
 SETTLES = (0.10, 0.012)
 """The same for where its friction still settles."""
 LEAST_LEVEL = 0.03
 """What a joint may hold at rest at least [share of the channel's RMS torque]."""
+
+# Bursts.
+BURST_WINDOW = 0.5
+"""Windows of the residual whose strengths are compared [s]."""
+BURST_LOUD = 3.0
+"""Times the median window's mean square from which on a window is out of the ordinary."""
+BURST_SHARE = 0.2
+"""Share of the residual's energy above that which makes it bursts."""
 
 # The answer.
 GATE = 1.0

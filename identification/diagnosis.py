@@ -37,8 +37,11 @@ class Rival:
 class Finding:
     """An effect that the model left out, in the field's words.
 
-    ``margin`` is how often it, or one that the recordings cannot tell from it, beat the others in a bootstrap over time
-    blocks; ``probability`` how often a name with that margin was right on simulated arms, shared among those.
+    ``margin`` of torques is what the held-out recordings gain by it, in standard errors over blocks of time; ``gain``
+    its log Bayes factor on the training recordings; ``probability`` is how often a name with these two was right on
+    simulated arms, shared with what the recordings cannot tell from it. ``margin`` of encoders and captures is how
+    often it, or one that cannot be told from it, beat the others in a bootstrap over blocks of time; these have no
+    Bayes factor, and ``gain`` is None.
     """
 
     name: str
@@ -48,6 +51,7 @@ class Finding:
     parameters: Mapping[str, Estimate]
     evidence: str
     rivals: tuple[Rival, ...]
+    gain: float | None = None
 
 
 @dataclass(frozen=True)
@@ -159,7 +163,7 @@ class Diagnosis:
     steps : tuple of Step
         Baseline first, then one line an effect added.
     candidates : tuple of Candidate
-        First screening, best first.
+        Each effect at each place by itself on top of the model as given, best first.
     moved : tuple of Moved
     traces : tuple of Trace
     limits : tuple of Limit
@@ -229,6 +233,7 @@ def _finding(finding: Finding) -> dict[str, Any]:
         "name": finding.name,
         "at": finding.at,
         "margin": finding.margin,
+        "gain": finding.gain,
         "probability": finding.probability,
         "parameters": {name: _published(p) for name, p in finding.parameters.items()},
         "evidence": finding.evidence,

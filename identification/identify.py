@@ -19,6 +19,7 @@ from ..models.snare.setup import SnareTree
 from .fitting.assembly import Assembly
 from .fitting.base_parameters import INERTIAL, BaseParameters, base_parameters
 from .fitting.consistent_inertia import ConsistentInertia, consistent_inertia
+from .fitting.constants import notes_on, settled, with_constants
 from .fitting.experiment import Experiment, demand_apart, load_experiments, scales, with_silence
 from .fitting.fit import Fit, channel_rms, fit
 from .fitting.friction_curve import friction_curves, identifiable
@@ -43,6 +44,7 @@ class Identified:
     base: BaseParameters | None
     inertia: ConsistentInertia | None
     checks: tuple[Check, ...] = ()
+    notes: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """The published form."""
@@ -82,6 +84,7 @@ class Identified:
             "starts": {"tried": found.starts, "agreed": found.agreed},
             "notes": [
                 *self.model.tree.notes,
+                *self.notes,
                 *(
                     f"{Path(e.motion.path).name}: {note}"
                     for e in (*self.train, *self.holdout)
@@ -159,10 +162,11 @@ def identify(
     progress("reading and conditioning the recordings")
     read = read_all(model, [*recordings, *holdout])
     model = with_recorded_joints(model, read)
-    fitted, held = read[: len(recordings)], read[len(recordings) :]
     body = RigidBody(model.tree)
     checks = early_checks(model, read)
     try:
+        model, read, said = with_constants(model, read, len(recordings))
+        fitted, held = read[: len(recordings)], read[len(recordings) :]
         train = with_silence(load_experiments(model, recordings, body, datasets=fitted))
     except InputError as error:
         raise InputError(f"{error}; {checks[0].message}: {checks[0].mend}" if checks else error) from None
@@ -174,7 +178,9 @@ def identify(
     found = fit(assembly, train, progress=progress, seed=seed)
     found, inertia = physical(found, train)
     values = {**model.values, **assembly.values(found.theta), **inertial_values(model, inertia)}
-    return Identified(replace(model, values=values), found, tuple(train), tuple(locked), base, inertia, checks)
+    model = settled(replace(model, values=values))
+    notes = (*said, *notes_on(found))
+    return Identified(model, found, tuple(train), tuple(locked), base, inertia, checks, notes)
 
 
 def demand_one_process(model: Model, jobs: int | None) -> None:

@@ -1,11 +1,13 @@
-"""How often a name was right at a given margin: a frequency counted on a bank of simulated arms, not a softmax.
+"""How often a name was right: frequencies counted on simulated arms with known answers, not a softmax.
 
-``reliability.json`` beside this file holds the curve, and the command that made it.
+``reliability.json`` beside this file holds what was counted, by which command: a logistic map for names of torques, and
+a curve over the margin for those of link encoders and captures.
 """
 
 import json
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +15,19 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
+BOOTSTRAPS = 400
+"""Resamplings of time blocks that a margin is counted over."""
+
+
+@cache
+def _stored() -> dict[str, Any]:
+    return json.loads(Path(__file__).with_name("reliability.json").read_text(encoding="utf-8"))
+
+
 @cache
 def _curve() -> tuple[Array, Array]:
     """Knots of margin, rising, and of probability, never falling; each (n_knots,)."""
-    stored = json.loads(Path(__file__).with_name("reliability.json").read_text(encoding="utf-8"))
+    stored = _stored()
     return np.array(stored["margin"], float), np.array(stored["probability"], float)
 
 
@@ -37,3 +48,20 @@ def probability(margin: float) -> float:
     """
     knots, frequencies = _curve()
     return float(np.interp(margin, knots, frequencies))
+
+
+def of_name(gain: float, sure: float) -> float:
+    """Frequency with which a name with this evidence was the right one, at the right place.
+
+    A logistic regression on log(1 + gain) and log(sure), counted as ``reliability.json`` says.
+
+    Parameters
+    ----------
+    gain : float
+        Log Bayes factor on the training recordings.
+    sure : float
+        What the held-out recordings gain by it [standard errors over blocks of time].
+    """
+    level, by_gain, by_held = _stored()["logit"]
+    x = level + by_gain * np.log1p(max(gain, 0.0)) + by_held * np.log(max(sure, 1e-3))
+    return float(1 / (1 + np.exp(-x)))

@@ -20,11 +20,11 @@ from ..models.hidden_state import evaluate_law
 from ..models.model import Model
 from ..models.rig.kinematics import far_end
 from ..models.rigid_body import RigidBody
-from ..recordings import JointKind, read_recording
 from ..recordings.condition import Motion, condition
 from .fitting.assembly import Assembly
-from .fitting.experiment import Experiment, motion_signals, scales, without_torque
+from .fitting.experiment import Experiment, scales, without_torque
 from .fitting.floating_terms import outside, told, wheel_impulse, with_base, with_twist
+from .fitting.recorded import read_motion
 
 Array = NDArray[np.float64]
 
@@ -58,8 +58,7 @@ def simulate_floating(model: Model, tree: FloatingTree, motion: str | Path) -> x
                 f"{model.path}: {p.effect.name} at {p.at} moves the arm behind its encoder, which a floating base "
                 "feels; take it out to simulate"
             )
-    kinds: dict[str, JointKind] = {j.name: j.kind for j in tree.joints}
-    dataset = with_base(without_torque(read_recording(motion, motion_signals(model), kinds), model), tree)
+    dataset = with_base(without_torque(read_motion(model, motion), model), tree)
     recorded = f"vel.{tree.body}.x" in dataset
     known = with_twist(dataset, tree) if recorded else _at_rest(dataset, tree)
     followed = condition(known, model.joints, model.bandwidth, fitted=False)

@@ -1,9 +1,13 @@
 """The words of a diagnosis: verdict, evidence and experiments, as a test engineer would say them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ..models.model import Placed
 from .diagnosis import ChannelFit, Finding
+from .nuisance.noise import Noise
 from .report.words import chance, words
 
 LIKELY = 0.5
@@ -22,20 +26,20 @@ def from_to(before: float, after: float) -> str:
     return f"from {percent(before, digits)} to {percent(after, digits)}"
 
 
-def evidence_sentence(
-    placed: Placed, explained: float, channels: Sequence[str], relative_with: float, relative_without: float
-) -> str:
+def evidence_sentence(placed: Placed, channels: Sequence[str], relative_with: float, relative_without: float) -> str:
     """What an effect explains, and what happens on the held-out recording when it is taken out again."""
     where = " and ".join(channels) if len(channels) < 3 else f"{len(channels)} channels"
     what = placed.effect.sentence
+    explained = 1 - (relative_with / relative_without) ** 2 if relative_without > relative_with else 0.0
+    told = f"it explains {_part(explained)} what the model without it leaves over on {where}"
     return (
-        f"{what[:1].upper()}{what[1:]}: it explains {_part(explained)} what the model so far left over on {where}; "
+        f"{what[:1].upper()}{what[1:]}: {told}; "
         f"taking it out again raises the error on the held-out recording {from_to(relative_with, relative_without)}."
     )
 
 
 def _part(share: float) -> str:
-    """A share of what was left; another effect that is fitted beside it can make one's own share more than all."""
+    """A share of what was left."""
     return "all of" if share > 0.995 else f"{percent(share)} of"
 
 
@@ -48,8 +52,23 @@ def experiment_sentence(placed: Placed, rival: Placed) -> str:
     return own.format(at=placed.at.removeprefix("tau.").removeprefix("q."))
 
 
-def verdict_sentence(findings: Sequence[Finding], fit: Sequence[ChannelFit], remainder: str) -> str:
-    """The first sentence of the report."""
+def noise_words(unit: str, noise: Noise, encoders: Sequence[NDArray[np.float64]]) -> str:
+    """What a channel's noise is made of, with sizes and times."""
+    u = unit.replace("*", "·")
+    heard = float(np.sqrt(np.mean(np.concatenate(encoders) ** 2)))
+    parts = [
+        f"{noise.white:.2g} {u} from sample to sample",
+        f"{noise.coloured:.2g} {u} over {noise.coloured_time:.2g} s",
+        f"a wander of {noise.wander:.2g} {u} over {noise.wander_time:.2g} s",
+        f"{heard:.2g} {u} of the encoders",
+    ]
+    return listed(parts)
+
+
+def verdict_sentence(
+    findings: Sequence[Finding], fit: Sequence[ChannelFit], remainder: str, noise: Mapping[str, str] | None = None
+) -> str:
+    """The first sentence of the report; ``noise`` tells what explains the rest of each channel."""
     if findings:
         worst = max(fit, key=lambda f: f.holdout.relative_before - f.holdout.relative_after)
         fall = from_to(worst.holdout.relative_before, worst.holdout.relative_after)
@@ -60,18 +79,19 @@ def verdict_sentence(findings: Sequence[Finding], fit: Sequence[ChannelFit], rem
     if remainder:
         worst = max(fit, key=lambda f: f.holdout.relative_before)
         return f"Something is missing on {worst.channel} that no effect of the vocabulary explains.{remainder}"
-    return f"The model is adequate: nothing larger than the limits listed is left out. {_rest(fit)}"
+    return f"The model is adequate: nothing larger than the limits listed is left out. {_rest(fit, noise or {})}"
 
 
-def _rest(fit: Sequence[ChannelFit]) -> str:
+def _rest(fit: Sequence[ChannelFit], noise: Mapping[str, str]) -> str:
     """What an adequate model leaves over on the channel where that stands highest above the noise."""
     worst = max(fit, key=lambda f: f.holdout.rms_before / f.noise_floor if f.noise_floor > 0 else 0.0)
     left = (
         f"What it leaves over on the held-out recording is {percent(worst.holdout.relative_before)} of {worst.channel}"
     )
-    if not worst.noise_floor > 0:
-        return f"{left}."
-    return f"{left}, {worst.holdout.rms_before / worst.noise_floor:.2g} times that channel's noise floor."
+    if worst.noise_floor > 0:
+        left += f", {worst.holdout.rms_before / worst.noise_floor:.2g} times that channel's noise floor"
+    told = f" It is noise: {noise[worst.channel]}." if worst.channel in noise else ""
+    return f"{left}.{told}"
 
 
 def named(findings: Sequence[Finding]) -> str:

@@ -62,4 +62,6 @@ def hold(tree: Tree, angles: Mapping[str, float]) -> Tree:
         if carrier >= 0:
             carrying = links[carrier]
             links[carrier] = Link(carrying.name, carrying.phi + transform(tree.links[body].phi, rotation, translation))
-    return replace(tree, joints=tuple(joints), links=tuple(links), followers=tuple(followers))
+    moving = {joint.name for joint in joints}
+    axes = tuple(axis for axis in tree.axes if moving & set(axis.along))
+    return replace(tree, joints=tuple(joints), links=tuple(links), followers=tuple(followers), axes=axes)

@@ -14,13 +14,15 @@ from .hidden_state import rows
 from .holding import Holding
 from .rig.kinematics import booms, reached_joints, slides
 from .rig.rig import Rig
+from .servo import Servo
 from .snare.setup import SnareTree, snare_places
+from .transmission import Transmission
 from .tree import Tree
 
 
 @dataclass(frozen=True)
 class Placed:
-    """An effect and the one place it acts at: a joint, a link, a sling, or a sensor channel such as ``tau.joint1``.
+    """An effect and the one place it acts at: a joint, an axis, a link, a sling, or a channel such as ``tau.joint1``.
 
     Parameters named in ``hold`` are not identified: the recordings did not ask for them, or another effect carries
     them.
@@ -64,6 +66,10 @@ class Model:
         Joints of the robot's file that are held here, and what is done about inertias that no body can have.
     cuts : Cuts
         Samples of the recordings that are left out.
+    servo : mapping of str to Servo
+        Joints whose torque is worked out from what their servo was asked for.
+    transmission : Transmission or None
+        Motors that move several joints.
     """
 
     path: Path
@@ -78,6 +84,8 @@ class Model:
     values: Mapping[str, float]
     holding: Holding = field(default_factory=Holding)
     cuts: Cuts = field(default_factory=Cuts)
+    servo: Mapping[str, Servo] = field(default_factory=dict)
+    transmission: Transmission | None = None
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -118,3 +126,10 @@ def places(effect: Effect, tree: Tree) -> tuple[str, ...]:
         every = {"sling": tuple(s.name for s in tree.slings), "slide": slides(tree), "boom": booms(tree)}[effect.at]
         return tuple(at for at in every if reached_joints(tree, effect.at, at, rows(effect)))
     return tuple(f"tau.{j.name}" for j in tree.joints[carriers:])
+
+
+def all_places(effect: Effect, tree: Tree) -> tuple[str, ...]:
+    """The same, and axes that are not one joint's own: an effect acts there only where it is asked for by name."""
+    if effect.at != "joint" or effect.acts_on != "torque":
+        return places(effect, tree)
+    return (*places(effect, tree), *(axis.name for axis in tree.axes if len(axis.along) > 1))

@@ -14,8 +14,13 @@ from ..files import toml_table
 from ..recordings.cuts import read_cuts
 from ..recordings.mixes import read_signal
 from ..recordings.read import SUFFIXES
+<<<<<<< HEAD
 from ..recordings.signals import FORMS, Signal, is_signal, joint_of
 from .docking.bench_setup import read_bench
+=======
+from ..recordings.signals import FORMS, FREE, Signal, is_signal, joint_of
+from .axes import read_axes
+>>>>>>> one
 from .effects import get_effect
 from .floating.tree import UNNAMED, n_carriers, read_floating
 from .holding import Holding, read_holding
@@ -23,7 +28,9 @@ from .model import Model, Placed, places
 from .published_inertia import Fix
 from .rig.file import read_slings
 from .rig.rig import Rig, built_in_rig
+from .servo import read_servo
 from .snare.setup import read_setup
+from .transmission import Transmission, read_transmission
 from .tree import Tree
 from .urdf import load_urdf
 
@@ -53,6 +60,9 @@ _KEYS = (
     "capture",
     "docking",
     "signals",
+    "servo",
+    "transmission",
+    "axes",
     "bandwidth",
     "parameters",
 )
@@ -107,7 +117,19 @@ def load_model(path: str | Path, fix: Fix = "") -> Model:
     holding = read_holding(path, raw, system)
     holding = replace(holding, fix=holding.fix or fix)
     tree = _tree(path, raw, system, urdf, gravity, holding)
-    return Model(
+    for key in ("servo", "transmission", "axes"):
+        if key in raw and type(tree) is not Tree:
+            raise InputError(f"{path}: [{key}] belongs to system = 'arm'; take it out")
+    transmission = read_transmission(path, raw, tree.joints)
+    axes = read_axes(path, raw, tree.joints)
+    motors = () if transmission is None else transmission.axes(tree.joints)
+    twice = {axis.name for axis in axes} & {motor.name for motor in motors}
+    if twice:
+        raise InputError(f"{path}: {sorted(twice)[0]!r} is an axis and a motor; give each a name of its own")
+    tree = replace(tree, axes=(*axes, *motors))
+    servo = read_servo(path, raw, [joint.name for joint in tree.joints])
+    signals = _signals(path, raw.get("signals", {}), tree, holding, transmission)
+    model = Model(
         path,
         _text(path, raw, "name", path.stem),
         system,
@@ -115,12 +137,36 @@ def load_model(path: str | Path, fix: Fix = "") -> Model:
         tree,
         inertia,
         _placed(path, raw.get("effects", []), tree),
-        _signals(path, raw.get("signals", {}), tree, holding),
+        signals,
         None if bandwidth is None else float(bandwidth),
         _values(path, raw.get("parameters", {})),
         holding,
         read_cuts(path, raw, [f"tau.{joint.name}" for joint in tree.joints]),
+        servo,
+        transmission,
     )
+    _demand_one_reading(model)
+    return model
+
+
+def _demand_one_reading(model: Model) -> None:
+    """Refuse a torque that is read in two ways, and constants that are no more to be told apart (InputError)."""
+    path = model.path
+    free = {name for name, s in model.signals.items() if s.gain == FREE}
+    for joint, servo in model.servo.items():
+        if f"tau.{joint}" in model.signals:
+            raise InputError(f"{path}: 'tau.{joint}' is in [signals] and worked out by [servo]; keep one of them")
+        free |= {f"tau.{joint}"} if servo.stiffness is None else set()
+    for p in model.effects:
+        if p.effect.name == "sensor_gain" and p.at in free:
+            raise InputError(f"{path}: sensor_gain at {p.at}, whose constant is free already; keep one of them")
+    torques = [f"tau.{j}" for j in model.joints]
+    driven = [name for name in torques if name not in model.signals or not model.signals[name].nothing]
+    if model.inertia == "free" and free and free >= set(driven):
+        raise InputError(
+            f"{path}: inertia = 'free' and every torque's constant free: masses, friction and constants can all grow "
+            "together; give one constant as a number, or inertia = 'fixed'"
+        )
 
 
 def _missing(path: Path) -> bool:
@@ -211,6 +257,8 @@ def _placed(path: Path, entries: Any, tree: Tree) -> tuple[Placed, ...]:
             allowed += tuple(f"q.{j.name}" for j in encoded)
         if effect.at == "sensor":
             allowed += tuple(f"q_link.{j.name}" for j in encoded)
+        if effect.at == "joint" and effect.acts_on == "torque":
+            allowed += tuple(axis.name for axis in tree.axes)
         if at is not None and at not in allowed:
             raise InputError(f"{path}: {name} at {at!r}; this model has {', '.join(allowed)}")
         hold = entry.get("hold", []) if isinstance(entry, dict) else []
@@ -224,17 +272,22 @@ def _placed(path: Path, entries: Any, tree: Tree) -> tuple[Placed, ...]:
     return tuple(found)
 
 
-def _signals(path: Path, table: Any, tree: Tree, holding: Holding) -> dict[str, Signal]:
+def _signals(
+    path: Path, table: Any, tree: Tree, holding: Holding, transmission: Transmission | None
+) -> dict[str, Signal]:
     if not isinstance(table, dict):
         raise InputError(f"{path}: [signals] must be a table of name = {{ column = ... }}")
     signals, joints = {}, [j.name for j in tree.joints]
+    motors = () if transmission is None else transmission.motors
     for name, entry in table.items():
         if not is_signal(name):
             raise InputError(f"{path}: {name!r} in [signals] is not a signal's name; allowed are {FORMS}")
         joint = joint_of(name)
         if joint in holding.locked or joint in tree.weightless:
             continue  # a joint that is held has no signals, wherever they would be
-        if joint is not None and joint not in joints:
+        if joint in motors and name.partition(".")[0] not in ("q", "tau"):
+            raise InputError(f"{path}: {name!r} in [signals]: of a motor q and tau are read; take it out")
+        if joint is not None and joint not in joints and joint not in motors:
             raise InputError(
                 f"{path}: {name!r} in [signals]: the URDF has no such joint, only {', '.join(joints)}; did you mean "
                 f"{nearest(joint, joints)!r}?"
@@ -243,6 +296,11 @@ def _signals(path: Path, table: Any, tree: Tree, holding: Holding) -> dict[str, 
         if name.startswith("tension.") and name not in slings:
             raise InputError(f"{path}: {name!r} in [signals]: the rig has no such sling, only {', '.join(slings)}")
         signals[name] = read_signal(path, name, entry)
+        if joint in motors and signals[name].gain == FREE:
+            raise InputError(
+                f"{path}: [signals] {name} gain = {FREE!r}; a constant is identified at a joint: mix the motors' "
+                "columns there, as in columns = { c5 = 45.0, c6 = 32.0 }"
+            )
     return signals
 
 

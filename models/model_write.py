@@ -15,7 +15,9 @@ from .model import Model, Placed, places
 from .model_comments import with_comments
 from .rig.file import sling_table
 from .rig.rig import Rig
+from .servo import servo_fields
 from .snare.setup import SnareTree
+from .transmission import transmission_fields
 
 
 def save_model(model: Model, path: str | Path, note: str) -> None:
@@ -71,6 +73,15 @@ def save_model(model: Model, path: str | Path, note: str) -> None:
         lines += ["", "[signals]"]
         for name, signal in model.signals.items():
             lines.append(f"{toml_text(name)} = {toml_text(signal_fields(signal))}")
+    if model.servo:
+        lines += ["", "[servo]", *(f"{toml_text(j)} = {toml_text(servo_fields(s))}" for j, s in model.servo.items())]
+    if model.transmission is not None:
+        fields = transmission_fields(model.transmission)
+        lines += ["", "[transmission]", *(f"{key} = {toml_text(value)}" for key, value in fields.items())]
+    motors = () if model.transmission is None else model.transmission.motors
+    axes = [axis for axis in model.tree.axes if axis.name not in motors]
+    if axes:
+        lines += ["", "[axes]", *(f"{toml_text(a.name)} = {toml_text(dict(a.along))}" for a in axes)]
     if model.values:
         lines += ["", "[parameters]", *(f"{toml_text(k)} = {float(v)!r}" for k, v in model.values.items())]
     with written_whole(path, "choose a folder that exists") as part:

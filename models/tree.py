@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from ..errors import InputError
+from .axes import Axis
 from .inertia import Array
 
 
@@ -73,7 +74,8 @@ class Tree:
     """Joints and links of a fixed-base tree; ``links[i]`` is moved by ``joints[i]``, parents stand before children.
 
     Behind the joints' links stand those of the ``followers``, in their order. ``notes`` are what a reader of the
-    robot's file did that a user should know, ``weightless`` the joints that are held because they move no mass.
+    robot's file did that a user should know, ``weightless`` the joints that are held because they move no mass,
+    ``axes`` places for effects along combinations of joints.
 
     Raises
     ------
@@ -89,6 +91,7 @@ class Tree:
     followers: tuple[Follower, ...] = field(default=(), kw_only=True)
     notes: tuple[str, ...] = field(default=(), kw_only=True)
     weightless: tuple[str, ...] = field(default=(), kw_only=True)
+    axes: tuple[Axis, ...] = field(default=(), kw_only=True)
 
     def __post_init__(self) -> None:
         """Refuse what the recursions could not run through."""
@@ -111,6 +114,15 @@ class Tree:
     def n_joints(self) -> int:
         """Number of joints J: degrees of freedom, so without followers."""
         return len(self.joints)
+
+    @property
+    def stands(self) -> bool:
+        """Whether it stands on ground that no joint moves: a joint at rest feels nothing of the others there."""
+        return True
+
+    def sticks(self, joint: int) -> bool:
+        """Whether dry friction can hold a joint where it is."""
+        return self.stands
 
     @property
     def bodies(self) -> tuple[tuple[Joint, int, float, float], ...]:

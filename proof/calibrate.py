@@ -1,27 +1,29 @@
-"""``python -m proof.calibrate``: how often a name is right, counted on cases of another seed than the proof's.
+"""``python -m proof.calibrate``: how often a name is right, counted on cases of other seeds than the proof's.
 
-The cases are drawn as the proof's are, from seeds that are for work on the tool. The result is
-``identification/reliability.json``: the frequency of a right name and place against the margin, which is how often the
-effect beat its rivals in a bootstrap. It never falls with the margin (isotonic regression: Barlow, Bartholomew, Bremner
-and Brunk 1972), and every group of names counts one right and one wrong name more than it saw, so that no name is ever
-certain. What is done is kept under ``build/calibration`` as the proof keeps its own.
+Cases of the proof's own generator are drawn as the proof's are, from seeds that are for work on the tool, and
+diagnosed; what is done is kept under ``build/calibration``. To these come the lines that ``python -m proof.drives
+score`` kept. A name is right as ``proof/judge.py`` and ``proof/drives/judge.py`` say: it, or one that the recordings
+cannot tell from it, is concealed at its place. The result is the logistic map of names of torques in
+``identification/reliability.json`` (`counting`), with how well each generator is foretold by a map that leaves it out.
+The curve over margins, of link encoders and captures, stays there as it was counted.
 """
 
 import argparse
+import json
 import os
+import subprocess
 import sys
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from datetime import date
 from multiprocessing import get_context
 from pathlib import Path
+from typing import Any
 
 os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import isotonic_regression
-
 from .cases import ROUND
+from .counting import RIDGE, Row, counted, of_effects, of_lines
 from .judge import rightly_placed
 from .run import diagnose, fill, prepare
 from .score import score
@@ -30,68 +32,83 @@ from .seal import ROOT, tool, write_json
 SEED = 90200
 FOLDER = Path("build/calibration")
 JSON = ROOT / "identification" / "reliability.json"
-GROUP = 15
-"""Fewest names behind a knot of the curve."""
-
-
-def curve(margins: ArrayLike, right: ArrayLike, group: int = GROUP) -> tuple[NDArray, NDArray]:
-    """Knots (n_knots,) of margin, rising, and of probability, never falling.
-
-    Names are grouped by margin, equal margins together and at least ``group`` at a time (all of them, if fewer).
-    """
-    order = np.argsort(margins)
-    x, y = np.asarray(margins, float)[order], np.asarray(right, float)[order]
-    starts = [0]
-    for k in range(1, len(x)):
-        if x[k] > x[k - 1] and k - starts[-1] >= group and len(x) - k >= group:
-            starts.append(k)
-    count = np.diff([*starts, len(x)])
-    knots = np.add.reduceat(x, starts) / count
-    smoothed = (np.add.reduceat(y, starts) + 1.0) / (count + 2.0)
-    return knots, isotonic_regression(smoothed, weights=count + 2.0).x
+OWN = "mujoco"
+"""The proof's own generator."""
 
 
 def main() -> int:
     """Record, diagnose, count; print the figures, too, which are those of work on the tool and prove nothing."""
     parser = argparse.ArgumentParser(prog="python -m proof.calibrate", description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--cases", type=int, default=len(ROUND))
+    parser.add_argument("--cases", type=int, default=len(ROUND), help="of the proof's own generator; 0: none")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--seed", type=int, default=SEED)
+    parser.add_argument("--drives", type=Path, nargs="*", default=[], help="files of python -m proof.drives score")
     given = parser.parse_args()
-    folder = FOLDER / str(given.seed)
 
     def tell(words: str) -> None:
         print(words, flush=True)
 
+    cases: dict[str, int] = {}
+    rows: list[Row] = []
     try:
-        with ProcessPoolExecutor(given.workers, get_context("spawn")) as pool:
-            answers, folders, seal = prepare(given.cases, given.seed, pool, tell, folder)
-            version = tool() + seal.answers
-            found = fill(folder / "diagnoses.jsonl", version, folders, diagnose, pool, tell)
+        for file in given.drives:
+            lines = [json.loads(x) for x in file.read_text(encoding="utf-8").splitlines()]
+            rows += of_lines(lines)
+            cases["drives"] = cases.get("drives", 0) + len(lines)
+        if given.cases:
+            rows += own(given.cases, given.seed, given.workers, tell)
+            cases[OWN] = given.cases
+        stored = mapped(rows, cases, json.loads(JSON.read_text(encoding="utf-8")), sys.argv[1:])
+    except (ValueError, OSError) as error:
+        print(error, file=sys.stderr)
+        return 2
     except KeyboardInterrupt:
         print("stopped; the same command goes on where it was", file=sys.stderr)
         return 130
-    names = [
-        (effect["margin"], right)
-        for answer, one in zip(answers, found, strict=True)
-        for effect, right in zip(one["effects"], rightly_placed(answer, one), strict=True)
-    ]
+    write_json(JSON, stored)
+    tell(json.dumps(stored["counted"], indent=1))
+    return 0
+
+
+def own(cases: int, seed: int, workers: int, tell: Callable[[str], None]) -> list[Row]:
+    """Names of cases of the proof's own generator; what was recorded and diagnosed is not done again."""
+    folder = FOLDER / str(seed)
+    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
+        answers, folders, seal = prepare(cases, seed, pool, tell, folder)
+        found = fill(folder / "diagnoses.jsonl", tool() + seal.answers, folders, diagnose, pool, tell)
     for figure in score(answers, found).figures.values():
         tell(f"{figure.name:24} {figure.value}")
-    knots, probability = curve([margin for margin, _ in names], [right for _, right in names])
-    write_json(
-        JSON,
-        {
-            "margin": knots.tolist(),
-            "probability": probability.tolist(),
-            "names": len(names),
-            "cases": given.cases,
-            "seed": given.seed,
+    rows = []
+    for answer, one in zip(answers, found, strict=True):
+        rows += of_effects(one["effects"], rightly_placed(answer, one), OWN)
+    return rows
+
+
+def mapped(
+    rows: Sequence[Row], cases: dict[str, int], stored: dict[str, Any], arguments: Sequence[str]
+) -> dict[str, Any]:
+    """What is stored, with the map counted over these rows in place of the one it had."""
+    found = counted(rows)
+    generators = {}
+    for name, count in sorted(cases.items()):
+        right = [r.right for r in rows if r.generator == name]
+        generators[name] = {"cases": count, "names": len(right), "right": sum(right), "skill": found.skill.get(name)}
+    return stored | {
+        "logit": list(found.logit),
+        "counted": {
+            "generators": generators,
+            "ridge": RIDGE,
+            "commit": _commit(),
             "date": date.today().isoformat(),
-            "command": f"python -m proof.calibrate --cases {given.cases} --seed {given.seed}",
+            "command": " ".join(["python -m proof.calibrate", *arguments]),
         },
-    )
-    return 0
+    }
+
+
+def _commit() -> str:
+    """Of the sources, and whether they had been changed since; empty where there is no repository."""
+    asked = subprocess.run(["git", "describe", "--always", "--dirty"], cwd=ROOT, capture_output=True, text=True)
+    return asked.stdout.strip() if asked.returncode == 0 else ""
 
 
 if __name__ == "__main__":

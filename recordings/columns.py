@@ -85,6 +85,18 @@ class Columns:
         """All names in the file, columns first."""
         return [*self.arrays, *self.problems, *self.scalars]
 
+    def numbered(self, column: str | int, signal: str) -> str:
+        """The header of a column, which may be given by its number, from 1; InputError beyond the last."""
+        if isinstance(column, str):
+            return column
+        headers = self.order or self.names
+        if not 1 <= column <= len(headers):
+            raise InputError(
+                f"{self.path}: [signals] {signal!r} is column number {column}; the file has {len(headers)}: 1 to "
+                f"{len(headers)}"
+            )
+        return headers[column - 1]
+
     def column(self, name: str, signal: str, n_samples: int | None = None) -> tuple[str, np.ndarray]:
         """Header and values of one column, shape (n_samples,), float64.
 

@@ -10,6 +10,12 @@ al., GitHub repository JonasWeigand/Robot_Identification, MIT licence.
 
 BAM, a Dynamixel XL330 servo with a pendulum, 16 runs of 6 s: M. Duclusaud et al., "Extended Friction Models for the
 Physics Simulation of Servo Actuators", ICRA 2025; GitHub repository Rhoban/bam, Apache licence 2.0.
+
+Stäubli TX40, six axes with a coupled wrist, 9 s at 5 kHz in two files, positions and currents of the motors: GitHub
+repository thanhndv212/figaroh-examples, ``examples/staubli_TX40``.
+
+A cart on a belt, seven runs of 20 s at 150 Hz each of two tests: N. Skov, GitHub repository
+nielsSkov/masterThesisMatlab, ``parameterEstimation/data``; no licence is stated.
 """
 
 import os
@@ -29,6 +35,14 @@ _WEIGAND = (
     "9e403c07d9dadbb391a9f3921e8d219f714636a8/data/recorded_trajectories/2020-10-21%2010s%20FF%20{}%2008ms/data.mat"
 )
 _RHOBAN = "https://raw.githubusercontent.com/Rhoban/bam/af2260462471ff45ac18af159b1327ea51d8db15/bam/data.bak/raw/"
+_NGUYEN = (
+    "https://raw.githubusercontent.com/thanhndv212/figaroh-examples/"
+    "c0b5c7f0fda10078be55104f9ee76ac106b7a5ee/examples/staubli_TX40/data/"
+)
+_SKOV = (
+    "https://raw.githubusercontent.com/nielsSkov/masterThesisMatlab/"
+    "0e2c7253fe6e740c36da872508a71c0d1f66a965/parameterEstimation/data/"
+)
 #: SHA-256 of each file.
 SHA256 = {
     "DATA_EMPS.mat": "6cf6814ae14618795da0101aae2bb97ff0c6351b0501b5492751b02b07facf7e",
@@ -52,11 +66,29 @@ SHA256 = {
     "2026-01-15_10h29m54.json": "b50055742ee553a8cb849b38d04d2b9bcf7143d0acefe6539f922984b93d958a",
     "2026-01-15_10h30m02.json": "040e065f9885833fa909683f13665f90048ce5457d94dd2a3af056c21c36210d",
     "2026-01-15_10h30m10.json": "01d32db99e7859f012a230aca59f1dda24219d6781472d356861b138526213e6",
+    "pos_read_data.csv": "5cc1cecc1024ef0e331d0caba06f689456ab789ec3f1e904599c0a8be5c27bc8",
+    "curr_data.csv": "f4592f4ba4db42f5d7625688986be25b575ca34d0504b27979ca6b0276bd3af9",
+    "cartTest2/0m05.csv": "816ad32625bd0aa9b6576ec3a383b5f9f96e803458e41ff85ec5c4ea49fd3613",
+    "cartTest2/0m15.csv": "cd64282373ea2f63b97ebdb477a7fbf80c2b095dfd67638101f24c82588974d2",
+    "cartTest2/0m25.csv": "d4d29bef118b8bcdaf812292cd85868aa96aea14845e722cca773f91862330cf",
+    "cartTest2/0m35.csv": "b828dc6122e54511df4625f3d39b43094e8fd6d43f19017398d81fd5e09bbb55",
+    "cartTest2/0m45.csv": "ccf3df28600b3059d895fb1fc360d48be5bd759c994cb3c00b6d31d046b7f10e",
+    "cartTest2/0m55.csv": "5de208bea8f14886d99dbdefaa5797d6542b8a57434de62ec3317b9b2e76ecf1",
+    "cartTest2/0m65.csv": "ccab6ec88be80491898de62be0f92a477a7b96b55e954ed6f10a4dd8871e8fff",
+    "cartTest3/0m05.csv": "838af85619631f40896a2aed27d1fabc403a30fb3c1476508ac95ec275eafd57",
+    "cartTest3/0m15.csv": "0212b59b60b51ef9c9e6a845a44eaadff51e9a9bf8c88065160774e3d9f35206",
+    "cartTest3/0m25.csv": "8cbb7509d842a7cd1cde45cf9005a3c2fee4166df18814272ea8a1c53bdcd6e1",
+    "cartTest3/0m35.csv": "950f667c4e3417a9c856083988bbd2df16b7bda86e6e4798144dec56492cd4e9",
+    "cartTest3/0m45.csv": "70155b847480e10b2d9d66f3ed79f1370d17877d9a424a0e37d40cc423f2b57e",
+    "cartTest3/0m55.csv": "7467855ea247c00e5b329071cbf24d88b0adddc85f0f4ad07e3b1f786cd120a0",
+    "cartTest3/0m65.csv": "ee0b2992602b2b67011cef1f50ed17a157119d7edc27539aa6a054d12800d9a1",
 }
 #: Folder and address of each file that is not of EMPS.
 ELSEWHERE = {
     **{f"run_{run}.mat": ("kuka_kr300", _WEIGAND.format(run)) for run in "ABC"},
     **{name: ("bam/xl330", _RHOBAN + name) for name in SHA256 if name.endswith(".json")},
+    **{name: ("tx40", _NGUYEN + name) for name in SHA256 if name.endswith("_data.csv")},
+    **{name: ("cart", _SKOV + name) for name in SHA256 if name.startswith("cartTest")},
 }
 
 
@@ -64,11 +96,12 @@ def find_recording(name: str) -> Path:
     """Path of a public recording.
 
     ``DATA_EMPS.mat`` (to identify with) and ``DATA_EMPS_PULSES.mat`` (to validate with); ``run_A.mat``, ``run_B.mat``
-    and ``run_C.mat`` of the KR 300; the servo's 16 runs by date and time, as ``2026-01-15_10h28m10.json``.
+    and ``run_C.mat`` of the KR 300; the servo's 16 runs by date and time, as ``2026-01-15_10h28m10.json``;
+    ``pos_read_data.csv`` and ``curr_data.csv`` of the TX40; the cart's runs, as ``cartTest2/0m05.csv``.
 
-    Looks in the folder ``emps``, ``kuka_kr300`` or ``bam/xl330`` of ``$SNARELAB_RECORDINGS``, then of
-    ``../shared/recordings``, then fetches the file from its publisher into the user's cache folder. Raises InputError
-    when it cannot be had, when its SHA-256 is not the published file's, and for another name.
+    Looks in the folder ``emps``, ``kuka_kr300``, ``bam/xl330``, ``tx40`` or ``cart`` of ``$SNARELAB_RECORDINGS``,
+    then of ``../shared/recordings``, then fetches the file from its publisher into the user's cache folder. Raises
+    InputError when it cannot be had, when its SHA-256 is not the published file's, and for another name.
     """
     if name not in SHA256:
         raise InputError(

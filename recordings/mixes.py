@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import InputError, nearest
 from .columns import Columns, split_header
-from .signals import Signal
+from .signals import FREE, Signal
 
 
 def with_mixes(columns: Columns, signals: Mapping[str, Signal]) -> tuple[Columns, dict[str, Signal]]:
@@ -34,7 +34,7 @@ def with_mixes(columns: Columns, signals: Mapping[str, Signal]) -> tuple[Columns
             made[header] = np.arange(_length(columns)) / signal.rate
             plain[name] = replace(signal, column=header, rate=None, unit="s")
             continue
-        weights = {_numbered(columns, c, name): w for c, w in signal.parts.items()}
+        weights = {columns.numbered(c, name): w for c, w in signal.parts.items()}
         if len(weights) == 1 and signal.offset == 0 and set(weights.values()) == {1.0}:
             plain[name] = replace(signal, column=next(iter(weights)), columns={})
             continue
@@ -57,19 +57,6 @@ def with_mixes(columns: Columns, signals: Mapping[str, Signal]) -> tuple[Columns
     return (kept if not made else replace(kept, mixed=frozenset(map(str, used)))), plain
 
 
-def _numbered(columns: Columns, column: str | int, name: str) -> str:
-    """The header of a column that is given by its number, from 1."""
-    if isinstance(column, str):
-        return column
-    headers = columns.order or columns.names
-    if not 1 <= column <= len(headers):
-        raise InputError(
-            f"{columns.path}: [signals] {name!r} is column number {column}; the file has {len(headers)}: 1 to "
-            f"{len(headers)}"
-        )
-    return headers[column - 1]
-
-
 def _length(columns: Columns) -> int:
     """Rows of a recording: of its longest column."""
     return max((max(array.shape) for array in columns.arrays.values()), default=0)
@@ -85,7 +72,7 @@ def _formula(weights: Mapping[str, float], offset: float) -> str:
     return text if not offset else f"{text} {'-' if offset < 0 else '+'} {abs(offset):g}"
 
 
-_SIGNAL_KEYS = ("column", "unit", "gain", "columns", "offset", "rate")
+_SIGNAL_KEYS = ("column", "unit", "gain", "columns", "offset", "rate", "file")
 
 
 def read_signal(path: Path, name: str, entry: object) -> Signal:
@@ -121,13 +108,21 @@ def read_signal(path: Path, name: str, entry: object) -> Signal:
     gain = fields.get("gain")
     if isinstance(gain, bool) or not isinstance(gain, int | float | str | None):
         raise InputError(f"{path}: [signals] {name} gain = {gain!r}; allowed is a number or a scalar's name")
+    if gain == FREE and not name.startswith("tau."):
+        raise InputError(f"{path}: [signals] {name} gain = {FREE!r}; only a torque's constant can be identified")
     offset, rate = fields.get("offset", 0.0), fields.get("rate")
     if not _number(offset):
         raise InputError(f"{path}: [signals] {name} offset = {offset!r}; allowed is a number, in the column's unit")
     if rate is not None and not (name == "time" and isinstance(rate, int | float) and _number(rate) and rate > 0):
         raise InputError(f"{path}: [signals] {name} rate = {rate!r}; allowed is, for time, a positive number of hertz")
+    file = fields.get("file")
+    if file is not None and (not isinstance(file, str) or not file or rate is not None):
+        raise InputError(
+            f"{path}: [signals] {name} file = {file!r}; allowed is a file's name, from the recording's folder"
+        )
     weights = {k: float(w) for k, w in columns.items()}
-    return Signal(column, fields.get("unit"), gain, weights, float(offset), None if rate is None else float(rate))
+    frequency = None if rate is None else float(rate)
+    return Signal(column, fields.get("unit"), gain, weights, float(offset), frequency, file=file)
 
 
 def signal_fields(signal: Signal) -> dict[str, object] | str:
@@ -139,7 +134,7 @@ def signal_fields(signal: Signal) -> dict[str, object] | str:
         fields["columns"] = dict(signal.columns)
     elif not fields:
         fields["column"] = signal.column
-    fields |= {"unit": signal.unit, "gain": signal.gain, "offset": signal.offset or None}
+    fields |= {"unit": signal.unit, "gain": signal.gain, "offset": signal.offset or None, "file": signal.file}
     return {key: value for key, value in fields.items() if value is not None}
 
 

@@ -12,8 +12,10 @@ from ..errors import InputError, nearest
 from ..files import bounded_memory
 from . import csv_table, hdf5, matlab
 from .columns import Columns, check_count, split_header
+from .joined import with_files
 from .mixes import with_mixes
-from .signals import FORMS, JointKind, Signal, default_unit, is_signal, joint_of
+from .part import part_of
+from .signals import FORMS, FREE, JointKind, Signal, default_unit, is_signal, joint_of
 from .timebase import UNIFORM, sampling
 from .units import convert, fits, parse_unit
 
@@ -51,7 +53,7 @@ def read_recording(
     Parameters
     ----------
     path : str or Path
-        The file, or a bag's folder.
+        The file, or a bag's folder; a part of it as ``run.csv@2.5:10`` [s].
     signals : mapping of str to Signal
         A model's [signals]: where each signal is found. A mapped signal wins over a column of its own name.
     joint_kinds : mapping of str to "revolute" or "prismatic"
@@ -74,7 +76,8 @@ def read_recording(
         does not increase; a unit does not fit; a channel holds text, infinities or no number, or is not as long as
         time.
     """
-    path, signals = Path(path), signals or {}
+    part, signals = part_of(path), signals or {}
+    path, given = part.file, Path(path)
     kinds: dict[str, JointKind] = dict(joint_kinds or {})
     for name in signals:
         if not is_signal(name):
@@ -82,6 +85,7 @@ def read_recording(
     columns = _load(path, signals)
     check_count(path, len(columns.names))
     undriven = [name for name, signal in signals.items() if signal.nothing]
+    columns, signals = with_files(columns, signals, lambda other: _load(other, {}))
     columns, signals = with_mixes(columns, signals)
     headers = {name: header for name, header in _signal_headers(columns, signals).items() if name not in undriven}
     time_header, time = _time(columns, signals, headers)
@@ -124,9 +128,10 @@ def read_recording(
     idle = [f"{name} is left out, no fit needs it: {fault}" for name, fault in faults.items()]
     dataset = xr.Dataset(variables, {"time": ("time", time, {"unit": "s", "column": time_header})})
     used = {"time": time_header} | {name: raw[name][0] if raw[name] else header for name, header in headers.items()}
-    gains = {signal.gain for signal in signals.values() if isinstance(signal.gain, str)}
+    gains = {signal.gain for signal in signals.values() if isinstance(signal.gain, str) and signal.gain != FREE}
     left_out = _left_out(columns, used, gains | {gain.rpartition("[")[0] for gain in gains})
-    return dataset.assign_attrs(path=str(path), notes=[*columns.notes, *idle, *left_out, *_quality(dataset)])
+    dataset = part(dataset)
+    return dataset.assign_attrs(path=str(given), notes=[*columns.notes, *idle, *left_out, *_quality(dataset)])
 
 
 def _load(path: Path, signals: Mapping[str, Signal]) -> Columns:
@@ -158,7 +163,7 @@ def _load(path: Path, signals: Mapping[str, Signal]) -> Columns:
 def _idle(name: str, joints: Mapping[str, JointKind]) -> bool:
     """Whether no fit of a model with these joints needs a signal."""
     family, _, joint = name.partition(".")
-    return family in ("qd", "qdd", "temp") or (joint_of(name) is not None and joint not in joints)
+    return family in ("qd", "qdd", "temp", "command") or (joint_of(name) is not None and joint not in joints)
 
 
 def _signal_headers(columns: Columns, signals: Mapping[str, Signal]) -> dict[str, str]:
@@ -252,7 +257,8 @@ def _in_unit(
     signal: Signal | None,
 ) -> np.ndarray:
     if signal is not None and signal.gain is not None:
-        gain = columns.scalar(signal.gain, name) if isinstance(signal.gain, str) else float(signal.gain)
+        given = 1.0 if signal.gain == FREE else signal.gain
+        gain = columns.scalar(given, name) if isinstance(given, str) else float(given)
         if not math.isfinite(gain) or gain == 0.0:
             raise InputError(
                 f"{columns.path}: gain {signal.gain!r} of [signals] {name!r} is {gain}; a number but 0 is wanted"

@@ -1,7 +1,12 @@
 """The names a recording's columns can have, and their SI default units.
 
+<<<<<<< HEAD
 ``time``; of a joint ``q qd qdd q_link tau temp``; ``tension.<sling>``; of a body ``pos quat vel omega``; of a wrench
 sensor ``force torque``; ``angle.ring``; ``closed.latches``.
+=======
+``time``; of a joint ``q qd qdd q_link tau command temp``; ``tension.<sling>``; of a body ``pos quat vel omega``; of a
+wrench sensor ``force torque``; ``angle.ring``.
+>>>>>>> one
 """
 
 from collections.abc import Iterable, Mapping
@@ -16,15 +21,24 @@ _JOINT = {
     "qd": {"revolute": "rad/s", "prismatic": "m/s"},
     "qdd": {"revolute": "rad/s^2", "prismatic": "m/s^2"},
     "tau": {"revolute": "N*m", "prismatic": "N"},
+    "command": {"revolute": "rad", "prismatic": "m"},
 }
+FREE = "free"
+"""Gain of a torque whose constant is identified beside the rest; until then one unit of the column counts as one."""
+
 _SCALAR = {"tension": "N", "temp": "degC"}
 _VECTOR = {"pos": "m", "quat": "dimensionless", "vel": "m/s", "omega": "rad/s", "force": "N", "torque": "N*m"}
 _SINGLE = {"time": "s", "angle.ring": "rad", "closed.latches": "dimensionless"}
 
 #: How signal names look, for messages.
 FORMS = (
+<<<<<<< HEAD
     "time, q|qd|qdd|q_link|tau|temp.<joint>, tension.<sling>, pos|vel|omega.<body>.x|y|z, quat.<body>.w|x|y|z, "
     "force|torque.<sensor>.x|y|z, angle.ring, closed.latches"
+=======
+    "time, q|qd|qdd|q_link|tau|command|temp.<joint>, tension.<sling>, pos|vel|omega.<body>.x|y|z, quat.<body>.w|x|y|z, "
+    "force|torque.<sensor>.x|y|z, angle.ring"
+>>>>>>> one
 )
 
 
@@ -41,7 +55,8 @@ class Signal:
         The column's unit; the header's own unit, or the signal's default, where it is left out.
         With a gain it is what the gain counts per: a header in another unit of its dimension is converted first.
     gain : float or str, optional
-        Signal's default unit (N·m or N for ``tau``) per unit of the column, or the name of a number in the recording.
+        Signal's default unit (N·m or N for ``tau``) per unit of the column, or the name of a number in the recording;
+        of a torque also `FREE`: identified.
     columns : mapping of str to float
         Instead of ``column``: columns and their weights, summed before unit and gain.
     offset : float
@@ -50,6 +65,8 @@ class Signal:
         Instead of ``column``, for time: samples a second [Hz] of a recording that has no clock.
     nothing : bool
         Of a torque: nothing drives the joint, it is zero.
+    file : str, optional
+        Another file, from the recording's folder, that the column stands in; it has a row for each of the recording's.
     """
 
     column: str | int
@@ -59,6 +76,7 @@ class Signal:
     offset: float = 0.0
     rate: float | None = None
     nothing: bool = False
+    file: str | None = None
 
     @property
     def parts(self) -> Mapping[str | int, float]:
@@ -81,7 +99,7 @@ def is_signal(name: str) -> bool:
 
 
 def joint_of(name: str) -> str | None:
-    """The joint of a signal whose unit depends on the joint's kind (``q qd qdd q_link tau``), else None."""
+    """The joint of a signal whose unit depends on the joint's kind (``q qd qdd q_link tau command``), else None."""
     family, _, joint = name.partition(".")
     return joint if family in _JOINT else None
 

@@ -9,6 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from .. import __version__
+from ..recordings.part import part_of
 
 PACKAGES = ("casadi", "drake", "numpy", "scipy")
 """What computes an arm's result."""
@@ -33,7 +34,7 @@ class Provenance:
 
 def provenance(command: str = "", files: Sequence[tuple[str, str | Path | None]] = ()) -> Provenance:
     """Of a command and its files, each with its role; None is passed over. A folder counts with all files in it."""
-    known = tuple((role, Path(path).name, _digest(Path(path))) for role, path in files if path is not None)
+    known = tuple((role, Path(path).name, _digest(part_of(path).file)) for role, path in files if path is not None)
     return Provenance(command, known, (("snarelab", __version__), ("Python", platform.python_version()), *_versions()))
 
 

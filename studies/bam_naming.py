@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from ..identification.search.passing import TIE
 from ..models.effects import effects
 from .bam_servo import FRICTION, ServoRun, simulate
 
@@ -27,6 +26,9 @@ Values = Mapping[str, float]
 
 WORTH = 0.05
 """Least share of the squared position error that a law must explain to be named, and that is called worse."""
+
+TIE = 2.0
+"""Difference of two scores that says nothing (Kass and Raftery 1995: not worth more than a bare mention)."""
 
 MOST_ROUNDS = 3
 MOST_LEFT_OUT = 3

@@ -151,3 +151,27 @@ def test_import_and_help_load_no_engine(code):
     *loaded, seconds = out.stdout.splitlines()[-1].split()
     assert loaded == []
     assert float(seconds) < 0.5, f"{seconds} s of processor time, {time.monotonic() - started:.2f} s in all"
+
+
+def test_lists_in_the_cells_of_a_table_are_columns_of_it(tmp_path):
+    """What a robot logs as one list a row, from memory as from a file."""
+    files = Path(str(snarelab.__file__)).parent / "studies" / "bundled"
+    plain = pd.read_csv(files / "train.csv")
+    joints = ("joint1", "joint2", "joint3")
+    lists = pd.DataFrame({"time": plain["time"]})
+    lists["positions"] = list(plain[[f"q.{j}" for j in joints]].to_numpy())
+    lists["torques"] = [json.dumps(list(row)) for row in plain[[f"tau.{j}" for j in joints]].to_numpy()]
+    text = (files / "arm3.toml").read_text().replace("arm3.urdf", str(files / "arm3.urdf"))
+    model = tmp_path / "lists.toml"
+    signals = [
+        f'"{f}.{j}" = "{n}[{k}]"' for f, n in (("q", "positions"), ("tau", "torques")) for k, j in enumerate(joints)
+    ]
+    model.write_text(text + "\n[signals]\n" + "\n".join(signals) + "\n")
+    one = snarelab.identify(files / "arm3.toml", plain).parameters
+    two = snarelab.identify(model, lists).parameters
+    assert [p.value for p in two] == pytest.approx([p.value for p in one], rel=1e-9)
+    lists["positions"] = [row[: 2 if k == 7 else 3] for k, row in enumerate(lists["positions"])]
+    with pytest.raises(
+        snarelab.InputError, match=r"recording 1: column 'positions\[0\]' .*as many numbers in every row"
+    ):
+        snarelab.identify(model, lists)

@@ -1,77 +1,19 @@
 """Vibration that comes and goes: which windows count, how loud they are, and from when on they are bursts."""
 
-from types import SimpleNamespace as Made
-from typing import Any
-
 import numpy as np
 import pytest
 
-from snarelab.identification.search import bursts as module
-from snarelab.identification.search.bursts import _windows, bursts
+from snarelab.identification.nuisance.bursts import Left, bursts
 
-LENGTH = 50
-"""Samples of half a second at 100 Hz, twice the band."""
-
-
-def run(band=50.0, n=0, n_joints=1) -> Any:
-    return Made(motion=Made(band=band), measured=np.zeros((n, n_joints)), body=Made(tree=Made()))
+STEP, LENGTH = 0.01, 50
+"""Half a second at 100 Hz."""
 
 
-def steps(*levels):
-    """Windows of a constant level."""
-    return np.repeat(np.array(levels, float), LENGTH)
-
-
-def always(x):
-    return np.ones(len(x), bool)
-
-
-def test_windows_are_whole_half_seconds_in_each_recordings_own_rate():
-    """100 and 40 samples a second: 50 and 20 a window; what is left over at the end is no window."""
-    one, other = np.concatenate([steps(1, 2), np.full(LENGTH - 1, 9.0)]), np.repeat([3.0, 4.0, 5.0], 20)
-    strength, _ = _windows([run(50.0), run(20.0)], [one, other], [always(one), always(other)])
-    np.testing.assert_allclose(strength, [1, 4, 9, 16, 25])
-
-
-def test_a_window_counts_if_half_of_it_is_in_motion_and_by_that_half():
-    residual = steps(2, 2, 2)
-    residual[:25] = 7.0  # at rest
-    moving = always(residual)
-    moving[:25] = False
-    moving[LENGTH : LENGTH + 26] = False  # one sample more than half
-    strength, _ = _windows([run()], [residual], [moving])
-    np.testing.assert_allclose(strength, [4, 4])
-    moving[:] = False
-    strength, frequency = _windows([run()], [residual], [moving])
-    assert (len(strength), frequency) == (0, 0.0)
-
-
-def test_a_band_below_the_windows_own_rate_still_has_two_samples_a_window():
-    strength, _ = _windows([run(0.5)], [np.array([1.0, 3.0, 2.0, 4.0])], [np.ones(4, bool)])
-    np.testing.assert_allclose(strength, [5, 10])
-
-
-@pytest.mark.parametrize(("band", "hertz"), [(50.0, 20.0), (50.0, 31.0), (20.0, 12.0)])
-def test_the_frequency_is_that_of_the_loudest_window(band, hertz):
-    length = round(band)  # half a second
-    t = np.arange(3 * length) / (2 * band)
-    residual = np.where(t < 0.5, 1.0, 3.0) * np.sin(2 * np.pi * np.where(t < 0.5, 7.0, hertz) * t)
-    residual[2 * length :] *= 0.1
-    _, frequency = _windows([run(band)], [residual], [always(residual)])
-    assert frequency == pytest.approx(hertz, abs=0.15)
-
-
-def found(monkeypatch, residuals, moving=None, heard=((0.0,),)):
-    """`bursts` for residuals (n, J) of recordings at 100 Hz; ``heard`` is what the encoders' noise leaves of each."""
-    experiments = [run(n=len(r), n_joints=r.shape[1]) for r in residuals]
-    moving = [np.ones(r.shape, bool) for r in residuals] if moving is None else moving
-    noise = {id(e): np.array(h, float) for e, h in zip(experiments, heard, strict=True)}
-    answers = {id(e): r for e, r in zip(experiments, residuals, strict=True)}
-    monkeypatch.setattr(module, "in_motion", lambda _: np.concatenate(moving))
-    monkeypatch.setattr(module, "bridged", lambda e: e)
-    monkeypatch.setattr(module, "encoder_torque", lambda _, e: noise[id(e)])
-    assembly = Made(residual=lambda e, _theta: (answers[id(e)], []))
-    return bursts(Made(assembly=assembly, theta=None), experiments)  # pyright: ignore[reportArgumentType]
+def windows(*energies, residual=None, step=STEP) -> Left:
+    """Windows of a constant strength each; a vibration of 8 Hz by default."""
+    energy = np.repeat(np.array(energies, float), round(0.5 / step))
+    wave = np.sqrt(2 * energy) * np.sin(2 * np.pi * 8 * step * np.arange(len(energy)))
+    return Left(wave if residual is None else residual, energy, np.ones(len(energy), bool), step)
 
 
 @pytest.mark.parametrize(
@@ -88,40 +30,51 @@ def found(monkeypatch, residuals, moving=None, heard=((0.0,),)):
         (12 * [1], None, False),
     ],
 )
-def test_bursts_are_a_fifth_of_the_energy_beyond_three_times_the_median(monkeypatch, energies, share, again):
-    answer = found(monkeypatch, [steps(*np.sqrt(energies))[:, None]])
+def test_bursts_are_a_fifth_of_the_energy_beyond_three_times_the_median(energies, share, again):
+    found = bursts([windows(*energies)])
     if share is None:
-        assert answer == {}
+        assert found is None
     else:
-        assert answer[0].share == pytest.approx(share)
-        assert answer[0].again is again
+        assert found is not None
+        assert found.share == pytest.approx(share)
+        assert found.again is again
 
 
-def test_what_the_encoders_leave_counts_one_and_a_half_times_among_the_ordinary(monkeypatch):
-    """RMS 2 and 0 in two recordings: 2 on average of the squares, so that 1 + 1.5 * 2 = 4 is usual, and 12 the bar."""
-    first, second = steps(*5 * [1], np.sqrt(20))[:, None], steps(*5 * [1], np.sqrt(20))[:, None]
-    answer = found(monkeypatch, [first, second], heard=((2.0,), (0.0,)))
-    assert answer[0].share == pytest.approx(2 * 8 / 50)
-    assert found(monkeypatch, [first, second], heard=((2.0,), (2.0,))) == {}  # 1 + 6: 21 and more would be loud
+def test_windows_are_whole_half_seconds_in_each_recordings_own_rate():
+    """What is left over at the end is no window: six windows and twelve at 40 Hz, the loud ones among them."""
+    first, second = windows(1, 1, 1, 1, 1, 16), windows(1, 1, 1, 1, 1, 16, step=0.025)
+    tail = Left(np.append(first.residual, 99.0), np.append(first.energy, 99.0**2), np.ones(301, bool), STEP)
+    found = bursts([tail, second])
+    assert found is not None
+    assert found.share == pytest.approx(26 / 42)
+    assert found.again
 
 
-def test_every_channel_has_its_own_windows_and_rest(monkeypatch):
-    """The second channel's joint stands in the second recording, where its residual is loud."""
-    quiet, loud = steps(*12 * [1]), steps(*10 * [1], 4, 4)
-    moving = [np.ones((600, 2), bool), np.ones((600, 2), bool)]
-    moving[1][:, 1] = False
-    recordings = [np.stack([loud, quiet], 1), np.stack([quiet, 9 * loud], 1)]
-    answer = found(monkeypatch, recordings, moving, heard=((0.0, 0.0), (0.0, 0.0)))
-    assert list(answer) == [0]
-    assert answer[0].share == pytest.approx(26 / (22 + 32))
-    moving[1][:, 1] = True
-    assert list(found(monkeypatch, recordings, moving, heard=((0.0, 0.0), (0.0, 0.0)))) == [0, 1]
+@pytest.mark.parametrize("hertz", [12.0, 31.0])
+def test_the_frequency_is_that_of_the_loudest_window(hertz):
+    t = STEP * np.arange(12 * LENGTH)
+    loud = (t >= 2.0) & (t < 2.5)
+    residual = np.where(loud, 9.0, 1.0) * np.sin(2 * np.pi * np.where(loud, hertz, 7.0) * t)
+    found = bursts([Left(residual, residual**2, np.ones(len(t), bool), STEP)])
+    assert found is not None
+    assert found.frequency == pytest.approx(hertz, abs=0.15)
 
 
-@pytest.mark.parametrize(("name", "stand_in"), [("n_carriers", lambda _: 6), ("Rig", Made)])
-def test_nothing_is_said_where_every_joint_moves_what_carries_the_others(monkeypatch, name, stand_in):
-    """A floating base; a suspension."""
-    loud = [steps(*10 * [1], 4, 4)[:, None]]
-    assert list(found(monkeypatch, loud)) == [0]
-    monkeypatch.setattr(module, name, stand_in)
-    assert found(monkeypatch, loud) == {}
+def test_what_happens_near_rest_is_no_burst():
+    """A window counts if half of it is in motion, and by that half."""
+    own = windows(*5 * [1.0], 16.0, *5 * [1.0], 16.0)
+    loud = own.energy > 1
+    assert bursts([own]) is not None
+    assert bursts([Left(own.residual, own.energy, ~loud, STEP)]) is None  # of ten windows a median says nothing
+    energy, moves = own.energy.copy(), np.ones(len(loud), bool)
+    energy[np.flatnonzero(loud)[::2]] = 1e6
+    moves[np.flatnonzero(loud)[::2]] = False
+    found = bursts([Left(own.residual, energy, moves, STEP)])
+    assert found is not None
+    assert found.share == pytest.approx(26 / 42)
+
+
+def test_what_is_slower_than_a_window_is_none():
+    t = STEP * np.arange(12 * LENGTH)
+    residual = np.where((t >= 2.0) & (t < 3.0), 9.0, 1.0) * np.cos(2 * np.pi * 0.5 * t)
+    assert bursts([Left(residual, residual**2, np.ones(len(t), bool), STEP)]) is None

@@ -90,14 +90,15 @@ def disturbed(
     return e, residual
 
 
-def bands(*several, blocks=()):
+def bands(*several, blocks=(), share=0.1):
     residuals = {id(e): r for e, r in several}
     assembly = Made(
         residual=lambda e, _theta: (residuals[id(e)], list(blocks)),
         evaluate=lambda e, _theta: Made(load=np.zeros((N, 1))),
         tree=Made(),
     )
-    return _bands(Made(assembly=assembly, theta=None), [e for e, _ in several])  # pyright: ignore[reportArgumentType]
+    found: Any = Made(assembly=assembly, theta=None)
+    return _bands(found, [e for e, _ in several], share)
 
 
 def test_a_clock_of_ten_seconds_has_a_band_too(monkeypatch):
@@ -121,6 +122,13 @@ def test_a_clock_of_ten_seconds_has_a_band_too(monkeypatch):
 def test_the_band_ends_where_what_is_unexplained_drives_a_tenth_of_the_snap(level, inertia, wanted):
     (found,) = bands(disturbed(level, inertia=inertia))
     assert found == pytest.approx(wanted, rel=0.06)
+
+
+@pytest.mark.parametrize("share", [0.05, 0.2])
+def test_half_the_share_that_may_be_driven_is_a_fifth_roots_less_of_the_band(share):
+    (found,) = bands(disturbed(), share=share)
+    assert found == pytest.approx(16.0 * (share / 0.1) ** 0.2, rel=0.06)
+    assert abs(found - 16.0) > 1.0
 
 
 def test_the_band_is_four_times_the_speeds_own_at_least():
@@ -164,7 +172,7 @@ def planned_with(monkeypatch, found, before=None, n=1):
         if before:
             earlier[0].store["bands"] = np.array(before)
     fit: Any = None
-    return planned(fit, experiments, earlier), experiments, earlier
+    return planned(fit, experiments, earlier, driven=0.1), experiments, earlier
 
 
 def test_where_no_band_is_narrower_than_the_analysis_nothing_is_filtered(monkeypatch):

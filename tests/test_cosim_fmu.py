@@ -6,12 +6,14 @@ import signal
 import sys
 import time
 from types import SimpleNamespace
+from typing import Any
 
 import fmpy
 import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
 
+from bench.fmu_models import redescribed
 from bench.oscillator_fmu import build
 from snarelab.cosim.compiled_loop import compiled_loop
 from snarelab.cosim.fmi_variables import pint_unit, read_interface
@@ -98,6 +100,42 @@ def test_loop_in_c_gives_the_same_bits(files, scheme, hold):
     assert (runs[0].steps, runs[0].evaluations) == (runs[1].steps, runs[1].evaluations)
     assert runs[0].steps == 251
     assert runs[0].evaluations - 251 in (range(1, 5) if hold == "quadratic" else [0])  # its start is iterated
+
+
+def test_fmi_3_takes_halves_where_any_step_is_good(files, tmp_path):
+    """An FMU that names a step of its own might not end half of ours; discrete inputs have no parabola."""
+    left = files["left", 3]
+    assert Fmu(left).can_halve
+    assert not Fmu(files["left", 2]).can_halve
+    for k, (old, new) in enumerate(
+        [
+            ('canHandleVariableCommunicationStepSize="true"', 'canHandleVariableCommunicationStepSize="false"'),
+            ("<CoSimulation ", '<CoSimulation fixedInternalStepSize="1e-3" '),
+            ('causality="input" variability="continuous"', 'causality="input" variability="discrete"'),
+        ]
+    ):
+        other = tmp_path / f"{k}.fmu"
+        redescribed(left, other, lambda text, old=old, new=new: text.replace(old, new))
+        assert Fmu(left).can_halve
+        assert not Fmu(other).can_halve
+
+
+def test_halves_are_two_steps_on_two_values(files):
+    halved, plain = (Fmu(files["left", 3]) for _ in range(2))
+    for one in (halved, plain):
+        one.initialize(0.0)
+    halved.set_input_halves(np.array([2.0]), np.array([-1.0]))
+    halved.step(0.0, 0.1)
+    for k, force in enumerate((2.0, -1.0)):
+        plain.set_inputs(np.array([force]))
+        plain.step(0.05 * k, 0.05)
+    assert halved.outputs().tobytes() == plain.outputs().tobytes()
+    for one in (halved, plain):  # a step on one value is one step again
+        one.set_inputs(np.array([0.5]))
+        one.step(0.1, 0.1)
+    assert halved.outputs().tobytes() == plain.outputs().tobytes()
+    for one in (halved, plain):
+        one.close()
 
 
 def test_loop_in_c_is_left_to_what_it_can_do(files):
@@ -217,12 +255,14 @@ def test_hang_and_crash_of_a_participant_in_its_own_process(files, fault, said):
             parts["left"].step(0.0, 1e-3)
 
 
-def test_own_process_gives_the_same_bits_rolls_back_and_ends(files):
-    left = OwnProcess(Fmu, files["left", 2])
-    apart = System({"left": left, "right": Fmu(files["right", 2])}, CONNECTIONS)
-    for options in ({}, {"iterate": True, "scheme": "gauss_seidel"}):
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_own_process_gives_the_same_bits_rolls_back_and_ends(files, fmi):
+    left = OwnProcess(Fmu, files["left", fmi])
+    apart = System({"left": left, "right": Fmu(files["right", fmi])}, CONNECTIONS)
+    kinds: list[dict[str, Any]] = [{}, {"hold": "quadratic"}, {"iterate": True, "scheme": "gauss_seidel"}]
+    for options in kinds:
         ours = Master(apart, 1e-2, **options).run(0.3).recording
-        with Master(system(files, 2), 1e-2, **options) as master:
+        with Master(system(files, fmi), 1e-2, **options) as master:
             assert ours.equals(master.run(0.3).recording)
     number = left._process.pid
     left.close()

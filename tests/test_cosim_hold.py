@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from snarelab.cosim.feedthrough import FeedThrough
-from snarelab.cosim.hold import HOLDS, Hold, combine, end_weights, hold_named, weights
+from snarelab.cosim.hold import HALVES, HOLDS, Hold, combine, end_weights, hold_named, weights
 from snarelab.cosim.participant import Participant, StepError, Variable
 from snarelab.cosim.participants.oscillator import LeftOscillator
 from snarelab.cosim.sweep import Sweep
@@ -53,6 +53,18 @@ def test_holds_have_the_degrees_of_their_names():
 )
 def test_weights_give_the_polynomials_value_and_derivatives_and_the_mean_of_what_is_not_taken(hold, nodes, order, rows):
     np.testing.assert_allclose(weights(hold, nodes, H, order), rows, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("nodes", [(0.0,), (0.0, -1.0), (1.0, 0.0), (0.0, -0.5, -2.0), (1.0, 0.0, -1.5)])
+def test_two_halves_have_the_mean_and_the_first_moment_of_the_parabola(nodes):
+    """Integrals over the step by Gauss-Legendre, exact here; moments about its start."""
+    values = [force(t) for t in nodes]
+    parabola = np.polynomial.Polynomial.fit(nodes, values, len(nodes) - 1)
+    at, share = np.polynomial.legendre.leggauss(4)
+    at, share = (at + 1) / 2, share / 2
+    first, second = (float(np.dot(row, values)) for row in weights(Hold(2), nodes, H, HALVES))
+    assert (first + second) / 2 == pytest.approx(share @ parabola(at), rel=1e-12)
+    assert first / 8 + second * 3 / 8 == pytest.approx(share @ (at * parabola(at)), rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -171,9 +183,9 @@ def test_a_compiled_loop_is_told_the_weights_of_equal_steps_where_no_one_takes_s
         assert plan is None
         return
     assert plan is not None
-    for found, expected in ((plan.before[0], before), (plan.before[1], end), (plan.after, after)):
+    for found, expected in ((plan.before, [before]), (plan.end, end), (plan.after, [after])):
         np.testing.assert_allclose(found, expected)
-    assert (plan.visits, plan.follow, plan.sequential) == ((), (), True)
+    assert (plan.visits, plan.follow, plan.halves, plan.sequential) == ((), (), (), True)
 
 
 class Faulty(Pusher):

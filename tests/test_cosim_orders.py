@@ -2,7 +2,8 @@
 
 import pytest
 
-from bench.cosim_orders import error, halves, slopes
+from bench.cosim_orders import error, halves
+from bench.two_masses import slopes
 from snarelab.cosim.master import Master
 from snarelab.cosim.participants.oscillator import LeftOscillator, RightOscillator
 from snarelab.cosim.step_control import StepControl
@@ -13,26 +14,23 @@ LINKS = [("right.force", "left.force"), ("left.x", "right.x_left"), ("left.v", "
 
 @pytest.fixture(scope="module", params=[2, 3])
 def files(request, tmp_path_factory):
-    return request.param, halves(tmp_path_factory.mktemp("halves"), request.param)
+    return halves(tmp_path_factory.mktemp("halves"), request.param)
 
 
 @pytest.mark.parametrize("scheme", ["jacobi", "gauss_seidel"])
-@pytest.mark.parametrize(("hold", "expected"), [("constant", (1, 1)), ("linear", (2, 2)), ("quadratic", (3, 2))])
+@pytest.mark.parametrize(("hold", "expected"), [("constant", 1), ("linear", 2), ("quadratic", 3)])
 def test_observed_order(files, hold, expected, scheme):
-    """FMI 2.0 takes slopes; FMI 3.0 has held inputs, whose shape in a step costs an order."""
-    version, paths = files
+    """FMI 2.0 takes slopes; FMI 3.0 takes two values a step, with the parabola's first two moments."""
     steps = (0.01, 0.005)
-    (found,) = slopes(steps, [error(paths, step, hold, scheme) for step in steps])
-    assert found == pytest.approx(expected[version - 2], abs=0.1)
+    (found,) = slopes(steps, [error(files, step, hold, scheme) for step in steps])
+    assert found == pytest.approx(expected, abs=0.1)
 
 
 @pytest.mark.parametrize("hold", ["linear", "quadratic"])
 def test_step_controls_error_follows_its_tolerance(files, hold):
-    """What is held has a shape in a step, of order H², that control does not see where its steps go by H³."""
-    tolerances, version = (1e-2, 1e-3), files[0]
-    expected = 2 / 3 if (version, hold) == (3, "quadratic") else 1.0
-    errors = [error(files[1], 1e-3, hold, control=StepControl(tolerance)) for tolerance in tolerances]
-    assert slopes(tolerances, errors)[0] == pytest.approx(expected, abs=0.15)
+    tolerances = (1e-2, 1e-3)
+    errors = [error(files, 1e-3, hold, control=StepControl(tolerance)) for tolerance in tolerances]
+    assert slopes(tolerances, errors)[0] == pytest.approx(1.0, abs=0.15)
 
 
 class Stuck(LeftOscillator):

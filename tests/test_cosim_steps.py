@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from snarelab.cosim.iteration import Iteration
+from snarelab.cosim.macro_step import Taken
 from snarelab.cosim.master import Master
 from snarelab.cosim.participants.oscillator import LeftOscillator, RightOscillator
 from snarelab.cosim.step_control import StepControl
@@ -71,16 +72,16 @@ def test_a_macro_step_is_positive_and_finite(step):
 def test_an_error_is_the_worst_miss_of_what_is_coupled_in_tolerances(changed, error):
     """Constant hold: outputs were foretold to stay. Masses stand 1 m apart on 3 N/m."""
     one = master(hold="constant", control=StepControl(0.1, {"left.x": 2.0}))
-    assert one._error(outputs(one, **changed), 0.1) == pytest.approx(error, rel=1e-12)
+    assert one._step._error(outputs(one, **changed), 0.1) == pytest.approx(error, rel=1e-12)
 
 
 def test_the_largest_magnitude_so_far_is_kept():
     """-3 N at first; once 6 N were passed, a miss of 1.2 N is a fifth."""
     one = master(hold="constant", control=StepControl(0.1))
-    one._accept(outputs(one, right_force=9.0), 0.1)
-    one._accept(outputs(one, right_force=-5.0), 0.1)
+    for change in (9.0, -5.0):
+        one._step.remember(Taken(outputs(one, right_force=change), 0.1, None))
     assert one.value("right.force") == pytest.approx(1.0)
-    assert one._error(outputs(one, right_force=1.2), 0.1) == pytest.approx(1.2 / 6.0 / 0.1)
+    assert one._step._error(outputs(one, right_force=1.2), 0.1) == pytest.approx(1.2 / 6.0 / 0.1)
 
 
 def test_what_is_foretold_follows_the_hold_through_the_last_points():
@@ -88,10 +89,10 @@ def test_what_is_foretold_follows_the_hold_through_the_last_points():
     for hold, foretold in (("constant", 5.0), ("linear", 11.0), ("midpoint", 11.0), ("quadratic", 15.0)):
         one = master(hold=hold, iterate=True)
         for change in (2.0, 6.0):
-            one._accept(outputs(one, right_force=change), 0.1)
+            one._step.remember(Taken(outputs(one, right_force=change), 0.1, None))
         at = one.system.layout.outputs.index("right.force")
-        assert one._predicted(0.1)[at] == pytest.approx(foretold)
-        assert one._predicted(0.1)[one.system.layout.outputs.index("left.x")] == pytest.approx(1.0)
+        assert one._step._predicted(0.1)[at] == pytest.approx(foretold)
+        assert one._step._predicted(0.1)[one.system.layout.outputs.index("left.x")] == pytest.approx(1.0)
 
 
 def test_a_step_that_is_cut_does_not_shorten_the_next_run():
@@ -114,12 +115,29 @@ def test_a_step_that_is_off_is_repeated_shorter_and_at_the_smallest_it_is_taken(
     assert run.evaluations == run.steps + run.rejected == 3
 
 
+@pytest.mark.parametrize(
+    ("error", "degree", "rejected", "size"),
+    [
+        (0.25, 0, False, 0.2),  # 0.36, but never more than twice the last one
+        (0.81, 1, False, 0.1),
+        (0.729, 2, False, 0.1),
+        (4.0, 1, True, 0.045),
+        (1e9, 1, True, 0.02),  # a fifth at least
+        (1e-9, 1, True, 0.1),  # not larger when it is repeated
+        (0.0, 2, False, 0.2),
+    ],
+)
+def test_the_next_step_follows_the_order_of_the_error(error, degree, rejected, size):
+    """0.9 of the step at which an error of order degree + 1 would be 1."""
+    assert StepControl().next_size(0.1, error, degree, rejected) == pytest.approx(size)
+
+
 def test_an_iteration_is_counted_and_ends_where_outputs_are_what_was_assumed():
     """Two forces and speeds that follow each other: at least two evaluations a step, and the masses' sum is kept."""
     given = Iteration(tolerance=1e-10)
     one = master(0.05, iterate=given, hold="linear")
-    assert one._solver is not None
-    assert one._solver.iteration is given
+    assert one._step._solver is not None
+    assert one._step._solver.iteration is given
     run = one.run(0.5)
     assert run.steps == 10
     assert run.evaluations >= 20

@@ -1,28 +1,35 @@
 """Every deciding number, halved and doubled: an answer that stands at it must change.
 
-Those of closed loops (`DRIVEN`), of captures and of encoders have theirs where these are tested.
+Those of captures and of encoders have theirs where these are tested.
 """
 
 import sys
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
 import pytest
 from explained import Explained, hypotheses, white
+from test_bursts import windows
 from test_sticking import near_rest
 
 from snarelab.identification import deciding
-from snarelab.identification.evidence import arm, beside, rounds
+from snarelab.identification.evidence import arm, beside, rounds, tolerant
 from snarelab.identification.evidence import confirm as confirming
+from snarelab.identification.evidence import diagnose as deciding_all
+from snarelab.identification.evidence import hypotheses as hypothesising
+from snarelab.identification.evidence.beside import Beside
 from snarelab.identification.evidence.evidence import Channel, Evidence, Projected
 from snarelab.identification.evidence.hypotheses import pool
 from snarelab.identification.evidence.members import Members
-from snarelab.identification.evidence.pool import Hypothesis, Item
+from snarelab.identification.evidence.pool import Columns, Hypothesis, Item
 from snarelab.identification.evidence.search import Search
 from snarelab.identification.nuisance import rest
+from snarelab.identification.nuisance.bursts import bursts
 from snarelab.identification.nuisance.noise import Run, learn
 from snarelab.identification.nuisance.rest import Zone
+from snarelab.identification.search.candidates import Variant
 from snarelab.models.effects import get_effect
 from snarelab.models.model import Placed
 
@@ -32,13 +39,21 @@ FACTORS = (0.5, 2.0)
 def move(monkeypatch, name: str, factor: float) -> None:
     """A number times a factor wherever it was imported to."""
     value = getattr(deciding, name)
-    moved: Any = tuple(factor * x for x in value) if isinstance(value, tuple) else factor * value
+    moved: Any = (factor * np.array(value)).tolist() if isinstance(value, tuple) else factor * value
     moved = int(moved) if isinstance(value, int) else moved
     for module in [m for n, m in sys.modules.items() if n.startswith("snarelab.identification")]:
         own = getattr(module, name, None)
         if own is not None:
-            made = np.array(moved) if isinstance(own, np.ndarray) else moved
-            monkeypatch.setattr(module, name, Zone(*moved) if isinstance(own, Zone) else made)
+            monkeypatch.setattr(module, name, _as(own, moved))
+
+
+def _as(own: Any, moved: Any) -> Any:
+    """A number as a module holds it: an array, one zone or several, or as it is."""
+    if isinstance(own, Zone):
+        return Zone(*moved)
+    if isinstance(own, tuple):
+        return tuple(_as(x, y) for x, y in zip(own, moved, strict=True))
+    return np.array(moved) if isinstance(own, np.ndarray) else moved
 
 
 def planted(size: float) -> Explained:
@@ -71,12 +86,13 @@ def odds_of(made: Explained):
     effects = ("viscous_friction",) * 5 + ("coulomb_friction",)
     placed = [Placed(get_effect(n), f"joint{k}") for k, n in enumerate(effects)]
     named = {p.key: (p, [x]) for p, x in zip(placed, made.items, strict=False)}
-    return pool(named, {(0, f"curve {k}"): x for k, x in enumerate(made.items[6:])})
+    return pool(named, {(0, f"curve {k}"): x for k, x in enumerate(made.items[6:])}, ())
 
 
 def test_priors_are_shared_by_effects_and_by_places():
     several = odds_of(white(np.random.default_rng(0), 10, {}))
-    assert [np.exp(h.prior) for h in several] == pytest.approx([0.5 / 2 / 5] * 5 + [0.5 / 2] + [0.2 / 4] * 4)
+    one_of_five = 0.5 / 5 + 0.5 / 25
+    assert [np.exp(h.prior) for h in several] == pytest.approx([0.5 / 2 * one_of_five] * 5 + [0.5 / 2] + [0.2 / 4] * 4)
     assert [h.named for h in several] == [True] * 6 + [False] * 4
 
 
@@ -211,12 +227,12 @@ def test_what_adds_the_same_is_alike(monkeypatch):
 @pytest.mark.parametrize("constant", ["STICKS", "SETTLES"])
 def test_where_a_joint_sticks_and_where_its_friction_settles(monkeypatch, constant):
     """Of a peak of 2: below 0.08 and 0.2; of a travel of 100, for 0.5 and 1.2 after it stood."""
-    edge, after = {"STICKS": (0.08, 50), "SETTLES": (0.2, 120)}[constant]
+    edge, after, at = {"STICKS": (0.08, 50, 0), "SETTLES": (0.2, 120, None)}[constant]
     speeds = [1.0, 1.9 * edge, 1.01 * edge, 0.99 * edge, 0.6 * edge, 0.4 * edge, 1.0]
     stood = np.concatenate([np.zeros(5), np.ones(400)])
 
     def told():
-        zone = getattr(rest, constant)
+        zone = getattr(rest, constant) if at is None else getattr(rest, constant)[at]
         return len(near_rest(speeds, Zone(zone.speed, 0.0))), len(near_rest(stood, zone, 100.0)) - 5
 
     assert told() == (3, pytest.approx(after, abs=1))
@@ -298,7 +314,7 @@ def test_a_level_that_wanders_must_show(monkeypatch):
     for k in range(1, n):
         walk[k] = decay * walk[k - 1] + np.sqrt(1 - decay**2) * rng.normal()
     nothing = np.zeros(n)
-    run = Run(step, (slice(0, n),), nothing, nothing, nothing, 0.0)
+    run = Run(step, (slice(0, n),), nothing, (nothing,), nothing, 0.0)
     t = step * np.arange(n)
     x = np.stack([np.sin(2 * np.pi * 0.21 * t), np.cos(2 * np.pi * 0.34 * t)], 1) * np.sqrt(2)
 
@@ -318,3 +334,215 @@ def test_a_level_that_wanders_must_show(monkeypatch):
         with monkeypatch.context() as patch:
             move(patch, "WANDER_TIMES", factor)
             assert wander() != (level, time)
+
+
+def test_an_effect_that_is_at_one_joint_is_likelier_at_another(monkeypatch):
+    """The smallest viscous friction that is told at a second of five joints, beside one that is plain."""
+
+    def told(size):
+        made = planted(1.0)
+        (x,) = made.columns.parts[0, 0]
+        own = made.pieces[0][0]
+        made.pieces[0][0] = Channel(x[:, 0] + size * x[:, 1], own.covariance, own.index, own.columns)
+        several = odds_of(made)
+        slots = Search(Projected(made.evidence(), (0,)), several).answer()
+        return 1 in {s.taken.hypothesis for s in slots}
+
+    before = smallest(told)
+    for factor in FACTORS:
+        with monkeypatch.context() as patch:
+            move(patch, "ELSEWHERE", factor)
+            assert bool(smallest(told) < 0.97 * before) is (factor > 1)
+            assert bool(smallest(told) > 1.03 * before) is (factor < 1)
+
+
+def becomes(alike: float) -> bool:
+    """Does a curve become the name whose law can add this share of what it adds?"""
+    made = planted(1.0)
+    (x,) = made.columns.parts[0, 0]
+    x[:, 1] = np.sqrt(alike) * x[:, 0] + np.sqrt(1 - alike) * x[:, 2]
+    labels = [SimpleNamespace(amplitudes=[0])] * 2
+    items = [Item(i.index, i.spread, i.positive, False, y) for i, y in zip(made.items[:2], labels, strict=True)]
+    made = Explained(made.pieces, made.columns, items, 0)
+    several = [Hypothesis("curve", False, (items[0],), -1.0), Hypothesis("name", True, (items[1],), -12.0)]
+    run = Search(Projected(made.evidence(), (0,)), several)
+    slots = run.answer()
+    assert [s.taken.hypothesis for s in slots] == [0]
+    return rounds._as_names(run, slots)[0].taken.hypothesis == 1
+
+
+def test_a_curve_becomes_the_name_that_it_nearly_is(monkeypatch):
+    assert [becomes(x) for x in (0.5, 0.74, 0.76, 0.9)] == [False, False, True, True]
+    for factor in FACTORS:
+        with monkeypatch.context() as patch:
+            move(patch, "NEARLY", factor)
+            assert becomes(0.5) is (factor < 1)
+            assert becomes(0.9) is (factor < 1)
+
+
+def test_a_payload_is_named_beyond_what_masses_are_known_to(monkeypatch):
+    """Smaller ones are the masses' tolerance: the smallest that is named goes with how wide that may be."""
+
+    def named(size):
+        made = planted(1.0)
+        (x,) = made.columns.parts[0, 0]
+        x *= 1000
+        own = made.pieces[0][0]
+        made.pieces[0][0] = Channel(size * x[:, 0], own.covariance, np.zeros(1, int), x[:, :1])
+        made = Explained(made.pieces, made.columns, made.items[:1], 1)
+        payload = Hypothesis("payload", True, (made.items[0],), -6.0)
+        masses = Beside([], 1, slice(0, 1), [])
+        weighed: Any = SimpleNamespace(beside=masses, evidence=made.evidence(), pool=(payload,), noises=())
+        return bool(tolerant.searched(weighed, (0,), (), range(len(weighed.noises)))[2])
+
+    before = smallest(named)
+    assert before > deciding.TOLERANCES[-1]
+    for factor in FACTORS:
+        with monkeypatch.context() as patch:
+            move(patch, "TOLERANCES", factor)
+            assert smallest(named) == pytest.approx(factor * before, rel=0.25)
+
+
+def searching(monkeypatch, rounds_with_news: int) -> tuple[int, set[float]]:
+    """How many names a search has of which every round finds another, and the shares of motion that may be driven."""
+    shares = set()
+
+    def planned(*_, driven, **__):
+        shares.add(driven)
+        return [None]
+
+    slot = SimpleNamespace(gain=10.0, taken=SimpleNamespace(hypothesis=0))
+    made = SimpleNamespace(members=lambda _: SimpleNamespace(value=20.0), scan=lambda _: SimpleNamespace(odds=[1.0]))
+    weighed = SimpleNamespace(noises=(), pool=[SimpleNamespace(named=True, label=Placed(get_effect("backlash"), "a"))])
+    left = iter([[slot]] * rounds_with_news + [[]] * 99)
+    model: Any = SimpleNamespace(with_effects=lambda *_: model)
+    stubs: dict[str, Any] = {
+        "assemble": lambda *_: None, "fit": lambda *_, **__: None, "fitted": lambda *_: None, "planned": planned,
+        "refitted": lambda *_: None, "weigh": lambda *_: weighed,
+        "searched": lambda *_: (weighed, made, next(left), 0.0),
+        "_trials": lambda *_: (), "_as_names": lambda _, slots: slots, "_error_of_laws": lambda *_: [0.0],
+        "_reached": lambda *_: [0],
+        "_name": lambda *_: (SimpleNamespace(placed=weighed.pool[0].label, channels=(0,)), {}),
+    }  # fmt: skip
+    for name, stub in stubs.items():
+        monkeypatch.setattr(rounds, name, stub)
+    return len(rounds.search(model, None, {}, [], []).names), shares
+
+
+def test_a_search_goes_on_for_so_many_rounds(monkeypatch):
+    """Where every round finds something; with fewer it ends by itself."""
+    assert [searching(monkeypatch, n)[0] for n in (1, 3, 4, 9)] == [1, 3, 4, 4]
+    for factor, names in zip(FACTORS, (2, 8), strict=True):
+        with monkeypatch.context() as patch:
+            move(patch, "ROUNDS", factor)
+            assert searching(patch, 9)[0] == names
+
+
+def test_how_much_of_a_motion_may_be_driven_is_what_the_search_asks_for(monkeypatch):
+    """What it then does to the band of a joint is in test_closed_loop.py: it goes with its fifth root."""
+    assert searching(monkeypatch, 2)[1] == {deciding.DRIVEN}
+    for factor in FACTORS:
+        with monkeypatch.context() as patch:
+            move(patch, "DRIVEN", factor)
+            assert searching(patch, 2)[1] == {factor * 0.01}
+
+
+def attempts(monkeypatch) -> float:
+    """How well the best attempt foretells, where each foretells better than the last and none is whole."""
+    density = iter(range(99))
+    name = SimpleNamespace(placed=SimpleNamespace(key="a"))
+    monkeypatch.setattr(deciding_all, "search", lambda *_, **__: None)
+    monkeypatch.setattr(deciding_all, "left_over", lambda *_: None)
+    monkeypatch.setattr(
+        deciding_all,
+        "confirm",
+        lambda *_: SimpleNamespace(rejected=(name,), found=None, foretold=SimpleNamespace(density=next(density))),
+    )
+    model: Any = None
+    return deciding_all.decide(model, None, {}, [], []).best.foretold.density
+
+
+def test_what_was_not_confirmed_is_looked_for_again_twice(monkeypatch):
+    assert attempts(monkeypatch) == 2
+    for factor, best in zip(FACTORS, (1, 4), strict=True):
+        with monkeypatch.context() as patch:
+            move(patch, "SECOND_CHOICES", factor)
+            assert attempts(patch) == best
+
+
+@pytest.mark.parametrize(("constant", "told"), [("BURST_LOUD", 7.0), ("BURST_SHARE", 7.0)])
+def test_how_loud_and_how_much_makes_bursts(monkeypatch, constant, told):
+    """One window of 5 beside eleven of 1 is none: 2 of 16 beyond three times the median; of 7 it is: 4 of 18."""
+
+    def heard(loud):
+        return bursts([windows(*11 * [1], loud)]) is not None
+
+    assert [heard(5), heard(told)] == [False, True]
+    for factor in FACTORS:
+        with monkeypatch.context() as patch:
+            move(patch, constant, factor)
+            assert heard(5) is (factor < 1)
+            assert heard(told) is (factor < 1)
+
+
+def test_how_long_the_windows_of_bursts_are(monkeypatch):
+    """Twelve are needed: of eleven half seconds nothing is said, of twelve it is; of as many halves of them, or so
+    many whole seconds, otherwise."""
+
+    def heard(count):
+        return bursts([windows(*(count - 1) * [1], 16)]) is not None
+
+    assert [heard(11), heard(12), heard(23)] == [False, True, True]
+    for factor in FACTORS:
+        with monkeypatch.context() as patch:
+            move(patch, "BURST_WINDOW", factor)
+            assert heard(11) is (factor < 1)
+            assert heard(23) is (factor < 1)
+
+
+def shaped(monkeypatch, off: float, bent: float, curve: bool) -> float:
+    """Log Bayes factor of a law at the middle one of three shapes, which is off by so many steps, and bent by so much.
+
+    Between shapes the law changes by one of ten columns, and it is bent by another, over which there may be a curve.
+    """
+    made = planted(1.0)
+    (x,) = made.columns.parts[0, 0]
+    placed = Placed(get_effect("stribeck_friction"), "joint1")
+    grid = [Variant(placed, np.array([1.0, s]), np.zeros(1, int), np.zeros(1), np.ones(1)) for s in (1.0, 2.0, 3.0)]
+    laws = {v.parameters[1]: x[:, [0]] + (v.parameters[1] - 2) * x[:, [1]] for v in grid}
+    monkeypatch.setattr(hypothesising, "_grid", lambda *_: (grid, not curve))
+    monkeypatch.setattr(hypothesising, "_made", lambda _, v: {0: [laws[v.parameters[1]]]})
+    columns = Columns([len(x)])
+    over = Item(columns.add({0: [x[:, [2]]]}), np.ones(1), np.zeros(1, bool))
+    words = hypothesising.coordinate(placed.effect) or ""
+    along: Any = SimpleNamespace(n_train=1, scale=np.ones(1), assembly=SimpleNamespace(joint_of=lambda _: 0))
+    items = hypothesising._items(along, placed, {(0, words): over} if curve else {}, columns)
+    own = made.pieces[0][0]
+    residual = 0.3 * 10 * (x[:, 0] + off * x[:, 1] + bent * x[:, 2])
+    channel = Channel(residual, own.covariance, own.index, own.columns)
+    gains = Members(Projected(Evidence([[channel]], columns, items, 0), (0,))).gains()
+    middle = [k for k, item in enumerate(items) if item.label.parameters[1] == 2.0]
+    return float(gains[middle].max())
+
+
+@pytest.mark.parametrize(("constant", "off", "bent"), [("SLOPE", 0.6, 0.0), ("BENDS", 0.0, 1.2)])
+def test_how_far_a_law_may_be_from_a_shape_that_is_tried(monkeypatch, constant, off, bent):
+    """One that is far from it is believed more with more freedom, one that is just that shape with less."""
+    curve = constant == "BENDS"
+
+    def believed():
+        return shaped(monkeypatch, off, bent, curve), shaped(monkeypatch, 0.0, 0.0, curve)
+
+    far, near = believed()
+    for factor in FACTORS:
+        with monkeypatch.context() as patch:
+            move(patch, constant, factor)
+            other = believed()
+        assert (other[0] > far + 0.3) if factor > 1 else (other[0] < far - 0.3), f"{constant} times {factor}"
+        assert (other[1] < near - 0.1) if factor > 1 else (other[1] > near + 0.1), f"{constant} times {factor}"
+
+
+def test_no_number_is_without_a_test():
+    """Every one of them is named in this file, but for those that stand in a table of their own above."""
+    own = Path(__file__).read_text(encoding="utf-8")
+    assert [n for n in vars(deciding) if n.isupper() and f'"{n}"' not in own] == []

@@ -1,5 +1,6 @@
 """The documentation says what the code does: effects, links, targets, models, results and thresholds."""
 
+import ast
 import json
 import re
 import runpy
@@ -11,6 +12,7 @@ from diagnoses import spelt
 from documentation import CHANGELOG, DOCS, PAGES, README, ROOT, blocks, read
 
 from snarelab.cli import main
+from snarelab.identification import deciding
 from snarelab.models.effects import FAMILIES, effects
 from snarelab.models.model_file import load_model
 from snarelab.tolerance.study import load_study
@@ -151,18 +153,39 @@ def test_readme_says_what_can_be_named():
         assert not set(re.findall(r"`(\w+)`", " ".join(planned))) & set(effects())
 
 
+def numbers(code, name):
+    """Every value that a constant of this name has where it is set to numbers."""
+    written = re.findall(rf"^{name} = ([-\d.(].*)$", code, re.MULTILINE)
+    return [ast.literal_eval(value) for value in written]
+
+
 def test_thresholds_are_those_of_the_code():
-    table = rows(read(DOCS / "method.md"), "| constant | value |")
-    assert len(table) > 10
+    """Of the table written from the code, too: each number is set in one place alone."""
     sources = [path for folder in ("recordings", "identification") for path in (ROOT / folder).rglob("*.py")]
-    # The search over captures has thresholds of its own, under names that mean the same.
-    sources = [path for path in sources if path.parent.name != "snare"]
-    # Nor does the one evidence decide yet; its numbers stand in a file of their own.
-    sources = [p for p in sources if p.name != "deciding.py" and p.parent.name not in ("evidence", "nuisance")]
-    code = "\n".join(read(path) for path in sources)
-    for name, value, _ in table:
-        defined = re.findall(rf"^{name.strip('`')} = (.*)$", code, re.MULTILINE)
-        assert list(map(float, defined)) == [float(value)], f"{name} in docs/method.md, {defined} in the code"
+    # The searches over captures and encoders have thresholds of their own, under names that mean the same.
+    code = "\n".join(read(path) for path in sources if path.parent.name not in ("snare", "links"))
+    page = read(DOCS / "method.md")
+    heads = [m.start() for m in re.finditer(re.escape("| constant | value |"), page)]
+    decide, others = (rows(page[at:], "| constant | value |") for at in heads)
+    assert len(others) > 5
+    assert {name.strip("`") for name, _, _ in decide} == {n for n in vars(deciding) if n.isupper()}
+    for name, value, _ in (*decide, *others):
+        shown = ast.literal_eval(value)
+        assert numbers(code, name.strip("`")) == [shown], f"{name} in docs/method.md"
+
+
+def test_a_threshold_is_found_where_it_is_set_to_numbers():
+    code = "A = 0.5\nB = (1, 2.0)\nA = tuple(x)\n    A = 7\nAB = 3\nA = 2\n"
+    assert numbers(code, "A") == [0.5, 2]
+    assert numbers(code, "B") == [(1, 2.0)]
+
+
+def test_numbers_named_in_the_method_decide():
+    """In capitals in its text: no number is spoken of that there is no more."""
+    page = read(DOCS / "method.md")
+    named = set(re.findall(r"`([A-Z][A-Z_]+[A-Z])`", page[: page.index("## Numbers that decide")]))
+    assert named <= {n for n in vars(deciding) if n.isupper()}
+    assert len(named) > 20
 
 
 def test_results_shown_on_two_pages_are_the_same():

@@ -201,7 +201,8 @@ def test_an_effect_is_kept_as_the_tool_says_it(tmp_path, folders):
     told = effect("torque_ripple", "joint2", 0.8, [("x", "joint2", 0.1, False)], period=(0.2, 0.01))
     fit = {"tau.joint2": {part: {"rms_before": 2.0, "rms_after": 1.0} for part in ("train", "holdout")}}
     location = [{"channel": "tau.joint2", "share": 0.7}]
-    said = answer(verdict="missing_physics", effects=[{**told, "margin": 1.0}], fit=fit, location=location)
+    told |= {"margin": 2.5, "gain": 30.0}
+    said = answer(verdict="missing_physics", effects=[{**told, "evidence": "x"}], fit=fit, location=location)
     kept = score(folders[:1], tmp_path / "a.jsonl", tell=lambda _: None, run=lambda _: said)[0]
     assert kept["effects"] == [told]
     assert kept["location"] == {"tau.joint2": 0.7}

@@ -38,8 +38,8 @@ def run(segments=(slice(0, N),), links=1) -> Any:
 
 
 def added(e, name, at, parameters, joint=1, load=None, reading=None, scale=1.0, early_alone=False, tree=None) -> Any:
-    own: Any = tree or Made()
-    load, reading = (np.zeros(N) if x is None else x for x in (load, reading))
+    own: Any = tree or Made(joints=[Made(name=f"joint{k}", kind="revolute") for k in (1, 2)], axes=())
+    load, reading = (np.zeros((N, 2)) if x is None else np.stack([np.zeros(N), x], 1) for x in (load, reading))
     numbers = np.array(parameters, float)
     return contributions(e, own, Placed(get_effect(name), at), joint, load, reading, scale, numbers, early_alone)
 

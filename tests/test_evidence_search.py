@@ -148,7 +148,7 @@ def test_likeness_is_the_share_of_what_one_adds_that_another_can_add(cosine):
     assert likeness(run, 0, amplitudes, energy, 1) == pytest.approx(cosine**2, abs=1e-6)
 
 
-def test_the_share_of_the_residual_is_that_of_the_whitened_energy():
+def test_the_share_of_the_residual_is_of_what_stands_beside_everything_leaves():
     made = explained(4)
     run = Search(Projected(made.evidence(), (0, 1)), hypotheses(made.items, 0.1))
     amplitudes = np.array([0.3, 0.4])
@@ -156,6 +156,7 @@ def test_the_share_of_the_residual_is_that_of_the_whitened_energy():
     solved = np.linalg.inv(k + a @ a.T)
     c = pool[:, made.items[1].index] @ (made.items[1].spread * amplitudes)
     gained = r @ solved @ r - (r - c) @ solved @ (r - c)
-    wanted = gained / (r @ np.linalg.solve(k, r))
+    left = r - a @ a.T @ solved @ r
+    wanted = gained / (left @ np.linalg.solve(k, left))
     assert 0 < wanted < 1
     assert share_of_residual(run, 1, amplitudes) == pytest.approx(wanted, rel=1e-7)

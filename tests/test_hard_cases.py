@@ -11,8 +11,7 @@ from proof.judge import judge
 from snarelab.identification.diagnose import diagnose
 from snarelab.identification.fitting.experiment import load_experiments, scales
 from snarelab.identification.search.candidates import candidate_columns, variants
-from snarelab.identification.search.forward import assemble
-from snarelab.identification.search.screening import reliably_positive
+from snarelab.identification.search.refit import assemble
 from snarelab.models.effects import get_effect
 from snarelab.models.model import Placed
 from snarelab.models.model_file import load_model
@@ -39,7 +38,6 @@ def diagnosed(number, folder, seed=SEED):
 @pytest.mark.parametrize(
     ("number", "concealed"),
     [
-        (36, "backlash"),  # the link's ringing in closed loop is not in the motion that was asked for
         (63, "quadratic_friction"),  # one block gains thirty times what the others do
     ],
 )
@@ -55,7 +53,7 @@ def test_bristles_under_a_disturbance_are_told_beside_the_level_they_carry(tmp_p
     answer, found = diagnosed(41, tmp_path / "case", 90300)
     assert answer.kinds == ("coulomb_friction",)
     (joint,) = {truth.at for truth in answer.truths}
-    assert [(e.name, e.at) for e in found.effects] == [("coulomb_friction", joint), ("presliding_hysteresis", joint)]
+    assert {(e.name, e.at) for e in found.effects} == {("coulomb_friction", joint), ("presliding_hysteresis", joint)}
     error = judge(answer, found.to_json()).error
     assert error
     assert error[1] < 1.05  # times the disturbance and the noise
@@ -74,12 +72,13 @@ def test_bristles_under_load_are_told_near_rest_too(tmp_path):
     assert error[1] < 1.05  # times the disturbance and the noise
 
 
-def test_a_cable_that_hardens_is_no_harness(tmp_path):
-    """The spring that stands in for it leaves most; a curve on top of the spring takes that, and gains more."""
+def test_a_cable_that_hardens_is_a_harness_and_more(tmp_path):
+    """Most of it is no spring's: what the spring leaves stands beside it, without a name."""
     answer, found = diagnosed(66, tmp_path / "case", 90300)
     assert answer.kinds == ("hardening cable",)
-    assert found.verdict == "unknown_effect", found.sentence
-    assert not found.effects
+    (channel,) = answer.channels
+    assert {e.name for e in found.effects} <= {"harness_stiffness"}
+    assert f"on {channel}, a smooth curve over position" in found.description
 
 
 def test_bursts_are_an_effect_without_a_name(tmp_path):
@@ -93,42 +92,25 @@ def test_bursts_are_an_effect_without_a_name(tmp_path):
     assert found.location[0].channel == channel
 
 
-@pytest.mark.parametrize(("number", "concealed"), [(51, "damaged tooth"), (126, "one-way seal")])
-def test_what_only_stands_in_for_an_effect_without_a_name_is_not_named(number, concealed, tmp_path):
-    """Both times names passed on the held-out recording, and a nameless curve over the place explained far more.
-
-    Which names stand in for a seal turns with the last digits, and so with the processor.
-    """
-    answer, found = diagnosed(number, tmp_path / "case", 90400)
-    assert answer.kinds == (concealed,)
+def test_what_only_stands_in_for_an_effect_without_a_name_is_not_named(tmp_path):
+    """Friction by position passes on the held-out recording, but not beside the nameless curves over the place."""
+    answer, found = diagnosed(126, tmp_path / "case", 90400)
+    assert answer.kinds == ("one-way seal",)
     assert found.verdict == "unknown_effect", found.sentence
     (channel,) = answer.channels
     assert f"missing on {channel}" in found.sentence
-    assert "smooth curves over position" in found.description
+    assert "smooth curve over position" in found.description
     assert not found.effects
-    assert any(note.endswith("explains some of it, but smooth curves far more: not named") for note in found.notes)
 
 
-def test_twins_share_their_probability_and_the_sensor_is_told_first(tmp_path):
+def test_of_twins_the_likelier_is_told_and_the_other_beside_it(tmp_path):
     """In motion a torque sensor's bias and friction that differs by direction explain the same to the last digits."""
     _, found = diagnosed(8, tmp_path / "case", 90401)
     bias = next(e for e in found.effects if e.at == "tau.joint4")
     twin = next(r for r in bias.rivals if r.name == "asymmetric_friction")
     assert bias.name == "sensor_bias"
     assert not twin.separable
-    assert twin.probability == pytest.approx(bias.probability, rel=0.05)
-    assert bias.probability < 0.5 < bias.margin
-
-
-def test_a_block_that_dwarfs_the_others_is_no_reason_to_doubt_them():
-    gains = np.array([62.3, 59.1, 29.6, 18.5, 51.7, 34.5, 55.6, 66.2, 1527.0, 26.9, 45.9, 71.1, 81.5])
-    assert reliably_positive(gains)
-    assert not reliably_positive(-gains)
-    few = np.array([7646.0, 310.0, 947.0, 1851.0, 76.0, 82.0, 73.0])  # 94 % of a residual, of 12 s
-    assert reliably_positive(few)
-    assert not reliably_positive(np.where(few < 80, -few, few))
-    mixed = np.array([-15.6, -17.4, -4.7, 46.6, -29.6, 0.2, -21.1, 67.4, -391.0, 18.8, -28.6, 2.5, 32.4])
-    assert not reliably_positive(mixed)
+    assert bias.probability > twin.probability
 
 
 def test_a_candidate_with_fewer_amplitudes_has_its_own_columns():

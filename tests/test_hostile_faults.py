@@ -14,7 +14,8 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from bench.kills import kill_all, words, write_inputs
+from bench.killed import kill_all
+from bench.kills import Killed, words, write_inputs
 from snarelab import cli
 from snarelab.errors import InputError
 from snarelab.files import written_whole
@@ -125,7 +126,7 @@ def test_an_interrupted_diagnosis_says_so_and_leaves_nothing(folder):
     process = start(folder, [*DIAGNOSE, "-v"])
     assert process.stderr is not None
     line = ""
-    while "simulating each effect" not in line:
+    while "weighing each effect" not in line:
         line = process.stderr.readline()
         assert line
     time.sleep(0.3)
@@ -161,8 +162,9 @@ def test_an_interrupted_tolerance_study_keeps_its_cases_and_goes_on(folder):
 
 @pytest.mark.slow
 def test_kills_at_random_moments():
-    done = kill_all(["identify", "cosim"], 4, seed=5)  # of tolerance: tests/test_tolerance_run.py; all: bench/kills.py
-    assert all(found["runs"] == 2 for found in done.values())
+    kinds = ["identify", "cosim"]  # of tolerance: tests/test_tolerance_run.py; all: bench/kills.py
+    done = kill_all(kinds, Killed, 4, seed=5)
+    assert all(done[kind].total() == 2 for kind in kinds)
 
 
 @pytest.mark.parametrize(

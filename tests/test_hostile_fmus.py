@@ -20,7 +20,7 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def usual(folder):
     """Seconds that a run of sound FMUs takes here and now."""
-    found = run(folder, "sound")
+    found = run(folder, "sound", 60.0)
     assert not found.problems(allowance=60.0)
     return found.seconds
 
@@ -31,5 +31,5 @@ def test_there_are_thirty():
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=() if n in SOME else pytest.mark.slow) for n in NAMES])
 def test_it_ends_in_one_line_and_leaves_nothing(folder, usual, name):
-    found = run(folder, name)
+    found = run(folder, name, 3 * usual)
     assert not found.problems(allowance=3 * usual), found

@@ -15,7 +15,7 @@ from snarelab.identification.fitting.experiment import load_experiments, scales
 from snarelab.identification.fitting.fit import fit
 from snarelab.identification.links.diagnose import diagnose_links
 from snarelab.identification.links.pair import load_links, pair_of
-from snarelab.identification.search.forward import assemble
+from snarelab.identification.search.refit import assemble
 from snarelab.models.model_file import load_model
 from snarelab.models.rigid_body import RigidBody
 from snarelab.studies.kuka import CHECK, STIFFNESS, spring_alone, springs_of_measured_torque

@@ -10,7 +10,7 @@ from snarelab.identification.fitting.experiment import Scales
 from snarelab.identification.links import diagnose
 from snarelab.identification.links.pair import Pair, PairFit
 from snarelab.identification.links.search import Named, Searched, Trial, _weigh
-from snarelab.identification.search.choice import BOOTSTRAPS
+from snarelab.identification.reliability import BOOTSTRAPS
 from snarelab.models.effects import get_effect
 from snarelab.models.model import Placed
 

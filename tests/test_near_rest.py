@@ -1,4 +1,4 @@
-"""Which samples are near rest, what bridges them, and what is left of whitened data: counted by hand."""
+"""Which samples are near rest, and what bridges them: counted by hand."""
 
 from types import SimpleNamespace as Made
 from typing import Any
@@ -11,19 +11,15 @@ from snarelab.identification.fitting.experiment import Experiment
 from snarelab.identification.search import rest
 from snarelab.identification.search.rest import (
     CREEP,
-    LONGEST_RUN,
     REST,
-    Without,
-    begun,
-    bridged,
     fitted,
-    friction_less,
-    in_motion,
     moving,
     near_rest,
     slow,
-    without,
 )
+from snarelab.models.floating.ets_vii import ets_vii
+from snarelab.models.floating.tree import floating_tree
+from snarelab.models.rig.rig import built_in_rig
 
 
 def run(*speeds, thinning=1, segments=None) -> Any:
@@ -32,7 +28,7 @@ def run(*speeds, thinning=1, segments=None) -> Any:
     n = len(qd)
     t, torque = 0.01 * np.arange(n), np.arange(n, dtype=float)[:, None] * np.ones(qd.shape)
     names = tuple(f"joint{k + 1}" for k in range(qd.shape[1]))
-    body: Any = Made(tree=Made())
+    body: Any = Made(tree=Made(sticks=lambda _: True))
     e = Experiment(exact(names, 0.01, thinning, (t, 0 * qd, qd, 0 * qd, torque), segments), body)
     e.__dict__.update(regressor=None, mass_matrix=None, tangent=None, carried=None)
     return e
@@ -72,13 +68,19 @@ def test_near_rest_is_a_share_of_the_peak_either_way():
     assert np.flatnonzero(slow(e, 0, 0.03)).tolist() == [13, 14, 15, 16]
 
 
-def test_a_floating_base_and_a_suspended_arm_are_never_at_rest(monkeypatch):
+def test_what_cannot_stick_is_never_at_rest():
+    """A floating base, and the joints of an arm that hangs."""
     e = run(np.zeros(20), at(20, (5, 0.0)))
-    monkeypatch.setattr(rest, "n_carriers", lambda _: 1)
+    e.body.tree.sticks = lambda joint: joint > 0
     assert not slow(e, 0).any()
     assert slow(e, 1).any()
-    monkeypatch.setattr(rest, "Rig", Made)
-    assert not slow(e, 1).any()
+
+
+def test_trees_say_what_sticks_and_what_stands():
+    rig, floating, arm = built_in_rig(), floating_tree(ets_vii()), ets_vii().tree
+    assert [t.stands for t in (rig, floating, arm)] == [False, False, True]
+    assert [rig.sticks(0), arm.sticks(0)] == [False, True]
+    assert [floating.sticks(c) for c in (0, 5, 6)] == [False, False, True]
 
 
 @pytest.mark.parametrize(
@@ -104,14 +106,11 @@ def test_bridges_lead_over_rest_in_each_channel_and_count_or_not():
     """Torque is the sample's number; the first joint rests at 5 and so from 4 to 6, the second never moves."""
     e = run(at(12, (5, 0.0)), np.zeros(12))
     e.motion.tau[4:7, 0] = 99.0
-    over, without_it = bridged(e), moving(e)
-    np.testing.assert_allclose(over.measured[:, 0], np.arange(12))
-    assert over.kept is None
+    without_it = moving(e)
     np.testing.assert_allclose(without_it.measured[:, 0], [0, 1, 2, 3, 0, 0, 0, 7, 8, 9, 10, 11])
     np.testing.assert_allclose(without_it.measured[:, 1], np.arange(12))  # all that there is
     np.testing.assert_array_equal(without_it.counted, [9, 12])
     np.testing.assert_allclose(e.measured[4:7, 0], 99.0)
-    assert bridged(e) is over
     assert moving(e) is without_it
     assert moving(e, (REST, REST)) is without_it
     np.testing.assert_array_equal(moving(e, (0.0, 0.0)).counted, [12, 12])
@@ -136,17 +135,7 @@ def test_samples_of_the_band_that_are_near_rest(thinning, changed, segments, fou
     mask = near_rest(e, 0)
     assert np.flatnonzero(mask).tolist() == found
     assert len(mask) == size == len(e.measured)
-    both = in_motion([e, e])
-    np.testing.assert_array_equal(both, np.tile(np.stack([~mask, np.ones(size, bool)], 1), (2, 1)))
-
-
-def test_friction_may_fall_short_of_its_level_near_rest():
-    """-sgn(v) exp(-(v / w)²) at w = 0.3 and 1 % of the peak speed, here 2."""
-    e = run([2.0, 0.006, -0.006, 0.02, 0.0])
-    one, other = friction_less(e, 0).T
-    np.testing.assert_allclose(one, [0, -np.exp(-1), np.exp(-1), -np.exp(-100 / 9), 0], atol=1e-15)
-    np.testing.assert_allclose(other, [0, -np.exp(-0.09), np.exp(-0.09), -np.exp(-1), 0], atol=1e-15)
-    assert not friction_less(run(np.zeros(3)), 0).any()
+    np.testing.assert_array_equal(near_rest(e, 1), np.zeros(size, bool))
 
 
 def test_samples_near_rest_count_where_the_model_has_a_law_for_them(monkeypatch):
@@ -156,73 +145,3 @@ def test_samples_near_rest_count_where_the_model_has_a_law_for_them(monkeypatch)
     assembly: Any = Made(placed=placed, joint_of=lambda p: p.joint, tree=Made(joints=3 * [None]))
     monkeypatch.setattr(rest, "moving", lambda e, shares: (e, shares))
     assert fitted(assembly, ["a recording"]) == [("a recording", [0.0, REST, CREEP])]  # pyright: ignore[reportArgumentType]
-
-
-def left(missing, segments, order=2, lead=12):
-    """How many samples are left of innovations, and of how many."""
-    coefficients = np.array([0.5, 0.2])[:order]
-    drop = without([missing], [segments], coefficients, lead)
-    return int(np.count_nonzero(drop.kept)) + sum(mix.shape[1] for _, mix in drop.combined)
-
-
-@pytest.mark.parametrize(
-    ("at_rest", "segments", "wanted"),
-    [
-        ([], [(0, 100)], 88),
-        ([0, 9], [(0, 100)], 88),  # forgotten by the first innovation, which is 12's
-        ([10], [(0, 100)], 87),  # it remembers 10 and 11
-        ([0, 60], [(0, 100)], 87),
-        ([60], [(0, 12), (12, 100)], 75),  # a run as long as the lead has none
-        ([60], [(0, 13), (13, 100)], 1 + 75 - 1),
-        ([99], [(0, 100)], 87),
-        (range(40, 40 + LONGEST_RUN), [(0, 200)], 188 - LONGEST_RUN),  # combined
-        (range(40, 41 + LONGEST_RUN), [(0, 200)], 188 - LONGEST_RUN - 1 - 2),  # dropped with two that remember it
-        ([*range(40, 41 + LONGEST_RUN), 150], [(0, 200)], 188 - LONGEST_RUN - 3 - 1),
-    ],
-)
-def test_one_innovation_less_for_every_missing_sample_that_they_remember(at_rest, segments, wanted):
-    n = segments[-1][1]
-    missing = np.zeros(n, bool)
-    missing[list(at_rest)] = True
-    assert left(missing, [slice(a, b) for a, b in segments]) == wanted
-
-
-def test_recordings_stand_one_behind_the_other():
-    """The second recording's missing sample 20, by its third innovation on: 30 + 8 to 30 + 10."""
-    none, one = np.zeros(42, bool), np.zeros(42, bool)
-    one[20] = True
-    drop = without([none, one], [[slice(0, 42)], [slice(0, 42)]], np.array([0.5, 0.2]), 12)
-    assert np.flatnonzero(~drop.kept).tolist() == [38, 39, 40]
-    ((rows, mix),) = drop.combined
-    assert (rows, mix.shape) == (slice(38, 41), (3, 2))
-    np.testing.assert_allclose(mix.T @ [1.0, -0.5, -0.2], 0.0, atol=1e-12)
-    assert without([], [], np.zeros(0), 12)(np.zeros(0)).shape == (0,)
-
-
-def test_what_is_left_stands_in_the_order_of_time_and_a_combination_where_it_begins():
-    mix = np.array([[1.0, 0.0], [0.0, 0.0], [0.0, 2.0]])
-    kept = np.array([True, True, False, False, False, True, False, True])
-    drop = Without(kept, ((slice(2, 5), mix),))
-    np.testing.assert_allclose(drop(np.arange(8.0)), [0, 1, 2, 8, 5, 7])
-    np.testing.assert_array_equal(drop.first(np.array([0, 0, 1, 1, 2, 2, 3, 3])), [0, 0, 1, 1, 2, 3])
-    two = Without(kept[:5], ((slice(0, 1), np.ones((1, 1))), (slice(3, 5), np.ones((2, 1)))))
-    np.testing.assert_allclose(two(np.arange(1.0, 6.0)), [1, 2, 9])
-    np.testing.assert_array_equal(two.first(np.arange(5)), [0, 1, 3])
-
-
-def test_before_its_first_motion_a_joint_counts_for_nothing_and_from_then_on_all_of_it_does():
-    """Of two runs, each begins at rest; the first joint turns back in the second. The other joint never stands."""
-    speed = at(20, *((k, 0.0) for k in (0, 1, 2, 10, 11)), (15, 0.0))
-    e = run(speed, np.ones(20), segments=(slice(0, 10), slice(10, 20)))
-    kept = begun(e).kept
-    assert kept is not None
-    assert np.flatnonzero(~kept[:, 0]).tolist() == [0, 1, 2, 3, 10, 11, 12]  # and one that differentiation mixes in
-    assert kept[:, 1].all()
-    assert begun(e) is begun(e)
-    assert (begun(e).bridged, begun(e).measured.shape) == ((), e.measured.shape)
-
-
-def test_a_joint_that_never_moves_counts_whole():
-    kept = begun(run(np.ones(20), np.zeros(20))).kept
-    assert kept is not None
-    assert kept.all()

@@ -19,7 +19,7 @@ def run(encoder=0.0, sticks=None, settles=None, level=0.0, n=N) -> Run:
         STEP,
         (slice(0, n),),
         np.full(n, encoder),
-        nothing if sticks is None else sticks,
+        (nothing if sticks is None else sticks,),
         nothing if settles is None else settles,
         level,
     )

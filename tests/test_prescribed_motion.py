@@ -99,7 +99,9 @@ def test_noise_of_the_encoders_is_no_spring(tmp_path):
 def test_named_placed_and_nothing_else(concealed, name, at, parameter, value, error, tmp_path):
     found = diagnosed(tmp_path, concealed)
     (only,) = found.effects
-    assert (only.name, only.at) == (name, at), found.sentence
+    # All of a link's mass properties scaled by one factor are nearly a mass put at one point.
+    alike = {(only.name, only.at), *((r.name, r.at) for r in only.rivals if not r.separable)}
+    assert (name, at) in alike, found.sentence
     assert only.probability > 0.5
     wanted = value or 0.4 * pin.buildModelFromUrdf(str(ARM)).inertias[3].mass
     assert only.parameters[parameter].value == pytest.approx(wanted, rel=error)

@@ -11,17 +11,18 @@ from moving_arm import exact
 
 from snarelab.errors import InputError
 from snarelab.identification.fitting import experiment as module
+from snarelab.identification.fitting import recorded
 from snarelab.identification.fitting.experiment import (
     Bridge,
     Experiment,
     Scales,
     demand_apart,
     load_experiments,
-    motion_signals,
     scales,
     with_silence,
     without_torque,
 )
+from snarelab.identification.fitting.recorded import motion_signals
 
 N = 6
 
@@ -113,7 +114,8 @@ def test_bridges_and_samples_that_count_are_each_channels_own():
 
 
 def test_scales_are_peaks_over_all_recordings_and_never_zero():
-    first = run([[1.0, 0], [-7.0, 0]], [[-1.0, 0], [2.0, 0]], [[3.0, 0], [-4.0, 0]])
+    body: Any = Made(tree=Made(axes=()))
+    first = run([[1.0, 0], [-7.0, 0]], [[-1.0, 0], [2.0, 0]], [[3.0, 0], [-4.0, 0]], body)
     second = run([[6.0, 0], [0.0, 0]], [[5.0, 0], [4.0, 0]], [[1.0, 0], [1.0, 0]])
     found = scales([first, second])
     assert found["joint1"] == Scales(speed=4.0, travel=6.0, torque=7.0)
@@ -244,9 +246,10 @@ def test_all_recordings_get_the_narrowest_band_of_them(monkeypatch, bands, again
         return data(q__joint1=[0, 0, 0]).assign_attrs(band=path)
 
     monkeypatch.setattr(module, "condition", conditioned)
-    monkeypatch.setattr(module, "read_recording", read)
+    monkeypatch.setattr(recorded, "read_recording", read)
     tree = Made(joints=(Made(name="joint1", kind="prismatic"),))
     model: Any = Made(tree=tree, signals={}, joints=("joint1",), bandwidth=None, cuts=lambda read: read)
+    model.servo, model.transmission = {}, None
     body: Any = Made()
     found = load_experiments(model, bands, body)
     assert [e.motion.band for e in found] == (2 * [min(bands)] if again else list(bands))

@@ -8,6 +8,7 @@ import pytest
 
 from snarelab.cli import main
 from snarelab.errors import InputError
+from snarelab.identification.fitting.experiment import demand_apart
 from snarelab.models.model_file import load_model
 from snarelab.models.model_write import save_model
 from snarelab.recordings import JointKind, Signal, read_recording
@@ -156,3 +157,56 @@ def test_every_form_is_written_as_it_is_read(tmp_path):
     model = load_model(tmp_path / "swing.toml")
     save_model(model, tmp_path / "again.toml", "written")
     assert load_model(tmp_path / "again.toml").signals == model.signals
+
+
+def test_a_column_of_another_file_stands_beside_the_recordings_own(tmp_path):
+    (tmp_path / "positions.csv").write_text("a,b\n1.0,2.0\n3.0,4.0\n")
+    (tmp_path / "currents.csv").write_text("a,b [mA]\n10.0,20.0\n30.0,40.0\n")
+    signals = {
+        "time": Signal("", rate=10.0),
+        "q.joint1": Signal("a"),
+        "tau.joint1": Signal("b", unit="A", gain=2.0, file="currents.csv"),
+        "tau.joint2": Signal("", gain=1.0, columns={"a": 1.0, "b": -1.0}, unit="A", file="units.csv"),
+        "tau.joint3": Signal(1, gain=3.0, file="currents.csv"),
+        "command.joint1": Signal("goals[1]", unit="deg", file="goals.csv"),
+    }
+    (tmp_path / "goals.csv").write_text('goals\n"[1.0, 180.0]"\n"[1.0, 90.0]"\n')
+    (tmp_path / "units.csv").write_text("a,b\n5.0,1.0\n6.0,1.0\n")
+    found = read_recording(tmp_path / "positions.csv", signals)
+    np.testing.assert_allclose(found["q.joint1"], [1.0, 3.0])
+    np.testing.assert_allclose(found["tau.joint1"], [0.04, 0.08])
+    np.testing.assert_allclose(found["tau.joint2"], [4.0, 5.0])
+    np.testing.assert_allclose(found["tau.joint3"], [30.0, 90.0])
+    np.testing.assert_allclose(found["command.joint1"], [np.pi, np.pi / 2])
+    assert found["tau.joint1"].attrs["column"] == "currents.csv/b [mA]"
+    (tmp_path / "units.csv").write_text("a,b\n5.0,1.0\n")
+    with pytest.raises(InputError, match=r"units\.csv: has 1 rows and positions\.csv 2;"):
+        read_recording(tmp_path / "positions.csv", signals)
+    (tmp_path / "units.csv").unlink()
+    with pytest.raises(InputError, match="there is no such file"):
+        read_recording(tmp_path / "positions.csv", signals)
+
+
+def test_a_part_of_a_recording_is_read_by_its_time(tmp_path):
+    path = tmp_path / "run.csv"
+    path.write_text("time,q.joint1\n" + "".join(f"{k / 10},{k}\n" for k in range(20)))
+    assert read_recording(f"{path}@0.5:0.8")["q.joint1"].values.tolist() == [5, 6, 7]
+    assert read_recording(f"{path}@:0.2")["q.joint1"].values.tolist() == [0, 1]
+    assert read_recording(f"{path}@1.8:")["q.joint1"].values.tolist() == [18, 19]
+    assert read_recording(f"{path}@1.8:").attrs["path"] == f"{path}@1.8:"
+    for part, said in (("@2:1", "is empty"), ("@5:9", "too little"), ("@x:9", "no such file")):
+        with pytest.raises(InputError, match=said):
+            read_recording(f"{path}{part}")
+    odd = tmp_path / "odd.csv@0:1"
+    odd.write_text(path.read_text())
+    with pytest.raises(InputError, match="suffix"):  # a file of that very name is that file
+        read_recording(odd)
+
+
+def test_parts_of_one_file_may_be_fitted_and_held_out_where_they_do_not_overlap(tmp_path):
+    path = tmp_path / "run.csv"
+    path.write_text("time\n0\n")
+    demand_apart([f"{path}@0:4.5"], f"{path}@4.5:9")
+    for fitted in (f"{path}@0:5", path, f"{path}@8:"):
+        with pytest.raises(InputError, match="the holdout is also a recording to fit"):
+            demand_apart([fitted], f"{path}@4.5:9")

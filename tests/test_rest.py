@@ -1,51 +1,16 @@
-"""Samples near rest: what drops out of whitened data, and joints that stick under a textbook's friction."""
+"""Joints that stick under a textbook's friction, and what a fit makes of samples near rest."""
 
 import numpy as np
 import pytest
 from pendulum import diagnosed, recorded
-from scipy.signal import lfilter
 
 from snarelab.identification.fitting.experiment import Bridge, load_experiments, scales
 from snarelab.identification.fitting.fit import channel_rms, fit
-from snarelab.identification.search.forward import assemble, refitted
-from snarelab.identification.search.noise import Whitener
-from snarelab.identification.search.rest import fitted, without
+from snarelab.identification.search.refit import assemble, refitted
+from snarelab.identification.search.rest import fitted
 from snarelab.models.effects import get_effect
 from snarelab.models.model import Placed
 from snarelab.models.rigid_body import RigidBody
-
-
-def test_missing_samples_have_no_part_in_what_is_left():
-    rng = np.random.default_rng(0)
-    coefficients, lead = np.array([0.6, -0.2, 0.1]), 12
-    missing = np.zeros(400, bool)
-    missing[[40, 41, 42, 45, 200, 201, 399]] = True
-    whiten = Whitener(coefficients, 1.0, lead)
-    drop = without([missing], [[slice(0, 400)]], coefficients, lead)
-    x = np.asarray(lfilter([1.0], np.concatenate([[1.0], -coefficients]), rng.normal(size=400)))
-    left = drop(whiten(x, [slice(0, 400)]))
-    spoilt = np.where(missing, 1e3 * rng.normal(size=400), x)
-    np.testing.assert_allclose(drop(whiten(spoilt, [slice(0, 400)])), left, atol=1e-9)
-    assert len(left) == 400 - lead - 7  # one row for each missing sample, no more
-
-
-def test_what_is_left_of_white_innovations_is_white():
-    """Combinations are orthonormal: the energy left of any innovations is that of a projection."""
-    rng = np.random.default_rng(1)
-    missing = np.zeros(300, bool)
-    missing[100:104] = missing[110:112] = True
-    drop = without([missing], [[slice(0, 300)]], np.array([0.5, 0.2]), 12)
-    matrix = drop(np.eye(288))
-    np.testing.assert_allclose(matrix @ matrix.T, np.eye(len(matrix)), atol=1e-12)
-    x = rng.normal(size=288)
-    np.testing.assert_allclose(drop(x), matrix @ x)
-
-
-def test_a_long_rest_is_forgotten():
-    missing = np.zeros(300, bool)
-    missing[100:200] = True
-    drop = without([missing], [[slice(0, 300)]], np.array([0.5, 0.2]), 12)
-    assert len(drop(np.zeros(288))) == 288 - 102  # the rest, and the two innovations that remember it
 
 
 def test_a_bridge_leaves_straight_lines_alone():

@@ -1,71 +1,15 @@
-"""What the search chooses between: several local effects or one that reaches everywhere, and where a payload sits."""
-
-from types import SimpleNamespace
-from typing import Any
+"""Sets of columns that a candidate is tried with, and where a payload sits."""
 
 import numpy as np
 import pytest
 
 from bench.arm import random_arm
-from bench.concealed_arm import run_case
 from snarelab.identification.fitting.assembly import Assembly
 from snarelab.identification.fitting.experiment import Scales
 from snarelab.identification.search.candidates import Variant, variants
-from snarelab.identification.search.choice import choose
-from snarelab.identification.search.evidence import Channel, Evidence
 from snarelab.models.effects import get_effect
 from snarelab.models.model import Placed
 from snarelab.models.urdf import load_urdf
-
-N = 2000
-FREE = np.full(1, -np.inf), np.full(1, np.inf)
-
-
-def screening(rng: np.random.Generator, wide_size: float, local_size: float) -> tuple[Any, list[Any]]:
-    """Two channels of white noise; a wide effect on both, and on each a local one that looks like it (cosine 0.9).
-
-    The truth is ``wide_size`` times the wide effect and ``local_size`` times the local one of the second channel.
-    """
-    wide = {c: rng.normal(size=(N, 1)) for c in (0, 1)}
-    local = {c: 0.9 * wide[c] + np.sqrt(1 - 0.81) * rng.normal(size=(N, 1)) for c in (0, 1)}
-    channels = []
-    for c in (0, 1):
-        y = rng.normal(size=N) + wide_size * wide[c][:, 0] + local_size * c * local[c][:, 0]
-        block = np.arange(N) * 10 // N
-        channels.append(Channel(np.array([c]), rng.normal(size=(N, 1)), y, rng.normal(size=N), block))
-    evidence = Evidence(channels, 2, 10)
-
-    def judged(name: str, columns: dict[int, np.ndarray]) -> Any:
-        gain = evidence.gain(evidence.products(list(columns.items())), *FREE)
-        placed = SimpleNamespace(key=name, at="", effect=SimpleNamespace(contains=()))
-        return SimpleNamespace(
-            placed=placed,
-            channels=tuple(columns),
-            columns=columns,
-            price=4.0,
-            score=gain.total - 4.0,
-            variant=SimpleNamespace(low=FREE[0], high=FREE[1]),
-        )
-
-    candidates = [judged("wide", wide), *(judged(f"local{c}", {c: local[c]}) for c in (0, 1))]
-    threshold = {(0,): 5.0, (1,): 5.0, (0, 1): 5.0}
-    return SimpleNamespace(evidence=evidence, threshold=threshold), sorted(candidates, key=lambda j: -j.score)
-
-
-@pytest.mark.parametrize("seed", range(5))
-@pytest.mark.parametrize(
-    ("wide", "local", "first", "never"),
-    [
-        (0.3, 0.0, "wide", "local"),  # one effect on both
-        (0.0, 0.5, "local1", "wide"),  # one effect on one: the wide one only looks like it
-        (0.3, 0.8, "local1", "local0"),  # both: a strong local effect is no reason against the wide one ...
-    ],
-)
-def test_one_effect_on_all_channels_or_several_on_one_each(seed, wide, local, first, never):
-    result, candidates = screening(np.random.default_rng(seed), wide, local)
-    chosen = [j.placed.key for j in choose(result, candidates)]
-    assert chosen[0] == first
-    assert not any(key.startswith(never) for key in chosen)
 
 
 def test_where_a_payload_sits_is_read_off_its_slopes(tmp_path):
@@ -99,10 +43,3 @@ def test_every_set_of_columns_is_tried_of_a_links_few_and_else_single_ones_and_a
     sizes = [len(some) for some in sets]
     assert {size: sizes.count(size) for size in sizes} == counted
     assert len({tuple(some) for some in sets}) == len(sets)
-
-
-def test_a_small_payload_of_which_one_joint_shows_little_is_named():
-    """0.77 times the disturbance; the light last joint's residual must not drown what the others lose without it."""
-    found = run_case(1, 28)
-    assert found["outcome"] == "found", found["named"]
-    assert 0.5 < found["named"][0]["parameters"]["mass"] / found["value"] < 2.0

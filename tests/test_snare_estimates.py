@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from captures_by_hand import CLEARANCE, FRICTION, PRETENSION, UMBILICAL, along, capture, fit_of, track
 
-from snarelab.identification.search.choice import RivalOdds
+from snarelab.identification.evidence.rival import RivalOdds
 from snarelab.identification.snare import answer as module
 from snarelab.identification.snare.answer import (
     _finding,

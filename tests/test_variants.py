@@ -11,11 +11,8 @@ from snarelab.identification.search.candidates import (
     Variant,
     candidate_columns,
     free_parameters,
-    has_whole_law,
     library,
-    refines,
     variants,
-    widens,
 )
 from snarelab.models.effect import Parameter
 from snarelab.models.effects import effects, get_effect
@@ -76,7 +73,8 @@ def assembly(**scales) -> Any:
         scale=lambda _placed, x: scales.get(x.relative_to, 1.0),
         bounds=lambda _placed, x: (10 * x.low, 10 * x.high),
         joint_of=lambda _: 1,
-        speed_scales=[5.0, 7.0],
+        speed_scale=lambda _: 7.0,
+        place_of=lambda _: Made(channels=(1,)),
         tree=None,
         early_alone=False,
     )
@@ -161,29 +159,6 @@ def test_slides_of_the_first_joint_are_its_friction():
     assert keys(arm(("slide_friction", "joint2"))) == keys(arm())
 
 
-def test_a_whole_law_of_friction_is_free_in_every_parameter():
-    law, held = ("makkar_friction", "joint1"), ("makkar_friction", "joint2", "viscous")
-    model = arm(law, held, ("slide_friction", "joint2", "viscous"), ("viscous_friction", "joint2"))
-    assert has_whole_law(model.effects, "joint1")
-    assert not has_whole_law(model.effects, "joint2")
-    assert has_whole_law(arm(("slide_friction", "joint2")).effects, "joint2")
-    refined = {
-        e.name
-        for e in effects().values()
-        if e.at == "joint" and refines(model, Placed(e, "joint1")) and not refines(model, Placed(e, "joint2"))
-    }
-    shapes = {"makkar_friction", "viscous_friction", "coulomb_friction", "stribeck_friction"}
-    assert refined == shapes | {"quadratic_friction"}
-
-
-def test_an_effect_widens_what_it_contains_at_the_same_link():
-    model = arm(("payload_mass", "link1"), ("joint_elasticity", "joint1"))
-    assert widens(model, Placed(get_effect("inertia_error"), "link1"))
-    assert not widens(model, Placed(get_effect("inertia_error"), "link2"))
-    assert not widens(model, Placed(get_effect("com_offset"), "link1"))
-    assert not widens(model, Placed(get_effect("backlash"), "joint1"))  # a joint's spring is no link's
-
-
 VALUES, COLUMNS = np.array([1.0, 2.0]), np.array([[3.0, 4.0], [5.0, 6.0]])
 
 
@@ -217,7 +192,7 @@ def test_columns_of_the_amplitudes_or_the_whole_law_in_the_band(asked):
     np.testing.assert_array_equal(found, [[13.0], [23.0]])
     assert [call[-1] for call in calls] == [False, True]  # amplitudes are columns of the law's derivative
     _, joint, load, reading, speed, parameters, early_alone, _ = calls[0]
-    assert (joint, load.tolist(), reading.tolist(), speed, early_alone) == (1, [1, 2], [8, 9], 7.0, False)
+    assert (joint, load[:, 1].tolist(), reading[:, 1].tolist(), speed, early_alone) == (1, [1, 2], [8, 9], 7.0, False)
     assert parameters.tolist() == [0.0, 0.0]
 
 
@@ -250,7 +225,7 @@ def test_columns_that_nothing_changes_are_kept(asked, name, amplitudes, by_load,
     assert len(calls) == (2 if asked_twice else 1)
     np.testing.assert_array_equal(one[0][1], two[0][1])
     if not asked_twice:
-        assert two[0][0] == 1  # the joint's own channel
+        assert two[0][0] == one[0][0]
         for other in (variant(name, [1]), variant(name, [0], [1.0, 0.0])):
             candidate_columns(own, e, now, other)
         assert len(calls) == 3

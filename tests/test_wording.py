@@ -1,19 +1,23 @@
 """The words of a diagnosis: shares, lists, the experiment that is proposed, and the first sentence."""
 
+from contextlib import contextmanager
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from snarelab.identification import reliability
 from snarelab.identification.diagnosis import ChannelFit, Misfit
+from snarelab.identification.nuisance.noise import Noise
 from snarelab.identification.wording import (
     evidence_sentence,
     experiment_sentence,
     from_to,
     listed,
     named,
+    noise_words,
     percent,
     verdict_sentence,
 )
@@ -66,9 +70,9 @@ def test_the_rivals_experiment_is_proposed_where_it_is_another(own, other, text)
     ("channels", "where"), [(["a"], "a"), (["a", "b"], "a and b"), (["a", "b", "c"], "3 channels")]
 )
 def test_evidence_tells_what_is_explained_where_and_what_happens_without(channels, where):
-    assert evidence_sentence(placed("joint1", ""), 0.42, channels, 0.031, 0.26) == (
-        f"Friction that rubs: it explains 42 % of what the model so far left over on {where}; "
-        "taking it out again raises the error on the held-out recording from 3.1 % to 26 %."
+    assert evidence_sentence(placed("joint1", ""), channels, 0.08, 0.1) == (
+        f"Friction that rubs: it explains 36 % of what the model without it leaves over on {where}; "
+        "taking it out again raises the error on the held-out recording from 8 % to 10 %."
     )
 
 
@@ -100,6 +104,8 @@ def test_without_a_name_it_is_the_worst_channel_that_is_told():
         "The model is adequate: nothing larger than the limits listed is left out. "
         "What it leaves over on the held-out recording is 30 % of tau.joint1."
     )
+    told = verdict_sentence([], FITS, "", {"tau.joint1": "5 N·m from sample to sample", "tau.joint2": "none"})
+    assert told.endswith("is 30 % of tau.joint1. It is noise: 5 N·m from sample to sample.")
     noisy = replace(FITS[1], noise_floor=0.8)
     assert verdict_sentence([], [FITS[0], noisy], "").endswith(
         "is 25 % of tau.joint2, 1.2 times that channel's noise floor."
@@ -112,11 +118,47 @@ def test_without_a_name_it_is_the_worst_channel_that_is_told():
 def test_reliability_is_linear_between_its_knots_and_level_beyond(margin, right, tmp_path, monkeypatch):
     (tmp_path / "reliability.json").write_text('{"margin": [0.5, 0.7, 0.8], "probability": [0.6, 0.8, 0.9]}')
     monkeypatch.setattr(reliability, "__file__", str(tmp_path / "reliability.py"))
-    reliability._curve.cache_clear()
-    try:
+    with forgotten():
         assert reliability.probability(margin) == pytest.approx(right, rel=1e-12)
+
+
+@contextmanager
+def forgotten():
+    """What was read of the stored file is read anew, and not kept."""
+    both = reliability._curve, reliability._stored
+    for cached in both:
+        cached.cache_clear()
+    try:
+        yield
     finally:
-        reliability._curve.cache_clear()
+        for cached in both:
+            cached.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("gain", "held", "odds"),
+    [
+        (0.0, 1.0, np.exp(-1)),
+        (np.e - 1, 1.0, np.exp(-0.5)),  # half a unit for each of log(1 + gain)
+        (0.0, 4.0, np.exp(-1) * 16),  # odds grow with the square of what the held-out recordings gain
+        (-3.0, 1.0, np.exp(-1)),
+        (0.0, -7.0, np.exp(-1) * 1e-6),  # what they lose counts as next to nothing gained
+    ],
+)
+def test_how_often_a_name_of_torques_is_right_is_logistic_in_both_evidences(gain, held, odds, tmp_path, monkeypatch):
+    (tmp_path / "reliability.json").write_text('{"logit": [-1.0, 0.5, 2.0]}')
+    monkeypatch.setattr(reliability, "__file__", str(tmp_path / "reliability.py"))
+    with forgotten():
+        assert reliability.of_name(gain, held) == pytest.approx(odds / (1 + odds), rel=1e-12)
+
+
+def test_what_a_noise_is_made_of_is_told_with_sizes_and_times():
+    """Of the encoders the RMS over all recordings, of any length: √((3 · 4 + 5 · 0) / 8) = √1.5 here."""
+    noise = Noise(0.0123, 0.2, 0.345, 4.0, 40.0, 9.0)
+    told = noise_words("N*m", noise, [np.full(3, 2.0), np.zeros(5)])
+    assert told == (
+        "0.012 N·m from sample to sample, 0.2 N·m over 0.34 s, a wander of 4 N·m over 40 s and 1.2 N·m of the encoders"
+    )
 
 
 @pytest.mark.parametrize(
@@ -143,6 +185,6 @@ def test_what_is_less_likely_than_not_is_said_last_and_so():
 
 
 def test_nothing_explains_more_than_all():
-    assert "it explains all of what the model so far left over on a;" in evidence_sentence(
-        placed("joint1", ""), 1.18, ["a"], 0.031, 0.26
+    assert "it explains all of what the model without it leaves over on a;" in evidence_sentence(
+        placed("joint1", ""), ["a"], 0.001, 0.26
     )

@@ -150,6 +150,7 @@ def film(values: Mapping[str, float], case: CaseName = "inspection") -> str:
 SOURCES = (
     "tolerance/inspection.py",
     "cosim/orbit_capture.py",
+    "cosim/macro_step.py",
     "cosim/master.py",
     "cosim/sweep.py",
     "cosim/hold.py",

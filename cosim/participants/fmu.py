@@ -52,8 +52,11 @@ class Fmu(Participant):
         self.can_vary_step = bool(capable.canHandleVariableCommunicationStepSize)
         self.start_limit = _TOOL_START if capable.needsExecutionTool else _START
         self.unread = interface.unread
-        continuous = all(slot.continuous and slot.type == "Real" for slot in self._slots["input"])
-        self.input_order = 1 if capable.canInterpolateInputs and continuous else 0
+        inputs = self._slots["input"]
+        self.input_order = 1 if capable.canInterpolateInputs and _continuous(inputs, "Real") else 0
+        own = capable.fixedInternalStepSize  # declared by FMI 3.0 only: half a step may not be a multiple of it
+        self.can_halve = self.can_vary_step and not own and bool(inputs) and _continuous(inputs, "Float64")
+        self._second: np.ndarray | None = None  # inputs of the step's second half, where they are others
         self._instance: Instance | None = None
 
     def initialize(self, time: float = 0.0, parameters: Mapping[str, float] | None = None) -> None:
@@ -72,8 +75,14 @@ class Fmu(Participant):
 
     def set_inputs(self, values: np.ndarray) -> None:
         """Set every input."""
+        self._second = None
         for vector, where in self._inputs:
             vector.set(values[where])
+
+    def set_input_halves(self, first: np.ndarray, second: np.ndarray) -> None:
+        """Set every input for the first half of the step, and keep those for the second."""
+        self.set_inputs(first)
+        self._second = second
 
     def set_input_derivatives(self, first: np.ndarray, second: np.ndarray) -> None:
         """Set the slopes of every input; FMI 2.0's own extrapolation."""
@@ -82,9 +91,15 @@ class Fmu(Participant):
         self._instance.check("SetRealInputDerivatives", self._set_slopes(*self._slope_arguments))
 
     def step(self, time: float, size: float) -> None:
-        """One communication step."""
+        """One communication step, or two, each half as long, where inputs change between."""
         assert self._instance is not None
-        self._instance.step(time, size)
+        second = self._second
+        if second is None:
+            self._instance.step(time, size)
+            return
+        self._instance.step(time, 0.5 * size)
+        self.set_inputs(second)
+        self._instance.step(time + 0.5 * size, 0.5 * size)
 
     def outputs(self) -> np.ndarray:
         """Every output now."""
@@ -178,6 +193,10 @@ class Fmu(Participant):
             (ctypes.c_int * len(slots))(*[1] * len(slots)),
             buffer,
         )
+
+
+def _continuous(slots: Sequence[Slot], type_: str) -> bool:
+    return all(slot.continuous and slot.type == type_ for slot in slots)
 
 
 class _State:

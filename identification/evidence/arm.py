@@ -1,14 +1,13 @@
 """The evidence of recordings of an arm: residuals along the motion as measured, columns along the motion asked for."""
 
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.floating.tree import n_carriers
 from ...models.model import Model, Placed
-from ...models.rig.rig import Rig
 from ..deciding import LEAST_LEVEL
 from ..fitting.assembly import Assembly
 from ..fitting.experiment import Experiment, Scales
@@ -72,6 +71,7 @@ def weigh(
     *,
     runs: list[list[Run]] | None = None,
     search: bool = True,
+    nameless: Mapping[tuple[int, str], float] | None = None,
 ) -> Weighed:
     """Recordings under a fit.
 
@@ -90,14 +90,17 @@ def weigh(
         What the noise of every channel hangs on, as another fit has it: two models are compared under one noise.
     search : bool
         False leaves out all hypotheses: only the evidence of the fit itself is wanted.
+    nameless : mapping of (channel, words) to float, optional
+        Sizes of nameless curves that stand beside every explanation.
     """
     assembly = found.assembly
     states = [assembly.evaluate(e, found.theta) for e in instruments]
     along = Along(model, assembly, instruments, states, n_train, torque_scale(experiments[:n_train]))
     columns = Columns([len(e.measured) for e in experiments])
-    by_words = curves(along, scales, columns, small=not search)
+    nameless = nameless or {}
+    by_words = curves(along, scales, columns, small=not search, more={words for _, words in nameless})
     named = names(along, by_words, columns) if search else {}
-    others = beside(along, found, by_words, columns)
+    others = beside(along, found, by_words, columns, nameless)
     residuals = [assembly.residual(e, found.theta)[0] for e in experiments]
     if runs is None:
         runs = _runs(model, found, experiments, residuals, n_train, along.scale)
@@ -110,9 +113,10 @@ def weigh(
     ]
     if not search:
         columns = Columns([len(e.measured) for e in experiments])
-    found_pool = tuple(pool(named, by_words)) if search else ()
+    found_pool = tuple(pool(named, by_words, model.effects)) if search else ()
     items = [item for h in found_pool for item in h.items]
 
+    @functools.cache
     def bare(c: int) -> Noise:
         return _noise(c, along, residuals, runs, others, by_words, {}, columns)
 
@@ -136,13 +140,14 @@ def _runs(
         row = []
         for c, (peak, travel) in enumerate(zip(peaks, travels, strict=True)):
             m = e.motion
-            sticks = settles = np.zeros(len(e.measured))
-            level = 0.0
-            # On a suspension nothing hangs still, and nothing is asked of a floating base.
-            if not isinstance(model.tree, Rig) and c >= n_carriers(model.tree):
-                sticks, settles = (share(m, c, z, max(peak, 1e-12), travel) for z in (STICKS, SETTLES))
+            settles = np.zeros(len(e.measured))
+            sticks, level = (settles,) * len(STICKS), 0.0
+            if model.tree.sticks(c):
+                *sticks, settles = (share(m, c, z, max(peak, 1e-12), travel) for z in (*STICKS, SETTLES))
                 level = _level(found.assembly, found.theta, train, residuals, c, peak, scale[c])
-            row.append(Run(m.period * m.thinning, m.band_segments(), encoder_noise(e, c), sticks, settles, level))
+            row.append(
+                Run(m.period * m.thinning, m.band_segments(), encoder_noise(e, c), tuple(sticks), settles, level)
+            )
         made.append(row)
     return made
 

@@ -1,18 +1,19 @@
 """What always stands beside an explanation: the baseline's parameters, the tolerance of the masses, small curves."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..deciding import BASELINE, BASELINE_OWN, BASELINE_SHAPE, DISCREPANCY, LAW_ERROR
+from ..deciding import BASELINE, BASELINE_OWN, BASELINE_SHAPE, BENDS, DISCREPANCY, LAW_ERROR
 from ..fitting.assembly import Assembly
 from ..fitting.experiment import Experiment
 from ..fitting.fit import Fit
 from ..fitting.problem import gather
 from ..nuisance.curve import SMALL
-from .hypotheses import Along, Curves, coordinate
+from ..search.refit import carry
+from .hypotheses import Along, Curves, coordinate, lagging, remembers
 from .pool import Columns
 
 Array = NDArray[np.float64]
@@ -37,8 +38,10 @@ class Beside:
         return weight
 
 
-def beside(along: Along, found: Fit, by_words: Curves, columns: Columns) -> Beside:
-    """All of it for some recordings under a fit."""
+def beside(
+    along: Along, found: Fit, by_words: Curves, columns: Columns, nameless: Mapping[tuple[int, str], float]
+) -> Beside:
+    """All of it for some recordings under a fit; ``nameless`` curves have a size of their own."""
     assembly, n, n_channels = found.assembly, along.n_train, len(along.scale)
     blocks = [assembly.residual(e, found.theta)[1] for e in along.instruments]
     baseline = [
@@ -58,12 +61,25 @@ def beside(along: Along, found: Fit, by_words: Curves, columns: Columns) -> Besi
         count = tolerant.stop
     sizes = _small(found, baseline[:n], along.scale)
     for (c, words), item in by_words.items():
-        size = sizes.get((c, words), 0.0)
+        size = float(np.hypot(sizes.get((c, words), 0.0), nameless.get((c, words), 0.0)))
         if size > 0:
             for i, row in enumerate(parts):
                 index = count + np.arange(len(item.index))
                 row[c].append((index, columns.some(i, c, item.index) * (size * item.spread)))
             count += len(item.index)
+    for p in assembly.placed:
+        if not remembers(p):
+            continue
+        rest = assembly.keep([x for x in assembly.placed if x.key != p.key], found.theta)
+        left = carry(found, rest)
+        made = [e.motion.to_band(assembly.torque(e, found.theta) - rest.torque(e, left)) for e in along.instruments]
+        item = lagging(along, {c: [x[:, [c]] for x in made] for c in range(n_channels)}, columns)
+        rms = np.sqrt(np.mean(np.concatenate(made[:n]) ** 2, axis=0))
+        size = BENDS[0] * float(np.max(rms / along.scale)) * item.spread
+        for i, row in enumerate(parts):
+            for c in range(n_channels):
+                row[c].append((count + np.arange(2), columns.some(i, c, item.index) * size))
+        count += 2
     joined = [[_joined(own) for own in row] for row in parts]
     return Beside(joined, count, tolerant, baseline)
 

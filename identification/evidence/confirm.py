@@ -1,28 +1,26 @@
 """Confirm on the held-out recordings what a search named, by the same evidence.
 
 With an effect and without it the rest is fitted again, and both models foretell the held-out recordings: the log
-density of these given the training recordings (Dawid 1984), every nuisance integrated out anew.
-A name stays if that density falls without it by more than it scatters over blocks of time.
+density of these given the training recordings (Dawid 1984), every nuisance integrated out anew. The nameless curves
+that the search ended with stand beside both, so that what only stands in for one of them is not missed.
+A name stays if that density falls without it by more than it scatters over blocks of time, and if what is missed is
+more than any model has wrong.
 """
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...models.model import Model
-from ..deciding import BLOCK, GATE
+from ..deciding import BLOCK, DISCREPANCY, GATE
 from ..fitting.experiment import Experiment, Scales
-from ..fitting.fit import Fit, channel_rms, fit
-from ..search.forward import carry
-from ..search.rest import fitted
+from ..fitting.fit import Fit, channel_rms
+from ..search.refit import without
 from .arm import weigh
 from .evidence import Projected
-from .found import Found, Name, Remainder
-from .members import Members
-from .rounds import share_of_residual
-from .tolerant import searched
+from .found import Found, Name
 
 Array = NDArray[np.float64]
 
@@ -51,6 +49,17 @@ class Missed:
     def sure(self) -> float:
         """The gain in units of its scatter."""
         return self.gain / max(self.scatter, 1e-12)
+
+    @property
+    def size(self) -> float:
+        """RMS torque that is missed, by what it adds to the error [share of the channel's RMS torque]."""
+        with_it, without_it = self.trial
+        return float(np.sqrt(max(without_it**2 - with_it**2, 0.0)))
+
+    @property
+    def told(self) -> bool:
+        """Whether it is missed beyond its scatter, and as more than any model has wrong."""
+        return self.sure > GATE and self.size >= DISCREPANCY
 
 
 @dataclass(frozen=True)
@@ -95,8 +104,8 @@ def confirm(
         missed[key] = _missed(left[key], model, final, whole, found, train, held, scales)
         if any(k not in missed for k in left):
             continue
-        weakest = min(left, key=lambda k: missed[k].sure)
-        if missed[weakest].sure <= GATE and weakest not in stale:
+        weakest = min(left, key=lambda k: (missed[k].told, missed[k].sure))
+        if not missed[weakest].told and weakest not in stale:
             rejected.append(left.pop(weakest))
             weak[weakest] = missed.pop(weakest)
             final = weak[weakest].fit
@@ -104,7 +113,8 @@ def confirm(
             whole = foretold(model, final, found, train, held, scales)
             stale = set(left)
             progress(f"confirming on the held-out recordings: {len(rejected)} not missed, {len(left)} left")
-    return Confirmed(found, tuple(left.values()), tuple(rejected), weak, missed, model, final, whole)
+    names = tuple(sorted(left.values(), key=lambda n: -missed[n.placed.key].size))
+    return Confirmed(found, names, tuple(rejected), weak, missed, model, final, whole)
 
 
 def foretold(
@@ -119,7 +129,16 @@ def foretold(
     n = len(train)
     noise = found.weighed
     weighed = weigh(
-        model, own, [*train, *held], found.instruments, n, scales, noise.noises, runs=noise.runs, search=False
+        model,
+        own,
+        [*train, *held],
+        found.instruments,
+        n,
+        scales,
+        noise.noises,
+        runs=noise.runs,
+        search=False,
+        nameless=found.nameless,
     )
     weight = weighed.beside.weight(found.tolerance)
     fitted_by = Projected(weighed.evidence, range(n), weight)
@@ -158,67 +177,11 @@ def _missed(
 ) -> Missed:
     """Take one effect out of a fit, and fit the rest again."""
     key = name.placed.key
-    assembly = final.assembly.keep([p for p in final.assembly.placed if p.key != key], final.theta)
-    rest = fit(assembly, fitted(assembly, train), start=carry(final, assembly), multi_start=False)
+    rest = without(final, [key], train)
     other = foretold(_without(model, key), rest, found, train, held, scales)
     c = list(name.channels)
     with_it, measured = channel_rms(final.assembly, held, final.theta)
-    rms, _ = channel_rms(assembly, held, rest.theta)
+    rms, _ = channel_rms(rest.assembly, held, rest.theta)
     worst = c[int(np.argmax(rms[c] / measured[c] - with_it[c] / measured[c]))]
     trial = float(with_it[worst] / measured[worst]), float(rms[worst] / measured[worst])
     return Missed(whole.density - other.density, scatter(0.5 * (other.blocks - whole.blocks)), trial, rest)
-
-
-def remainders(found: Found, train: Sequence[Experiment], held: Sequence[Experiment]) -> tuple[Remainder, ...]:
-    """Nameless curves of the last search that the held-out recordings confirm."""
-    n, search, slots = len(train), found.search, found.slots
-    evidence = search.on.evidence
-    both = Projected(evidence, range(n + len(held)), found.weighed.beside.weight(found.tolerance))
-
-    def told(some: Sequence[int]) -> tuple[float, Array]:
-        taken = [(slots[k].taken.item, slots[k].taken.size) for k in some]
-        own, all_of_it = Members(search.on, taken), Members(both, taken)
-        mean = [(item, own.of(item)) for item, _ in taken]
-        always = search.on.beside(mean)
-        pairs = [(evidence.items[item], a) for item, a in mean]
-        parts = [blocks(evidence.left(n + i, always, pairs), e) for i, e in enumerate(held)]
-        return all_of_it.value - own.value, np.concatenate(parts)
-
-    kept = list(range(len(slots)))
-    made: dict[int, Remainder] = {}
-    while kept:
-        density, whole = told(kept)
-        made = {}
-        members = Members(search.on, [(slots[k].taken.item, slots[k].taken.size) for k in kept])
-        for k in kept:
-            item = slots[k].taken.item
-            if found.weighed.pool[slots[k].taken.hypothesis].named:
-                continue
-            other, rest = told([x for x in kept if x != k])
-            error = scatter(0.5 * (rest - whole))
-            c, curve = evidence.items[item].label
-            explained = share_of_residual(search, item, members.of(item))
-            made[k] = Remainder(c, curve.words, slots[k].gain, explained, (density - other) / max(error, 1e-12))
-        weak = min(made, key=lambda k: made[k].held, default=None)
-        if weak is None or made[weak].held > GATE:
-            break
-        kept.remove(weak)
-        made = {}
-    return tuple(sorted(made.values(), key=lambda r: -r.explained))
-
-
-def left_over(
-    best: Confirmed,
-    scales: Mapping[str, Scales],
-    train: Sequence[Experiment],
-    held: Sequence[Experiment],
-    barred: Collection[str],
-) -> tuple[Remainder, ...]:
-    """What the confirmed model still leaves to nameless curves."""
-    if best.rejected:
-        n = len(train)
-        own = best.found
-        weighed = weigh(best.model, best.fit, [*train, *held], own.instruments, n, scales, own.weighed.noises)
-        weighed, made, slots, tolerance = searched(weighed, range(n), barred)
-        best = replace(best, found=replace(own, weighed=weighed, search=made, slots=tuple(slots), tolerance=tolerance))
-    return remainders(best.found, train, held)

@@ -2,29 +2,34 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 from ...models.model import Model
 from ..deciding import SECOND_CHOICES
 from ..fitting.base_parameters import BaseParameters
 from ..fitting.experiment import Experiment, Scales
-from .confirm import Confirmed, confirm, left_over
-from .found import Name, Remainder
+from .confirm import Confirmed, confirm
+from .found import Name
+from .left import LeftOver, left_over
 from .rounds import search
 
 
 @dataclass(frozen=True)
 class Decided:
-    """What the recordings say: names confirmed on the held-out ones, nameless curves over what is left, and names that
-    the held-out recordings did not confirm."""
+    """What the recordings say: names confirmed on the held-out ones, what is left without a name, and names that the
+    held-out recordings did not confirm."""
 
     best: Confirmed
-    rest: tuple[Remainder, ...]
+    left: LeftOver
     rejected: tuple[Name, ...]
 
     @property
-    def verdict(self) -> str:
-        """``missing_physics``, ``unknown_effect`` or ``adequate``."""
-        return "missing_physics" if self.best.names else "unknown_effect" if self.rest else "adequate"
+    def verdict(self) -> Literal["missing_physics", "unknown_effect", "adequate"]:
+        """By what is named and what is left."""
+        if self.best.names:
+            return "missing_physics"
+        nameless = self.left.curves or any(b.again for b in self.left.bursts.values())
+        return "unknown_effect" if nameless else "adequate"
 
 
 def decide(

@@ -70,7 +70,13 @@ class Evidence:
         self._pools = [[columns.of(i, c)[1] for c in range(len(row))] for i, row in enumerate(channels)]
         self.numbers = [columns.of(0, c)[0] for c in range(len(channels[0]))]
         self.where = [_inverse(x, columns.count) for x in self.numbers]
-        self.products = [[self._products(i, c) for c in range(len(row))] for i, row in enumerate(channels)]
+        self._made: dict[tuple[int, int], Products] = {}
+
+    def products(self, i: int, c: int) -> Products:
+        """Of channel c of recording i, worked out when they are asked for: a search needs the training recordings'."""
+        if (i, c) not in self._made:
+            self._made[i, c] = self._products(i, c)
+        return self._made[i, c]
 
     def _products(self, i: int, c: int) -> Products:
         own, pool = self.channels[i][c], self._pools[i][c]
@@ -88,15 +94,14 @@ class Evidence:
         """The same with other covariances of one channel, one a recording."""
         other = copy(self)
         other.channels = [list(row) for row in self.channels]
-        other.products = [list(row) for row in self.products]
+        other._made = {key: x for key, x in self._made.items() if key[1] != c}
         for i, covariance in enumerate(covariances):
             other.channels[i][c] = replace(self.channels[i][c], covariance=covariance)
-            other.products[i][c] = other._products(i, c)
         return other
 
     def energy(self, i: int, c: int) -> float:
         """r' K⁻¹ r of a channel of a recording."""
-        return self.products[i][c].energy
+        return self.products(i, c).energy
 
     def reached(self, item: Item) -> list[int]:
         """Channels that an item has columns on."""
@@ -159,9 +164,8 @@ class Projected:
         beside, score = np.zeros((n_always, n_columns)), np.zeros(n_columns)
         energy = log_det = 0.0
         for i in recordings:
-            for own, products, numbers in zip(
-                evidence.channels[i], evidence.products[i], evidence.numbers, strict=True
-            ):
+            for c, (own, numbers) in enumerate(zip(evidence.channels[i], evidence.numbers, strict=True)):
+                products = evidence.products(i, c)
                 matrix[np.ix_(own.index, own.index)] += products.always
                 seen[own.index] += products.seen
                 beside[np.ix_(own.index, numbers)] += products.beside
@@ -184,11 +188,12 @@ class Projected:
         self._seen = solve_triangular(self._low, seen, lower=True)
         self.null = float(-0.5 * (energy - self._seen @ self._seen + log_det) - np.sum(np.log(np.diag(self._low))))
         self._grams: list[Array] = [
-            np.sum([evidence.products[i][c].gram for i in recordings], axis=0) for c in range(len(evidence.where))
+            np.sum([evidence.products(i, c).gram for i in recordings], axis=0) for c in range(len(evidence.where))
         ]
         self.beside_all = solve_triangular(self._low, beside, lower=True)
         self.score_all = score - self.beside_all.T @ self._seen
         self._crossed: dict[int, Array] = {}
+        self._left: dict[int, float] = {}
         self.groups = self._grouped()
         self._at = {int(x): (g, row) for g in self.groups for row, x in enumerate(g.numbers)}
 
@@ -213,6 +218,17 @@ class Projected:
             positive = np.stack([x.positive for x in items])
             made.append(Group(np.array(numbers), index, spread, positive, whole, curvature, score))
         return made
+
+    def left(self, c: int) -> float:
+        """e' K⁻¹ e of a channel of all these recordings, e what is left by all that stands beside, at its mean."""
+        if c not in self._left:
+            always, total = self.beside([]), 0.0
+            for i in self.recordings:
+                own = self.evidence.channels[i][c]
+                e = own.residual - own.columns @ always[own.index]
+                total += float(e @ own.covariance.solve(e))
+            self._left[c] = total
+        return self._left[c]
 
     def cross(self, number: int) -> Array:
         """C_item' S⁻¹ C of an item, in units of its spread, with every column (k, m)."""

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from ...models.model import Model, Placed
 from ..fitting.experiment import Experiment
 from ..fitting.fit import Fit
-from ..search.choice import RivalOdds
 from .arm import Weighed
+from .rival import RivalOdds
 from .search import Search, Slot
 
 Array = NDArray[np.float64]
@@ -21,14 +21,13 @@ class Name:
     """An effect that the search named.
 
     ``gain`` is its log Bayes factor on the training recordings, ``share`` its posterior share among all that could
-    stand in its place, ``explained`` the share of its channels' residual energy [0 to 1] that it explains.
+    stand in its place.
     """
 
     placed: Placed
     channels: tuple[int, ...]
     gain: float
     share: float
-    explained: float
     rivals: tuple[RivalOdds, ...]
 
 
@@ -64,6 +63,9 @@ class Found:
     fit: Fit
     names: tuple[Name, ...]
     trials: tuple[Trial, ...]
+    """Before anything was found ..."""
+    closing: tuple[Trial, ...]
+    """... and beside all that was."""
     opening: Weighed
     """The recordings under the first fit ..."""
     weighed: Weighed
@@ -73,3 +75,13 @@ class Found:
     search: Search
     instruments: tuple[Experiment, ...]
     tolerance: float
+
+    @property
+    def nameless(self) -> dict[tuple[int, str], float]:
+        """Sizes of the nameless curves of the last search, by channel and words."""
+        pool = self.weighed.pool
+        return {
+            (pool[s.taken.hypothesis].label[0], pool[s.taken.hypothesis].label[1].words): s.taken.size
+            for s in self.slots
+            if not pool[s.taken.hypothesis].named
+        }

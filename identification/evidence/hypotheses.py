@@ -1,19 +1,19 @@
 """Named effects and nameless curves of an arm's joints as hypotheses: columns, priors, odds."""
 
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from math import factorial
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from ...errors import InputError
 from ...models.effect import Effect
-from ...models.floating.tree import n_carriers
 from ...models.model import Model, Placed
-from ...models.rig.rig import Rig
-from ..deciding import BENDS, ODDS_OF_CURVES, ODDS_OF_NAMES, SLOPE
+from ..deciding import BENDS, ELSEWHERE, ODDS_OF_CURVES, ODDS_OF_NAMES, SLOPE
 from ..fitting.assembly import Assembly, Evaluation
 from ..fitting.experiment import Experiment, Scales
 from ..nuisance.curve import SMALL, Coordinates, family
@@ -44,11 +44,16 @@ class Along:
 
 
 def curves(
-    along: Along, scales: Mapping[str, Scales], columns: Columns, *, small: bool = False
+    along: Along,
+    scales: Mapping[str, Scales],
+    columns: Columns,
+    *,
+    small: bool = False,
+    more: Collection[str] = (),
 ) -> dict[tuple[int, str], Item]:
-    """Every nameless curve of every channel, or the small ones alone, by channel and words."""
+    """Every nameless curve of every channel, or the small ones and some more alone, by channel and words."""
     tree, n = along.model.tree, along.n_train
-    alone = isinstance(tree, Rig) or bool(n_carriers(tree))
+    alone = not tree.stands
     found = {}
     for c, joint in enumerate(along.model.joints):
         peak, travel = max(scales[joint].speed, 1e-9), scales[joint].travel
@@ -56,7 +61,7 @@ def curves(
         if max(float(np.ptp(x.q[:, c])) for x in signals[:n]) < 1e-6:
             continue
         for curve in family(c, along.model.joints, signals[:n], alone):
-            if small and curve.words not in {*SMALL, *(coordinate(p.effect) for p in along.model.effects)}:
+            if small and curve.words not in {*SMALL, *more, *(coordinate(p.effect) for p in along.model.effects)}:
                 continue
             own = [e.to_band(curve.columns(x), c) for e, x in zip(along.instruments, signals, strict=True)]
             k = own[0].shape[1]
@@ -84,19 +89,38 @@ def names(along: Along, by_words: Curves, columns: Columns) -> dict[str, tuple[P
     return found
 
 
-def pool(named: Mapping[str, tuple[Placed, list[Item]]], by_words: Curves) -> list[Hypothesis]:
-    """Hypotheses with their prior odds: shared by the effects, and by the places of each (Scott and Berger 2010)."""
-    places: dict[str, int] = {}
-    for p, _ in named.values():
-        places[p.effect.name] = places.get(p.effect.name, 0) + 1
-    found = [
-        Hypothesis(key, True, tuple(items), float(np.log(ODDS_OF_NAMES / len(places) / places[p.effect.name])), p)
-        for key, (p, items) in named.items()
-    ]
+def pool(named: Mapping[str, tuple[Placed, list[Item]]], by_words: Curves, there: Sequence[Placed]) -> list[Hypothesis]:
+    """Hypotheses with their prior odds: shared by the effects, and by the places of each (Scott and Berger 2010).
+
+    What is ``there`` in the model counts as one of an effect's places that has it.
+    """
+    names = [p.effect.name for p, _ in named.values()]
+    odds = ODDS_OF_NAMES / max(len(set(names)), 1)
+    found = []
+    for key, (p, items) in named.items():
+        name = p.effect.name
+        have = sum(x.effect.name == name for x in there)
+        n = have + names.count(name)
+        # Joints are made alike; a sensor's fault, or a wrong mass, is an accident of one place.
+        logs = [log_share_of_places(k, n) for k in range(1, n + 1)]
+        steps = (float(np.log(odds)) + logs[0], *(b - a for a, b in pairwise(logs)))[have:]
+        if p.effect.at != "joint":
+            steps = (float(np.log(odds / n)),)
+        found.append(Hypothesis(key, True, tuple(items), steps[0], p, name, steps[1:]))
     each = float(np.log(ODDS_OF_CURVES / max(len(by_words), 1)))
     return found + [
         Hypothesis(f"curve.{c}.{words}", False, (item,), each, item.label) for (c, words), item in by_words.items()
     ]
+
+
+def log_share_of_places(k: int, n: int) -> float:
+    """Log probability that an effect which is there is at k certain ones of its n places.
+
+    It is at one alone, each as likely; or every place has it at a rate of which nothing is known but that it is not
+    zero: ∫ρ^k (1 - ρ)^(n-k) dρ = k! (n - k)! / (n + 1)!.
+    """
+    every = factorial(k) * factorial(n - k) / factorial(n + 1) * (n + 1) / n
+    return float(np.log(ELSEWHERE * every + (1 - ELSEWHERE) * (k == 1) / n))
 
 
 def _items(along: Along, p: Placed, by_words: Curves, columns: Columns) -> list[Item]:
@@ -105,12 +129,16 @@ def _items(along: Along, p: Placed, by_words: Curves, columns: Columns) -> list[
     extra = None
     if len(grid) <= FINE:
         extra = by_words.get((along.assembly.joint_of(p), coordinate(p.effect) or ""))
+    # What a law with memory has wrong is mostly its lag.
+    lags = remembers(p)
     items: list[Item] = []
     for k, (v, parts) in enumerate(zip(grid, made, strict=True)):
         size = None if parts is None else _size(along, parts)
         if parts is None or size is None or not np.any(size > 1e-12):
             continue
         n, own = len(size), parts
+        # A curve over a joint's own coordinate says nothing of an axis.
+        bent = extra if set(parts) == {along.assembly.joint_of(p)} else None
         neighbours = [x for x in (made[max(k - 1, 0)], made[min(k + 1, len(grid) - 1)]) if x is not None]
         if between and len(neighbours) == 2:
             steps = min(k + 1, len(grid) - 1) - max(k - 1, 0)
@@ -123,6 +151,8 @@ def _items(along: Along, p: Placed, by_words: Curves, columns: Columns) -> list[
             }
         index = columns.add(own)
         whole = len(v.amplitudes) == 0
+        if lags:
+            bent = lagging(along, parts, columns)
         for subset in v.subsets():
             some = reduced(v, subset)
             on = size[subset] > 1e-12
@@ -134,14 +164,38 @@ def _items(along: Along, p: Placed, by_words: Curves, columns: Columns) -> list[
             if len(index) > n:
                 at, spread = np.concatenate([at, index[n + subset]]), np.tile(spread, 2)
                 positive = np.concatenate([positive, np.zeros(len(subset), bool)])
-            if extra is None or whole:
+            if bent is None or whole:
                 items.append(Item(at, spread, positive, whole, some))
                 continue
-            free = np.zeros(len(extra.index), bool)
+            free = np.zeros(len(bent.index), bool)
             for bend in BENDS:
-                bent = np.concatenate([at, extra.index]), np.concatenate([spread, bend * extra.spread])
-                items.append(Item(*bent, np.concatenate([positive, free]), whole, some))
+                more = np.concatenate([at, bent.index]), np.concatenate([spread, bend * bent.spread])
+                items.append(Item(*more, np.concatenate([positive, free]), whole, some))
     return items
+
+
+def remembers(p: Placed) -> bool:
+    """Has a law a memory that is no joint's own: a sling's carriage, a tank, a late sensor?"""
+    return bool(p.effect.states) and p.effect.at != "joint"
+
+
+def lagging(along: Along, parts: Mapping[int, Sequence[Array]], columns: Columns) -> Item:
+    """What a law adds if it comes sooner or later: the first two derivatives by time of each of its columns.
+
+    The item's spreads make each as large as the law where that is as large as its channel's torque.
+    """
+    own: dict[int, list[Array]] = {}
+    for c, recordings in parts.items():
+        own[c] = []
+        for e, x in zip(along.instruments, recordings, strict=True):
+            first, second = np.zeros_like(x), np.zeros_like(x)
+            for s in e.motion.band_segments():
+                if s.stop - s.start > 2:
+                    first[s] = np.gradient(x[s], axis=0)
+                    second[s] = np.gradient(first[s], axis=0)
+            own[c].append(np.hstack([first, second]))
+    sizes = _size(along, own)
+    return Item(columns.add(own), 1 / np.maximum(sizes, 1e-12), np.zeros(len(sizes), bool))
 
 
 def _grid(assembly: Assembly, p: Placed) -> tuple[list[Variant], bool]:
@@ -151,8 +205,9 @@ def _grid(assembly: Assembly, p: Placed) -> tuple[list[Variant], bool]:
     """
     grid = variants(assembly, p)
     shapes = [i for i, x in enumerate(p.effect.parameters) if len(x.grid) > 1]
-    if p.effect.at != "joint" or p.effect.states or len(shapes) != 1 or not len(grid[0].amplitudes):
-        return grid[:: -(-len(grid) // MOST_GRID)], False
+    alone = len(shapes) == 1 and len(grid[0].amplitudes) > 0
+    if p.effect.at != "joint" or p.effect.states or not alone:
+        return grid[:: -(-len(grid) // MOST_GRID)], alone and p.effect.at != "joint"
     i = shapes[0]
     finer = [grid[0]]
     for a, b in pairwise(grid):
@@ -166,7 +221,11 @@ def _made(along: Along, v: Variant) -> dict[int, list[Array]] | None:
     """Columns of a point by channel, one array a recording; None where the law cannot be simulated there."""
     parts: dict[int, list[Array]] = {}
     for e, s in zip(along.instruments, along.states, strict=True):
-        for c, x in candidate_columns(along.assembly, e, s, v):
+        try:
+            found = candidate_columns(along.assembly, e, s, v)
+        except InputError:
+            return None  # a spring whose link has no inertia: no candidate ends a run
+        for c, x in found:
             parts.setdefault(c, []).append(x)
     complete = all(len(x) == len(along.instruments) for x in parts.values())
     finite = all(np.isfinite(x).all() for own in parts.values() for x in own)

@@ -38,9 +38,9 @@ class Members:
         sizes = [WHOLE if x.whole else size for x, (_, size) in zip(items, self.taken, strict=True)]
         self._deviation = np.concatenate([np.full(len(x.index), s) for x, s in zip(items, sizes, strict=True)])
         mean = np.concatenate([np.full(len(x.index), float(x.whole)) for x in items])
-        self._cross = np.concatenate([on.cross(x) for x, _ in self.taken])
         columns, spread = np.concatenate([x.index for x in items]), np.concatenate([x.spread for x in items])
-        curvature = self._cross[:, columns] * spread
+        # Of many a set only the value is asked for: what it has in common with every column is gathered when needed.
+        curvature = np.concatenate([on.cross(x)[:, columns] for x, _ in self.taken]) * spread
         curvature = 0.5 * (curvature + curvature.T)
         score = np.concatenate([on.score(x) for x, _ in self.taken])
         shift = curvature @ mean
@@ -59,8 +59,9 @@ class Members:
         amplitudes the first alone, the others -inf."""
         found = np.full((len(self.on.evidence.items), len(SIZES)), -np.inf)
         if self.taken:
-            explained = self.amplitudes @ self._cross
-            turned = solve_triangular(self._low, self._deviation[:, None] * self._cross, lower=True)
+            cross = np.concatenate([self.on.cross(x) for x, _ in self.taken])
+            explained = self.amplitudes @ cross
+            turned = solve_triangular(self._low, self._deviation[:, None] * cross, lower=True)
         for group in self.on.groups:
             curvature, score = group.curvature, group.score
             if self.taken:

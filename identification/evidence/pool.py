@@ -29,13 +29,20 @@ class Item:
 @dataclass(frozen=True)
 class Hypothesis:
     """An explanation with all its shapes, and its prior log odds. ``key`` names it; ``named``: it is in the
-    vocabulary."""
+    vocabulary; ``kind`` is the same for all places of an effect, and ``more`` holds its prior log odds where one, two
+    and more of its kind are in the set already."""
 
     key: str
     named: bool
     items: tuple[Item, ...]
     prior: float
     label: Any = None
+    kind: str = ""
+    more: tuple[float, ...] = ()
+
+    def prior_beside(self, others: int) -> float:
+        """Prior log odds beside so many of its kind."""
+        return (self.prior, *self.more)[min(others, len(self.more))]
 
 
 @dataclass

@@ -7,18 +7,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...models.model import Model
-from ..deciding import ALIKE, CLASS, DRIVEN, NEARLY, ROUNDS
+from ..deciding import ALIKE, CLASS, DRIVEN, LAW_ERROR, NEARLY, ROUNDS
 from ..fitting.base_parameters import BaseParameters
 from ..fitting.experiment import Experiment, Scales
 from ..fitting.fit import Fit, fit
 from ..search.candidates import free_parameters
-from ..search.choice import RivalOdds
 from ..search.closed_loop import planned
-from ..search.forward import assemble, refitted
+from ..search.refit import assemble, refitted
 from ..search.rest import fitted
 from .arm import Weighed, weigh
 from .found import Found, Name, Trial
+from .hypotheses import remembers
 from .members import Members, log_bayes
+from .rival import RivalOdds
 from .search import Search, Slot, Taken
 from .tolerant import searched
 
@@ -68,13 +69,16 @@ def search(
     noises = before.weighed.noises if before is not None else None
     opening: Weighed | None = None
     trials: tuple[Trial, ...] = before.trials if before is not None else ()
+    channels = None if before is None else _reached_by(before.opening, barred)
     for number in range(1, ROUNDS + 1):
         progress(f"round {number}: weighing each effect at each place")
         if number == 1 and before is not None:
             weighed = before.opening
         else:
             weighed = weigh(model, found, both, instruments, n, scales, noises)
-        weighed, made, slots, tolerance = searched(weighed, range(n), barred)
+        weighed, made, slots, tolerance = searched(
+            weighed, range(n), barred, range(len(weighed.noises)) if channels is None else channels
+        )
         opening = opening or weighed
         noises = weighed.noises
         if not trials:
@@ -83,6 +87,18 @@ def search(
         news = [s for s in slots if weighed.pool[s.taken.hypothesis].named]
         if not news:
             break
+        # What adds less than the error of laws that are not fitted yet waits until they are.
+        least = LAW_ERROR**2 * made.members([s.taken for s in slots]).value
+        error = _error_of_laws(opening, weighed)
+        large = [s for s in news if s.gain >= LAW_ERROR**2 * sum(error[c] for c in _reached(weighed, s))]
+        news = [s for s in large if s.gain >= least] or large
+        if not news:
+            break
+        alone = made.scan([]).odds
+        leading = max(news, key=lambda s: alone[s.taken.hypothesis])
+        if remembers(weighed.pool[leading.taken.hypothesis].label):
+            # What rings or lags explains little before its frequency is fitted: nothing is judged beside it.
+            news = [leading]
         start: dict[str, float] = {}
         members = made.members([s.taken for s in slots])
         for s in news:
@@ -90,6 +106,7 @@ def search(
             named.append(name)
             start |= own
         placed = [x.placed for x in named[-len(news) :]]
+        channels = {c for x in named[-len(news) :] for c in x.channels}
         model = model.with_effects(placed, start)
         progress("refitting with " + ", ".join(f"{p.effect.name} at {p.at}" for p in placed))
         assembly = assemble(model, base, scales)
@@ -98,8 +115,43 @@ def search(
         instruments = planned(found, train, instruments, others=held, driven=DRIVEN)
     assert opening is not None
     return Found(
-        first, model, found, tuple(named), trials, opening, weighed, tuple(slots), made, tuple(instruments), tolerance
+        first,
+        model,
+        found,
+        tuple(named),
+        trials,
+        _trials(made, weighed),
+        opening,
+        weighed,
+        tuple(slots),
+        made,
+        tuple(instruments),
+        tolerance,
     )
+
+
+def _error_of_laws(opening: Weighed, weighed: Weighed) -> Array:
+    """Log-likelihood that the names so far took out of each channel of the training recordings (J,).
+
+    A law that is wrong by a share of itself leaves the square of that share of it.
+    """
+    taken = np.zeros(len(weighed.noises))
+    for i in range(weighed.n_train):
+        pairs = zip(opening.evidence.channels[i], weighed.evidence.channels[i], strict=True)
+        for c, (before, now) in enumerate(pairs):
+            energy = float(before.residual @ now.covariance.solve(before.residual))
+            taken[c] += 0.5 * (energy - weighed.evidence.energy(i, c))
+    return np.maximum(taken, 0.0)
+
+
+def _reached_by(weighed: Weighed, keys: Collection[str]) -> set[int]:
+    """Channels that some hypotheses reach."""
+    evidence = weighed.evidence
+    return {c for h in weighed.pool if h.key in keys for x in h.items for c in evidence.reached(x)}
+
+
+def _reached(weighed: Weighed, slot: Slot) -> list[int]:
+    return weighed.evidence.reached(weighed.evidence.items[slot.taken.item])
 
 
 def _as_names(search: Search, slots: Sequence[Slot]) -> list[Slot]:
@@ -159,8 +211,7 @@ def _name(
     start = {f"{placed.key}.{p.name}": float(v) for p, v in zip(placed.effect.parameters, values, strict=True)}
     channels = tuple(weighed.evidence.reached(item))
     rivals = _rivals(search, slot, amplitudes)
-    explained = share_of_residual(search, slot.taken.item, amplitudes)
-    return Name(placed, channels, slot.gain, float(slot.shares[slot.taken.hypothesis]), explained, rivals), start
+    return Name(placed, channels, slot.gain, float(slot.shares[slot.taken.hypothesis]), rivals), start
 
 
 def _rivals(search: Search, slot: Slot, amplitudes: Array) -> tuple[RivalOdds, ...]:
@@ -196,10 +247,10 @@ def likeness(search: Search, own: int, amplitudes: Array, energy: float, other: 
 
 
 def share_of_residual(search: Search, item: int, amplitudes: Array) -> float:
-    """Share of the whitened residual of its channels that an item explains [0 to 1]."""
+    """Share that an item explains of what stands beside everything leaves of its channels, whitened [0 to 1]."""
     on = search.on
     reached = on.evidence.reached(on.evidence.items[item])
-    energy = sum(on.evidence.energy(i, c) for i in on.recordings for c in reached)
+    energy = sum(on.left(c) for c in reached)
     gained = 2 * float(amplitudes @ on.score(item)) - float(amplitudes @ on.own(item) @ amplitudes)
     return float(np.clip(gained / max(energy, 1e-300), 0.0, 1.0))
 

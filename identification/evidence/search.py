@@ -1,7 +1,7 @@
 """One search over sets of explanations: forward, backward and exchange moves until none raises the posterior.
 
-A set's log posterior is the log Bayes factor of its members at their best shapes and sizes together, and for each of
-them its prior log odds and what averaging over shapes and sizes took off when it was taken. Names and nameless curves
+A set's log posterior is the log Bayes factor of its members at their best shapes and sizes together, its prior log
+odds, and for each member what averaging over shapes and sizes took off when it was taken. Names and nameless curves
 are judged alike.
 """
 
@@ -30,7 +30,7 @@ MOVED = 0.05
 
 @dataclass(frozen=True)
 class Taken:
-    """A hypothesis in a set: with the number of its item, its size, and its prior log odds less what averaging took."""
+    """A hypothesis in a set: with the number of its item, its size, and what averaging took, as a negative number."""
 
     hypothesis: int
     item: int
@@ -68,7 +68,6 @@ class Search:
         counts = np.array([len(h.items) for h in pool], int)
         self._starts = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(int)
         self._counts = counts
-        self._prior = np.array([h.prior for h in pool])
         self._scans: dict[frozenset[tuple[int, float]], Scanned] = {}
         self._sets: dict[frozenset[tuple[int, float]], Members] = {}
 
@@ -91,12 +90,22 @@ class Search:
             weight = np.exp(gains - np.repeat(top, self._counts)[:, None])
             cases = np.add.reduceat(np.isfinite(gains).sum(axis=1), self._starts)
             mean = np.log(np.add.reduceat(weight.sum(axis=1), self._starts) / cases) + top
-            self._scans[key] = Scanned(mean + self._prior, item, SIZES[np.argmax(gains[item], axis=1)], top)
+            self._scans[key] = Scanned(mean + self._prior(taken), item, SIZES[np.argmax(gains[item], axis=1)], top)
         return self._scans[key]
 
     def total(self, taken: Sequence[Taken]) -> float:
         """Log posterior of a set against nothing."""
-        return self.members(taken).value + sum(t.offset for t in taken)
+        return self.members(taken).value + self._log_prior(taken) + sum(t.offset for t in taken)
+
+    def _prior(self, taken: Sequence[Taken]) -> Array:
+        """Log odds (n_hypotheses,) of every hypothesis beside a set, before the recordings are looked at."""
+        own = [self.pool[t.hypothesis].kind for t in taken]
+        return np.array([h.prior_beside(own.count(h.kind)) for h in self.pool])
+
+    def _log_prior(self, taken: Sequence[Taken]) -> float:
+        """Log odds of a set, before the recordings are looked at."""
+        own = [self.pool[t.hypothesis] for t in taken]
+        return sum(h.prior_beside(sum(x.kind == h.kind for x in own[:k])) for k, h in enumerate(own))
 
     def run(self, start: Sequence[Taken] = (), *, exchange: bool = True) -> tuple[float, list[Taken]]:
         """The best set that moves from a start reach, and its log posterior.
@@ -134,7 +143,8 @@ class Search:
         rows = self.scan(taken)
         plain = Taken(h, int(rows.item[h]), float(rows.size[h]), 0.0)
         gained = self.members([*taken, plain]).value - self.members(taken).value
-        return replace(plain, offset=float(rows.odds[h]) - gained)
+        prior = self.pool[h].prior_beside(sum(self.pool[t.hypothesis].kind == self.pool[h].kind for t in taken))
+        return replace(plain, offset=float(rows.odds[h]) - prior - gained)
 
     def answer(self) -> list[Slot]:
         """The best set from two starts, nothing and the best nameless curve, and the rivals of each member."""

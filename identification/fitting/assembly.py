@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ...models.axes import Place, place
 from ...models.effect import Parameter, written_unit
 from ...models.model import Placed
 from ...models.rig.kinematics import sling_of
@@ -86,7 +87,7 @@ class Assembly:
     base : BaseParameters or None
         Identified base inertial parameters; None trusts the tree's.
     scales : mapping of str to Scales
-        Of every joint, from the training recordings.
+        Of every joint and axis, from the training recordings.
     values : mapping of str to float
         Known parameters by key, to start from.
     """
@@ -105,7 +106,7 @@ class Assembly:
         self.tree, self.placed, self.base, self.scales = tree, placed, base, scales
         self._joints = [j.name for j in tree.joints]
         self._links = [link.name for link in tree.links]
-        self.speed_scales = [values.get(f"speed_scale.{j}", scales[j].speed) for j in self._joints]
+        self._speeds = {at: values.get(f"speed_scale.{at}", s.speed) for at, s in scales.items()}
         self.phi = np.array(
             [
                 values.get(f"inertia.{link.name}.{name}", value)
@@ -150,16 +151,28 @@ class Assembly:
         return len(self._joints) == 1 and self.base is not None
 
     def joint_of(self, p: Placed) -> int:
-        """Index of the joint that an effect's place belongs to."""
+        """Index of the joint that an effect's place belongs to; of an axis, the first of its joints."""
         if isinstance(self.tree, Rig) and p.effect.at == "sling":
             return sling_of(self.tree, p.at).link
         if p.effect.at in ("link", "boom", "base"):
             return self._links.index(p.at)
-        return self._joints.index(p.at.removeprefix("tau.").removeprefix("q."))
+        return int(self.place_of(p).channels[0])
+
+    def place_of(self, p: Placed) -> Place:
+        """The joint, or the axis, that an effect acts at, or whose channel it reads."""
+        return place(self.tree, p.at.removeprefix("tau.").removeprefix("q."))
+
+    def _own(self, p: Placed) -> str:
+        """Name of the joint or axis whose scales an effect refers to."""
+        return p.at if p.at in self.scales else self._joints[self.joint_of(p)]
+
+    def speed_scale(self, p: Placed) -> float:
+        """Peak speed that an effect's law refers to [rad/s or m/s]."""
+        return self._speeds[self._own(p)]
 
     def scale(self, p: Placed, parameter: Parameter) -> float:
         """What a parameter's bounds and grid are multiples of at this place."""
-        return self.scales[self._joints[self.joint_of(p)]].of(parameter.relative_to)
+        return self.scales[self._own(p)].of(parameter.relative_to)
 
     def bounds(self, p: Placed, parameter: Parameter) -> tuple[float, float]:
         """Physical bounds of a parameter at a place."""
@@ -178,7 +191,7 @@ class Assembly:
 
     def values(self, theta: Array) -> dict[str, float]:
         """Every effect parameter by key, and the speed scales that laws refer to, as a model file stores them."""
-        speeds = {f"speed_scale.{j}": float(v) for j, v in zip(self._joints, self.speed_scales, strict=True)}
+        speeds = {f"speed_scale.{at}": float(v) for at, v in self._speeds.items()}
         return speeds | {
             f"{p.key}.{x.name}": float(value)
             for k, p in enumerate(self.placed)
@@ -229,15 +242,7 @@ class Assembly:
                 continue
             j = self.joint_of(p)
             terms, by_load, sense = contributions(
-                experiment,
-                self.tree,
-                p,
-                j,
-                load[:, j],
-                tau[:, j],
-                self.speed_scales[j],
-                self.parameters(k, theta),
-                self.early_alone,
+                experiment, self.tree, p, j, load, tau, self.speed_scale(p), self.parameters(k, theta), self.early_alone
             )
             if sense is not None:
                 passed.setdefault(j, []).append(sense)
@@ -245,11 +250,21 @@ class Assembly:
                 apart = len(rigid) if p.at.startswith("q.") and not self.early_alone else 0
                 blocks[apart:] = [Block(j, b.index, sense(b.values)) if b.channel == j else b for b in blocks[apart:]]
             if by_load is not None:
-                blocks += [Block(j, b.index, by_load[:, None] * b.values) for b in rigid if b.channel == j]
+                blocks += self._through_load(p, by_load, rigid)
             for channel, values, columns in terms:
                 tau[:, channel] += values
                 blocks.append(Block(channel, self._index[k], columns[:, self._free[k]]))
         return Evaluation(load, tau, blocks, passed)
+
+    def _through_load(self, p: Placed, by_load: Array, rigid: Sequence[Block]) -> list[Block]:
+        """Derivative blocks of a torque that follows the load of its place: by_load (n,), of what gives the load."""
+        here = self.place_of(p)
+        return [
+            Block(int(c), b.index, (here.along[c] * here.back[b.channel]) * by_load[:, None] * b.values)
+            for c in here.channels
+            for b in rigid
+            if here.back[b.channel]
+        ]
 
     def _rigid(self, experiment: Experiment, theta: Array) -> tuple[Array, list[Block]]:
         """Rigid-body torque (n, J) and its derivative blocks."""
@@ -272,9 +287,9 @@ class Assembly:
                 self.tree,
                 p,
                 j,
-                load[:, j],
-                load[:, j],
-                self.speed_scales[j],
+                load,
+                load,
+                self.speed_scale(p),
                 self.parameters(k, theta),
                 self.early_alone,
             )

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import fftconvolve
 
+from ...models.axes import Place, place
 from ...models.effect import Effect
 from ...models.hidden_state import evaluate_law, rows
 from ...models.model import Placed
@@ -43,11 +44,11 @@ def contributions(
     tree : Tree
     placed : Placed
     joint : int
-        The joint of the effect's place.
-    load, reading : array (n,)
-        The joint's rigid-body torque, and its torque before a sensor effect [N·m or N].
+        The joint of the effect's place; of an axis, the first.
+    load, reading : array (n, J)
+        Rigid-body torque, and torque before a sensor effect [N·m or N].
     speed_scale : float
-        The joint's peak speed in the training recordings [rad/s or m/s].
+        The place's peak speed in the training recordings [rad/s or m/s].
     parameters : array (p,)
         All of the effect's parameters.
     early_alone : bool
@@ -59,7 +60,7 @@ def contributions(
     -------
     terms : list of (channel, values (n,), derivative by parameters (n, p))
     by_load : array (n,) or None
-        Derivative of the own channel by the joint's load.
+        Derivative of the torque at the place by the load there.
     passed : callable or None
         For a sensor effect: what it makes of columns (n, k) of the channel.
     """
@@ -77,11 +78,13 @@ def contributions(
         values, by_parameter, _ = _by_segment(experiment, effect, base_signals(experiment), parameters, bare)
         # What the effect gives to the base, nothing else has to supply.
         return [(c, -values[:, c], -by_parameter[:, c]) for c in rows(effect)], None, None
+    here = place(tree, tree.joints[joint].name if effect.at == "sensor" else placed.at)
+    own, reading = here.load(load), reading[:, joint]
     signals = {
-        "q": motion.q[:, joint],
-        "qd": motion.qd[:, joint],
-        "qdd": motion.qdd[:, joint],
-        "load": load,
+        "q": here.coordinate(motion.q),
+        "qd": here.coordinate(motion.qd),
+        "qdd": here.coordinate(motion.qdd),
+        "load": own,
         "value": reading,
         "time": experiment.elapsed,
         "temperature": motion.temperature[:, joint],
@@ -99,7 +102,7 @@ def contributions(
             return found[:, 0] - value, by[:, 0], by_value
 
         if encoder and not early_alone:
-            change, by, by_value = sensed(reading - load)
+            change, by, by_value = sensed(reading - own)
             moved = [sensed(x[:, joint]) for x in (motion.q, motion.qd, motion.qdd)]
             terms = _along(experiment, joint, *(np.stack(x, 1) for x in list(zip(*moved, strict=True))[:2]))
             terms[joint] = (joint, terms[joint][1] + change, terms[joint][2] + by)
@@ -108,13 +111,20 @@ def contributions(
             terms = [(joint, change, by)]
         return terms, None, _passed(experiment, effect, parameters, by_value, direction)
     if effect.states:
-        signals["inertia"] = experiment.mass_matrix[:, joint, joint]
+        signals["inertia"] = here.inertia(experiment.mass_matrix)
     values, by_parameter, by_load = _by_segment(experiment, effect, signals, parameters, bare)
     if isinstance(tree, Rig) and effect.at == "slide":
         return rig_terms(experiment, tree, effect, placed.at, values, by_parameter), None, None
     if effect.acts_on == "torque":
-        return [(joint, values[:, 0], by_parameter[:, 0])], None if by_load is None else by_load[:, 0, 0], None
+        return _felt(here, values[:, 0], by_parameter[:, 0]), None if by_load is None else by_load[:, 0, 0], None
     return _along(experiment, joint, values, by_parameter), None, None
+
+
+def _felt(here: Place, values: Array, by_parameter: Array) -> list[tuple[int, Array, Array]]:
+    """What joints feel of a torque (n,) at a place, and of its derivative (n, p)."""
+    if here.alone is not None:
+        return [(here.alone, values, by_parameter)]
+    return [(int(c), here.along[c] * values, here.along[c] * by_parameter) for c in here.channels]
 
 
 def _along(experiment: Experiment, joint: int, values: Array, by_parameter: Array) -> list[tuple[int, Array, Array]]:

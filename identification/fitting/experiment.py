@@ -12,15 +12,16 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ...models.axes import place
 from ...models.floating.tree import CARRIERS, FloatingTree, channel, n_carriers
 from ...models.model import Model
 from ...models.rig.kinematics import sling_map
 from ...models.rig.rig import Rig
 from ...models.rigid_body import RigidBody
-from ...recordings import JointKind, read_recording
 from ...recordings.condition import Motion, condition
-from ...recordings.signals import Signal
+from ...recordings.part import part_of
 from .floating_terms import as_carriers, twist_noise, wheel_impulse, with_base, with_twist
+from .recorded import read_all, read_motion
 
 Array = NDArray[np.float64]
 
@@ -199,11 +200,10 @@ def load_experiments(
     """
     if not paths:
         raise InputError("recordings: none is given; give one or more")
-    kinds: dict[str, JointKind] = {j.name: j.kind for j in model.tree.joints}
     if torque:
-        datasets = datasets or [model.cuts(read_recording(path, model.signals, kinds)) for path in paths]
+        datasets = datasets or read_all(model, paths)
     else:
-        datasets = [without_torque(read_recording(path, motion_signals(model), kinds), model) for path in paths]
+        datasets = [without_torque(read_motion(model, path), model) for path in paths]
     measured = [_tensions(d, model) for d in datasets]
     tree = model.tree
     if isinstance(tree, FloatingTree):
@@ -232,11 +232,6 @@ def load_experiments(
         )
         for m, d, t in zip(motions, datasets, measured, strict=True)
     ]
-
-
-def motion_signals(model: Model) -> dict[str, Signal]:
-    """A model's [signals] but for torques, which a motion that is only followed need not have."""
-    return {name: signal for name, signal in model.signals.items() if not name.startswith("tau.")}
 
 
 def without_torque(dataset: xr.Dataset, model: Model) -> xr.Dataset:
@@ -268,9 +263,12 @@ def _without_gaps_in(tensions: Mapping[str, Array], dataset: xr.Dataset) -> xr.D
 
 def demand_apart(recordings: Sequence[str | Path], holdout: str | Path) -> None:
     """Refuse a held-out recording that is fitted too (InputError)."""
-    held = Path(holdout)
-    for fitted in map(Path, recordings):
-        same = held.resolve() == fitted.resolve()
+    part = part_of(holdout)
+    for one in map(part_of, recordings):
+        held, fitted = part.file, one.file
+        same = part.overlaps(one)
+        if not same and held.resolve() == fitted.resolve():
+            continue  # another part of one file
         if same or _is_copy(held, fitted):
             copy = "" if same else f", byte for byte {fitted}"
             raise InputError(
@@ -320,7 +318,7 @@ def with_silence(experiments: Sequence[Experiment]) -> list[Experiment]:
 
 
 def scales(experiments: Sequence[Experiment]) -> Mapping[str, Scales]:
-    """Peak speed, travel and peak torque of every joint over all recordings; never zero.
+    """Peak speed, travel and peak torque of every joint and axis over all recordings; never zero.
 
     Of a joint that nothing drives, the rigid body's peak torque stands for its own.
     """
@@ -334,4 +332,10 @@ def scales(experiments: Sequence[Experiment]) -> Mapping[str, Scales]:
         found[joint] = Scales(
             max(float(np.max(np.abs(qd))), 1e-9), max(float(np.ptp(q)), 1e-9), max(float(np.max(np.abs(tau))), 1e-9)
         )
+    for axis in experiments[0].body.tree.axes:
+        here = place(experiments[0].body.tree, axis.name)
+        motions = [e.motion for e in experiments]
+        ends = [(here.coordinate(m.qd), here.coordinate(m.q), here.load(m.tau)) for m in motions]
+        qd, q, tau = (np.concatenate(x) for x in zip(*ends, strict=True))
+        found[axis.name] = Scales(*(max(float(x), 1e-9) for x in (np.abs(qd).max(), np.ptp(q), np.abs(tau).max())))
     return found

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...models.axes import Place, place
 from ...models.hidden_state import evaluate_law, reads
 from ...models.model import Placed
 from .experiment import Experiment
@@ -59,8 +60,8 @@ def friction_curves(found: Fit, experiments: list[Experiment] | tuple[Experiment
     curves = []
     for (kind, at), members in places.items():
         joint = assembly.joint_of(members[0][1])
-        speed = _speeds(experiments, joint)
-        signals = {"qd": speed, "speed_scale": np.full(len(speed), assembly.speed_scales[joint])}
+        speed = _speeds(experiments, place(assembly.tree, at))
+        signals = {"qd": speed, "speed_scale": np.full(len(speed), assembly.speed_scale(members[0][1]))}
         value, slope = np.zeros(len(speed)), np.zeros((len(speed), len(found.theta)))
         for k, p in members:
             law = evaluate_law(p.effect, signals, assembly.parameters(k, found.theta))
@@ -81,9 +82,9 @@ def identifiable(found: Fit) -> NDArray[np.bool_]:
     return (found.std <= np.abs(found.theta)) & ~(is_shape & found.at_bound)
 
 
-def _speeds(experiments: list[Experiment] | tuple[Experiment, ...], joint: int) -> Array:
+def _speeds(experiments: list[Experiment] | tuple[Experiment, ...], here: Place) -> Array:
     """Speeds travelled, closer together near rest, where friction bends."""
-    speeds = np.concatenate([e.motion.qd[:, joint] for e in experiments])
+    speeds = np.concatenate([here.coordinate(e.motion.qd) for e in experiments])
     even = np.linspace(-1.0, 1.0, POINTS)
     way = np.sign(even) * even**2
     return np.where(way < 0, -way * min(float(speeds.min()), 0.0), way * max(float(speeds.max()), 0.0))

@@ -133,7 +133,9 @@ def reached(assembly: Assembly, p: Placed) -> tuple[int, ...]:
     if p.effect.at == "base":
         return rows(p.effect)
     everywhere = p.effect.at == "link" or p.effect.acts_on == "position"
-    return tuple(range(tree.n_joints)) if everywhere else (assembly.joint_of(p),)
+    if everywhere or p.effect.at != "joint":
+        return tuple(range(tree.n_joints)) if everywhere else (assembly.joint_of(p),)
+    return tuple(int(c) for c in assembly.place_of(p).channels)
 
 
 def split(assembly: Assembly, experiments: Sequence[Experiment], theta: Array) -> list[Problem]:

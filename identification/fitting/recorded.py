@@ -1,6 +1,6 @@
 """Recordings read once for all that looks at them, and the joints that none of them has, held."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,16 +9,52 @@ import xarray as xr
 
 from ...errors import InputError
 from ...models.hold import hold
-from ...models.model import Model, places
+from ...models.model import Model, all_places
 from ...models.tree import Tree
 from ...recordings import JointKind, read_recording
-from ...recordings.signals import joint_of
+from ...recordings.signals import Signal, default_unit, joint_of
 
 
 def read_all(model: Model, paths: Sequence[str | Path]) -> list[xr.Dataset]:
-    """Every recording, with the model's [signals]; raises InputError for whatever is wrong with one."""
+    """Every recording as one of the model's joints; raises InputError for whatever is wrong with one."""
+    return [model.cuts(_with_servos(_of_joints(model, path, model.signals), model)) for path in paths]
+
+
+def read_motion(model: Model, path: str | Path) -> xr.Dataset:
+    """A recording of which only the motion counts: its torques need not be there."""
+    return _of_joints(model, path, motion_signals(model))
+
+
+def motion_signals(model: Model) -> dict[str, Signal]:
+    """A model's [signals] but for torques, which a motion that is only followed need not have."""
+    return {name: signal for name, signal in model.signals.items() if not name.startswith("tau.")}
+
+
+def _of_joints(model: Model, path: str | Path, signals: Mapping[str, Signal]) -> xr.Dataset:
+    """A recording with what its motors say turned into what the joints do."""
     kinds: dict[str, JointKind] = {j.name: j.kind for j in model.tree.joints}
-    return [model.cuts(read_recording(path, model.signals, kinds)) for path in paths]
+    if model.transmission is None:
+        return read_recording(path, signals, kinds)
+    own = kinds.get(model.transmission.joints[0], "revolute")
+    motors: dict[str, JointKind] = {motor: own for motor in model.transmission.motors}
+    return model.transmission(read_recording(path, signals, {**kinds, **motors}))
+
+
+def _with_servos(dataset: xr.Dataset, model: Model) -> xr.Dataset:
+    """The recording with stiffness * (command - q) as torque of each joint that has a servo; per unit while free."""
+    made = {}
+    kinds: dict[str, JointKind] = {j.name: j.kind for j in model.tree.joints}
+    for joint, servo in model.servo.items():
+        for name in (f"command.{joint}", f"q.{joint}"):
+            if name not in dataset:
+                raise InputError(
+                    f"{dataset.attrs['path']}: no signal {name!r}, which [servo] works out the torque from; add the "
+                    "column, or map it under [signals] in the model file"
+                )
+        attrs = {"unit": default_unit(f"tau.{joint}", kinds[joint]), "column": f"command.{joint} - q.{joint}"}
+        stiffness = 1.0 if servo.stiffness is None else servo.stiffness
+        made[f"tau.{joint}"] = (stiffness * (dataset[f"command.{joint}"] - dataset[f"q.{joint}"])).assign_attrs(attrs)
+    return dataset.assign(made)
 
 
 def with_recorded_joints(model: Model, datasets: Sequence[xr.Dataset]) -> Model:
@@ -51,7 +87,7 @@ def with_recorded_joints(model: Model, datasets: Sequence[xr.Dataset]) -> Model:
     tree = replace(tree, notes=(*tree.notes, note))
     gone = set(missing)
     kept = tuple(
-        p for p in model.effects if p.at in places(p.effect, tree) or (joint_of(p.at) or missing[0]) not in gone
+        p for p in model.effects if p.at in all_places(p.effect, tree) or (joint_of(p.at) or missing[0]) not in gone
     )
     locked = {**model.holding.locked, **dict.fromkeys(missing, 0.0)}
     return replace(model, tree=tree, effects=kept, holding=replace(model.holding, locked=locked))

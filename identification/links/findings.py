@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from ...models.effects import effects
 from ...models.model import Placed
-from ..answer import NAMELESS
 from ..diagnosis import Candidate, Estimate, Finding, Limit, Rival, Trace
 from ..reliability import probability as reliability
 from ..wording import experiment_sentence, percent
@@ -18,6 +17,9 @@ from .pair import Pair, PairFit, deviations
 
 Array = NDArray[np.float64]
 
+
+NAMELESS = 0.1
+"""Smooth curves that explain this share of the difference, in blocks they did not see, mean a nameless effect."""
 
 EITHER = ("sensor_gain", "sensor_drift", "sensor_bias")
 """Faults that either of the two encoders may have."""

@@ -23,12 +23,13 @@ from ...models.floating.tree import FloatingTree
 from ...models.hidden_state import evaluate_law
 from ...models.model import Model, Placed
 from ...models.rigid_body import RigidBody
-from ...recordings import JointKind, read_recording
+from ...recordings import JointKind
 from ...recordings.condition import Motion, condition
 from ..fitting.assembly import Assembly
 from ..fitting.experiment import Experiment, Scales
 from ..fitting.fit import CLUSTER
 from ..fitting.least_squares import Normal, Objective, minimise
+from ..fitting.recorded import read_motion
 from ..search.noise import Whitener
 
 Array = NDArray[np.float64]
@@ -225,8 +226,7 @@ def load_links(
     """
     if isinstance(model.tree, FloatingTree):
         return (), []
-    kinds: dict[str, JointKind] = {j.name: j.kind for j in model.tree.joints}
-    datasets = [read_recording(path, model.signals, kinds) for path in recordings]
+    datasets = [read_motion(model, path) for path in recordings]
     # A column that never changes while the joint moves is no encoder.
     joints = tuple(
         j

@@ -15,19 +15,23 @@ from numpy.typing import NDArray
 
 from ...models.effects import effects
 from ...models.model import Placed
+from ..deciding import ALIKE, BLOCK
+from ..reliability import BOOTSTRAPS
 from ..search.candidates import MOST_VARIANTS
-from ..search.choice import BOOTSTRAPS
-from ..search.forward import MOST_ROUNDS
 from ..search.noise import Whitener, whitener
-from ..search.passing import ALIKE
-from ..search.saturated import BLOCK, MOST_BLOCKS
-from ..search.trial import WORTH
 from .pair import Pair, PairFit, fit_pair
 
 Array = NDArray[np.float64]
 
 AT_LINK = ("sensor_delay", "sensor_gain", "sensor_drift")
 AT_JOINT = ("joint_elasticity", "backlash")
+
+WORTH = 0.05
+"""Least share of the difference's energy that an effect must explain to be named."""
+
+MOST_ROUNDS = 8
+
+MOST_BLOCKS = 24
 
 CHANCE = 0.005
 """How often the best of all candidates may beat the bar by chance; for one candidate the log-likelihood gained by

@@ -1,6 +1,6 @@
 """The noise of one channel: white, coloured, wandering, of the encoders, and what a joint holds near rest.
 
-    K = w² I + a² e^(-|d|/τa) + v² e^(-|d|/τv) + encoders + diag((s F)²) + diag((s' g)²)
+    K = w² I + a² e^(-|d|/τa) + v² e^(-|d|/τv) + encoders + s F (I + e^(-|d|/τh)) s F + diag((s' g)²)
 
 The scales are those of highest marginal likelihood beside everything that could explain the residual: beside the
 baseline alone the noise would learn the missing physics, and then hide it.
@@ -35,19 +35,21 @@ AVERAGED = 0.25
 @dataclass(frozen=True)
 class Run:
     """One channel of one recording, as its noise sees it: period [s], segments, noise of the encoders (n,) [T], shares
-    of every sample near rest and about it (n,), and the level [T] that a joint may hold at rest."""
+    of every sample near rest (n,), for each width that this may have, and about it, and the level [T] that a joint may
+    hold at rest."""
 
     step: float
     segments: tuple[slice, ...]
     encoder: Array
-    sticks: Array
+    sticks: tuple[Array, ...]
     settles: Array
     level: float
 
     def some(self, rows: slice) -> "Run":
         """The first samples of it."""
         inside = tuple(slice(s.start, min(s.stop, rows.stop)) for s in self.segments if s.start < rows.stop)
-        return Run(self.step, inside, self.encoder[rows], self.sticks[rows], self.settles[rows], self.level)
+        sticks = tuple(x[rows] for x in self.sticks)
+        return Run(self.step, inside, self.encoder[rows], sticks, self.settles[rows], self.level)
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,8 @@ class Noise:
     settling: float
     unit: float = 1.0
     """RMS of the residual that they were learnt from [T]."""
+    width: int = 0
+    """Which of the widths near rest."""
 
     @property
     def log_prior(self) -> float:
@@ -70,8 +74,9 @@ class Noise:
 
     def covariance(self, run: Run) -> Covariance:
         """K of a recording."""
-        variance = self.white**2 + (run.level * run.sticks) ** 2 + (self.settling * run.settles) ** 2
-        held = Remembering(run.level * run.sticks, HELD)
+        sticks = run.sticks[self.width]
+        variance = self.white**2 + (run.level * sticks) ** 2 + (self.settling * run.settles) ** 2
+        held = Remembering(run.level * sticks, HELD)
         processes = [Remembering(self.coloured, self.coloured_time), Remembering(self.wander, self.wander_time), held]
         heard = np.any(run.encoder**2 >= NEGLIGIBLE * variance)
         return Covariance(variance, processes, run.encoder if heard else None, run.step, run.segments)
@@ -149,7 +154,7 @@ def _averaged(residual: Array, columns: Array, run: Run) -> tuple[Array, Array, 
         segments.append(slice(count, count + len(own)))
         count += len(own)
     rows = np.concatenate(starts)[:, None] + np.arange(length)
-    sticks, settles = run.sticks[rows].mean(axis=1), run.settles[rows].mean(axis=1)
+    sticks, settles = tuple(x[rows].mean(axis=1) for x in run.sticks), run.settles[rows].mean(axis=1)
     other = Run(run.step * length, tuple(segments), np.zeros(count), sticks, settles, run.level)
     return residual[rows].mean(axis=1), columns[rows].mean(axis=1), other
 

@@ -25,7 +25,7 @@ class Zone:
     travel: float
 
 
-STICKS = Zone(*deciding.STICKS)
+STICKS = tuple(Zone(*x) for x in deciding.STICKS)
 SETTLES = Zone(*deciding.SETTLES)
 
 

@@ -109,7 +109,9 @@ def screened(diagnosis: Diagnosis) -> tuple[str, str, str]:
         ]
         for row in rows
     ]
-    every = table("First screening", ["Effect", "At", "Explained", "Score", ""], cells, numeric=(2, 3), wide=False)
+    every = table(
+        "Each effect by itself", ["Effect", "At", "Explained", "Score", ""], cells, numeric=(2, 3), wide=False
+    )
     return "candidates", heading, content + folded(f"All {len(rows)} candidates as a table", every)
 
 

@@ -1,6 +1,5 @@
 """Which effects could be missing, at which places, and the columns each would add to the torque."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, product
 
@@ -10,10 +9,11 @@ from numpy.typing import NDArray
 from ...models.effect import Parameter
 from ...models.effects import effects
 from ...models.floating.tree import n_carriers
-from ...models.model import Model, Placed, places
+from ...models.model import Model, Placed, all_places
 from ..fitting.assembly import Assembly, Evaluation
 from ..fitting.effect_terms import contributions
 from ..fitting.experiment import Experiment
+from ..fitting.problem import reached
 
 Array = NDArray[np.float64]
 
@@ -75,7 +75,7 @@ def library(model: Model) -> list[Placed]:
     for effect in effects().values():
         if effect.at == "link" and model.inertia == "free":
             continue  # the identified inertia already holds whatever a link effect could add
-        spots = places(effect, model.tree)
+        spots = all_places(effect, model.tree)
         if effect.name == "sensor_delay":
             # A torque channel is late or, where the encoder is late, early: one of the two.
             arm = model.joints[n_carriers(model.tree) :]
@@ -83,23 +83,6 @@ def library(model: Model) -> list[Placed]:
             spots = tuple(at for at in other if f"{effect.name}.{other[at]}" not in have)
         found += [Placed(effect, at) for at in spots if f"{effect.name}.{at}" not in have]
     return found
-
-
-def has_whole_law(effects: Sequence[Placed], at: str) -> bool:
-    """Is there a whole friction law among effects at a place, free in every parameter?"""
-    return any(p.effect.name in (SLIDE, "makkar_friction") and p.at == at and not p.hold for p in effects)
-
-
-def refines(model: Model, placed: Placed) -> bool:
-    """Is an effect a curve over the joint's speed, where the model has a whole friction law whose shape it changes?"""
-    curve = placed.effect.name in (*_makkar(), "quadratic_friction")
-    return curve and has_whole_law(model.effects, placed.at)
-
-
-def widens(model: Model, placed: Placed) -> bool:
-    """Is an effect all that the model has at the same link already, and more?"""
-    contained = placed.effect.contains if placed.effect.at == "link" else ()
-    return any(p.at == placed.at and p.effect.name in contained for p in model.effects)
 
 
 def _makkar() -> tuple[str, ...]:
@@ -151,13 +134,12 @@ def candidate_columns(
 ) -> list[tuple[int, Array]]:
     """What a variant adds to each channel it reaches, in the analysis band: (channel, (n_band, k))."""
     placed = variant.placed
-    joint = assembly.joint_of(placed)
     effect = placed.effect
     key = None
-    if effect.at == "joint" and not effect.states and not state.passed.get(joint):
+    if effect.at == "joint" and not effect.states and not any(state.passed.get(c) for c in reached(assembly, placed)):
         key = ("candidate", placed.key, variant.parameters.tobytes(), variant.amplitudes.tobytes())
         if key in experiment.store:
-            return [(joint, experiment.store[key])]
+            return experiment.store[key]
     terms, by_load = _terms(assembly, experiment, state, placed, variant.parameters, not len(variant.amplitudes))
     found = []
     for channel, values, columns in terms:
@@ -167,7 +149,7 @@ def candidate_columns(
                 own = passed(own)
         found.append((channel, experiment.to_band(own, channel)))
     if key is not None and by_load is None:
-        experiment.store[key] = found[0][1]
+        experiment.store[key] = found
     return found
 
 
@@ -181,9 +163,9 @@ def _terms(
 ) -> tuple[list[tuple[int, Array, Array]], Array | None]:
     """What an effect adds beside the model as evaluated, and its derivative by the joint's load."""
     joint = assembly.joint_of(placed)
-    load, reading, speed = state.load[:, joint], state.tau[:, joint], assembly.speed_scales[joint]
+    speed = assembly.speed_scale(placed)
     terms, by_load, _ = contributions(
-        experiment, assembly.tree, placed, joint, load, reading, speed, parameters, assembly.early_alone, bare
+        experiment, assembly.tree, placed, joint, state.load, state.tau, speed, parameters, assembly.early_alone, bare
     )
     return terms, by_load
 

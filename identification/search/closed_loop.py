@@ -23,10 +23,6 @@ from .rest import REST
 
 Array = NDArray[np.float64]
 
-DRIVEN = 0.1
-"""Largest share of a joint's snap (second derivative of acceleration: what a late sensor's column is made of) inside
-the band kept that the unexplained torque could account for."""
-
 LEAST = 4.0
 """The band kept is never narrower than this many times the frequency that holds 90 % of the speed's energy."""
 
@@ -40,7 +36,7 @@ def planned(
     before: Sequence[Experiment] | None = None,
     *,
     others: Sequence[Experiment] = (),
-    driven: float = DRIVEN,
+    driven: float,
 ) -> list[Experiment]:
     """The experiments with every joint's motion low-passed to what was asked of it; torques stay as they are.
 
@@ -56,7 +52,8 @@ def planned(
     others : sequence of Experiment
         Recordings that are low-passed alike and say nothing of the bands; they follow the training recordings.
     driven : float
-        Largest share of a joint's snap that the unexplained torque may account for.
+        Largest share of a joint's snap (second derivative of acceleration: what a late sensor's column is made of)
+        inside the band kept that the unexplained torque may account for.
 
     Returns
     -------
@@ -74,7 +71,7 @@ def planned(
     return [_low_passed(e, bands) for e in (*experiments, *others)]
 
 
-def _bands(found: Fit, experiments: Sequence[Experiment], share: float = DRIVEN) -> Array:
+def _bands(found: Fit, experiments: Sequence[Experiment], share: float) -> Array:
     """Edge of the band kept [Hz] for every joint."""
     assembly, n_joints = found.assembly, experiments[0].measured.shape[1]
     edge = experiments[0].motion.band

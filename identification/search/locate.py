@@ -1,4 +1,4 @@
-"""Where the misfit stands: which channel, when, and in which state of motion (step 3 of a diagnosis)."""
+"""Where the misfit stands: which channel, when, and in which state of motion."""
 
 from collections.abc import Sequence
 

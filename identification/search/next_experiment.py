@@ -1,4 +1,4 @@
-"""The next experiment: a motion that parts what the recordings so far cannot part (step 7 of a diagnosis).
+"""The next experiment: a motion that parts what the recordings so far cannot part.
 
 T-optimality (Atkinson and Fedorov 1975): of two rivals A and B, both fitted to what there is, the best motion is the
 one along which A's torque stays furthest from B's after B has fitted itself to it. Motions are finite Fourier series
@@ -159,7 +159,8 @@ def rivals(model: Model, diagnosis: Diagnosis) -> list[tuple[Placed, Placed]]:
             continue  # of two encoders no torque says which is off
         placed = [p for p in model.effects if (p.effect.name, p.at) == (finding.name, finding.at)]
         for rival in sorted(finding.rivals, key=lambda r: -r.probability):
-            if placed:
+            # No motion parts an effect from what holds it and more.
+            if placed and finding.name not in get_effect(rival.name).contains:
                 pair = placed[0], Placed(get_effect(rival.name), rival.at)
                 (likely if rival.separable else open_).append(pair)
     return open_[:PAIRS] or likely[:1]

@@ -5,8 +5,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..search.choice import BOOTSTRAPS, RivalOdds
-from ..search.passing import ALIKE
+from ..deciding import ALIKE
+from ..evidence.rival import RivalOdds
+from ..reliability import BOOTSTRAPS
 from .comparison import LONG, SLOW, Blocks, variances
 from .fit import Fit
 from .recording import Capture

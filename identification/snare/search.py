@@ -12,7 +12,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...models.model import Model, Placed
-from ..search.choice import RivalOdds
+from ..evidence.rival import RivalOdds
 from .fit import Fit, evaluate, fit, started, with_slopes
 from .library import library, start_of
 from .rivals import weigh

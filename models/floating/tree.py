@@ -27,6 +27,15 @@ class FloatingTree(Tree):
 
     body: str = UNNAMED
 
+    @property
+    def stands(self) -> bool:
+        """Every joint moves the base."""
+        return False
+
+    def sticks(self, joint: int) -> bool:
+        """Nothing holds the base."""
+        return joint >= CARRIERS
+
 
 def floating_tree(arm: FloatingArm, body: str = UNNAMED) -> FloatingTree:
     """Base and arm as one tree."""

@@ -94,6 +94,11 @@ class Rig(Tree):
             for contact in sling.slide:
                 self.tangent_of(sling, contact)
 
+    @property
+    def stands(self) -> bool:
+        """Slings never hang quite still: friction lets go of what it holds, and every joint moves what they carry."""
+        return False
+
     def tangent_of(self, sling: Sling, contact: Array) -> Array:
         """Unit vector (3,) in the link's frame along which a contact slides as the link's joint moves forward."""
         joint = self.joints[sling.link]

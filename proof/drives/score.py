@@ -71,7 +71,8 @@ def asked(folder: Path, limit: float, run: Diagnose) -> dict[str, Any]:
     except InputError as error:
         found = {"verdict": "failed", "effects": [], "notes": [str(error)]}
     seconds = time.perf_counter() - start
-    effects = [{key: e[key] for key in ("name", "at", "probability", "parameters", "rivals")} for e in found["effects"]]
+    kept = ("name", "at", "probability", "margin", "gain", "parameters", "rivals")
+    effects = [{key: e[key] for key in kept if key in e} for e in found["effects"]]
     for effect in effects:
         effect["rivals"] = [
             {key: r[key] for key in ("name", "at", "probability", "separable")} for r in effect["rivals"]

@@ -1,0 +1,74 @@
+"""Vibration that comes and goes: a residual far stronger at some times than its own noise is at most others.
+
+What a model leaves out goes with a state of the arm; a disturbance or a noise is as strong at one time as at another.
+What does neither has no law in the joint's own motion to be named by: how much, when, and how fast is all there is to
+say of it. Its strength is counted in units of the noise K, so that encoders and sticking do not count: the mean of
+e (K⁻¹ e) over a window.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import periodogram
+
+from ..deciding import BURST_LOUD, BURST_SHARE, BURST_WINDOW
+
+Array = NDArray[np.float64]
+
+FEWEST = 12
+"""Windows of which a median says something."""
+
+
+@dataclass(frozen=True)
+class Left:
+    """What is left of one channel of one recording: residual (n,) [T], its part of e' K⁻¹ e (n,), whether a sample is
+    far from rest (n,), period [s]."""
+
+    residual: Array
+    energy: Array
+    moves: NDArray[np.bool_]
+    step: float
+
+
+@dataclass(frozen=True)
+class Bursts:
+    """The share of the residual's energy that is out of the ordinary [0 to 1], its frequency [Hz], and whether it comes
+    again."""
+
+    share: float
+    frequency: float
+    again: bool
+
+
+def bursts(channel: Sequence[Left]) -> Bursts | None:
+    """Whether one channel's residual comes in bursts: `BURST_SHARE` of it above `BURST_LOUD` times the median window.
+
+    Windows count that are at least half in motion, and by that half. It comes again if as much is left without the
+    loudest window: what was there once, as a knock is, could not be held to any law of the arm's.
+    """
+    strength, parts = [], []
+    for own in channel:
+        length = max(round(BURST_WINDOW / own.step), 2)
+        for k in range(0, len(own.residual) - length + 1, length):
+            moves = own.moves[k : k + length]
+            if np.mean(moves) >= 0.5:
+                strength.append(float(np.mean(own.energy[k : k + length][moves])))
+                parts.append((own.residual[k : k + length], 1 / own.step))
+    if len(strength) < FEWEST:
+        return None
+    z = np.maximum(np.array(strength), 0.0)
+    over = np.maximum(z - BURST_LOUD * np.median(z), 0.0)
+    if (share := _share(over, z)) <= BURST_SHARE:
+        return None
+    once = int(np.argmax(z))
+    f, power = periodogram(parts[once][0], parts[once][1], window="hann", nfft=1024)
+    if f[np.argmax(power)] < 1 / BURST_WINDOW:
+        return None  # no window holds a period of it
+    again = _share(np.delete(over, once), np.delete(z, once)) > BURST_SHARE
+    return Bursts(share, float(f[np.argmax(power)]), again)
+
+
+def _share(over: Array, strength: Array) -> float:
+    return float(over.sum() / max(strength.sum(), 1e-300))

@@ -1,0 +1,129 @@
+"""How often a name with some evidence is right: a logistic regression over names whose truth is known.
+
+    p = 1 / (1 + exp(-(level + by_gain log(1 + gain) + by_held log(held))))
+
+``gain`` is a name's log Bayes factor on the training recordings, ``held`` what the held-out ones gain by it in standard
+errors. The three numbers are those of highest likelihood, with a small ridge (le Cessie and van Houwelingen 1992), so
+that names which were never wrong make no certainty; more evidence never makes a name less likely.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from .drives.judge import judge
+
+Array = NDArray[np.float64]
+
+RIDGE = 0.1
+"""Precision of the normal prior of each number, the evidence measured from its mean: they are about 3 at most."""
+
+LEAST_HELD = 1e-3
+"""Held-out gain that stands for any smaller one."""
+
+
+class Row(NamedTuple):
+    """A name that was told: its evidence, whether it was right, and the generator of its case."""
+
+    gain: float
+    held: float
+    right: bool
+    generator: str
+
+
+@dataclass(frozen=True)
+class Counted:
+    """``logit``: level, by_gain, by_held; ``skill``: by generator, the Brier skill of the map that leaves it out
+    against the constant that is its own frequency of right names; None where there is no such map, or nothing to be
+    told."""
+
+    logit: tuple[float, float, float]
+    skill: Mapping[str, float | None]
+
+
+def counted(rows: Sequence[Row]) -> Counted:
+    """The map over all rows, and how well each generator is foretold by the others.
+
+    Raises
+    ------
+    ValueError
+        Without a row, or where an evidence is no number.
+    """
+    if not rows:
+        raise ValueError("no name was told: nothing can be counted; give more cases")
+    skill = {}
+    for name in sorted({r.generator for r in rows}):
+        own, others = [r for r in rows if r.generator == name], [r for r in rows if r.generator != name]
+        skill[name] = _skill(fitted(others), own) if others else None
+    return Counted(fitted(rows), skill)
+
+
+def fitted(rows: Sequence[Row]) -> tuple[float, float, float]:
+    """Level, by_gain and by_held of some rows."""
+    x, right = _evidence(rows), np.array([r.right for r in rows], float)
+    mean = x.mean(axis=0)
+    columns = np.column_stack([np.ones(len(x)), x - mean])
+
+    def cost(w: Array) -> tuple[float, Array]:
+        z = columns @ w
+        value = float(np.sum(np.logaddexp(0.0, z) - right * z) + 0.5 * RIDGE * w @ w)
+        return value, columns.T @ (1 / (1 + np.exp(-z)) - right) + RIDGE * w
+
+    bounds = [(None, None), (0.0, None), (0.0, None)]
+    w = minimize(cost, np.zeros(3), jac=True, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-14, "gtol": 1e-9}).x
+    return float(w[0] - w[1:] @ mean), float(w[1]), float(w[2])
+
+
+def probability(logit: Sequence[float], rows: Sequence[Row]) -> Array:
+    """Of each row (n,)."""
+    return 1 / (1 + np.exp(-(logit[0] + _evidence(rows) @ np.array(logit[1:]))))
+
+
+def _evidence(rows: Sequence[Row]) -> Array:
+    """log(1 + gain) and log(held) (n, 2)."""
+    both = np.array([[r.gain, r.held] for r in rows], float)
+    if not np.isfinite(both).all():
+        raise ValueError("a name's gain or held-out gain is no number")
+    return np.column_stack([np.log1p(np.maximum(both[:, 0], 0.0)), np.log(np.maximum(both[:, 1], LEAST_HELD))])
+
+
+def _skill(logit: Sequence[float], rows: Sequence[Row]) -> float | None:
+    right = np.array([r.right for r in rows], float)
+    constant = float(np.mean((right - right.mean()) ** 2))
+    if not constant > 0:
+        return None
+    return 1 - float(np.mean((probability(logit, rows) - right) ** 2)) / constant
+
+
+def of_effects(effects: Sequence[Mapping[str, Any]], right: Sequence[bool], generator: str) -> list[Row]:
+    """Rows of a case's effects; names of encoders, which have no gain, are left out.
+
+    Raises
+    ------
+    ValueError
+        Where an effect was kept without its gain and margin.
+    """
+    found = []
+    for effect, is_right in zip(effects, right, strict=True):
+        if "gain" not in effect or "margin" not in effect:
+            raise ValueError(f"{effect['name']} at {effect['at']} was kept without gain and margin; diagnose it again")
+        if effect["gain"] is not None:
+            found.append(Row(float(effect["gain"]), float(effect["margin"]), bool(is_right), generator))
+    return found
+
+
+def of_lines(lines: Sequence[Mapping[str, Any]], generator: str = "drives") -> list[Row]:
+    """Rows of what ``python -m proof.drives score`` kept; names that are true of every case's background, and are
+    neither right nor wrong, are left out."""
+    found = []
+    for line in lines:
+        pairs = [(e, t.member) for e, t in zip(line["effects"], judge(line).told, strict=True) if not t.background]
+        try:
+            found += of_effects([e for e, _ in pairs], [right for _, right in pairs], generator)
+        except ValueError as error:
+            raise ValueError(f"{line['case']}: {error}") from None
+    return found
