@@ -14,13 +14,9 @@ from ..files import toml_table
 from ..recordings.cuts import read_cuts
 from ..recordings.mixes import read_signal
 from ..recordings.read import SUFFIXES
-<<<<<<< HEAD
-from ..recordings.signals import FORMS, Signal, is_signal, joint_of
-from .docking.bench_setup import read_bench
-=======
 from ..recordings.signals import FORMS, FREE, Signal, is_signal, joint_of
 from .axes import read_axes
->>>>>>> one
+from .docking.bench_setup import read_bench
 from .effects import get_effect
 from .floating.tree import UNNAMED, n_carriers, read_floating
 from .holding import Holding, read_holding

@@ -1,12 +1,7 @@
 """The names a recording's columns can have, and their SI default units.
 
-<<<<<<< HEAD
-``time``; of a joint ``q qd qdd q_link tau temp``; ``tension.<sling>``; of a body ``pos quat vel omega``; of a wrench
-sensor ``force torque``; ``angle.ring``; ``closed.latches``.
-=======
 ``time``; of a joint ``q qd qdd q_link tau command temp``; ``tension.<sling>``; of a body ``pos quat vel omega``; of a
-wrench sensor ``force torque``; ``angle.ring``.
->>>>>>> one
+wrench sensor ``force torque``; ``angle.ring``; ``closed.latches``.
 """
 
 from collections.abc import Iterable, Mapping
@@ -32,13 +27,8 @@ _SINGLE = {"time": "s", "angle.ring": "rad", "closed.latches": "dimensionless"}
 
 #: How signal names look, for messages.
 FORMS = (
-<<<<<<< HEAD
-    "time, q|qd|qdd|q_link|tau|temp.<joint>, tension.<sling>, pos|vel|omega.<body>.x|y|z, quat.<body>.w|x|y|z, "
-    "force|torque.<sensor>.x|y|z, angle.ring, closed.latches"
-=======
     "time, q|qd|qdd|q_link|tau|command|temp.<joint>, tension.<sling>, pos|vel|omega.<body>.x|y|z, quat.<body>.w|x|y|z, "
-    "force|torque.<sensor>.x|y|z, angle.ring"
->>>>>>> one
+    "force|torque.<sensor>.x|y|z, angle.ring, closed.latches"
 )
 
 

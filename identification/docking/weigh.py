@@ -147,7 +147,7 @@ def weigh(
         ]
         for r, x, row in zip(linear.residuals, linear.columns, own, strict=True)
     ]
-    hypotheses = tuple(pool(named, {})) if named else ()
+    hypotheses = tuple(pool(named, {}, ())) if named else ()
     items = [item for h in hypotheses for item in h.items]
     return Weighed(Evidence(channels, columns, items, len(index)), hypotheses, tuple(noises), tuple(own), linear)
 
@@ -168,7 +168,7 @@ def touching(record: Record, seen: Array) -> NDArray[np.bool_]:
     """Windows (n,) in which balls touch and slide, and those about them: the load on the target changes fast."""
     change = _change(seen)
     loads = [c for c, name in enumerate(record.channels) if name.startswith(("force.", "torque."))]
-    fast = change[:, loads or range(len(record.channels))].max(axis=1) > STICKS[0]
+    fast = change[:, loads or range(len(record.channels))].max(axis=1) > STICKS[0][0]
     return np.logical_or.reduce([np.roll(fast, k) for k in (-1, 0, 1)])
 
 
@@ -176,7 +176,7 @@ def standing(record: Record) -> NDArray[np.bool_]:
     """Windows (n,) in which the carriage stands, and takes any force up to its friction."""
     rate = record.motion.rate[::KNOTS]
     slowest = np.minimum(np.abs(rate[1:]), np.abs(rate[:-1]))
-    return (slowest < STICKS[0] * np.abs(rate).max()) | (rate[1:] * rate[:-1] < 0)
+    return (slowest < STICKS[0][0] * np.abs(rate).max()) | (rate[1:] * rate[:-1] < 0)
 
 
 def hangs(
@@ -218,7 +218,7 @@ def hangs(
             energy = np.convolve(energy, np.ones(2 * ABOUT + 1), "same") / np.maximum(count, 1)
             sticks = np.where(k, np.maximum(np.sqrt(energy), least[c]), 0.0)
             n = len(k)
-            own.append(Run(EVERY, (slice(0, n),), np.zeros(n), sticks, _change(x)[:, c], 1.0))
+            own.append(Run(EVERY, (slice(0, n),), np.zeros(n), (sticks,), _change(x)[:, c], 1.0))
     return found
 
 
