@@ -26,6 +26,7 @@ def assembly(*placed, n_joints=3, blocks=()) -> Any:
         index_of=lambda p: index[p.key],
         scale=lambda p, x: 2.0 * int(p.at[-1]) if x.relative_to else 1.0,
         joint_of=lambda p: int(p.at[-1]) - 1,
+        place_of=lambda p: Made(channels=np.array([0, 2] if p.at == "tie" else [int(p.at[-1]) - 1])),
         tree=Made(joints=range(n_joints), n_joints=n_joints),
         evaluate=lambda *_: Made(blocks=list(blocks)),
         keep=lambda kept, theta: ("kept", [p.key for p in kept], theta),
@@ -55,6 +56,7 @@ def test_shapes_have_the_grids_of_their_free_parameters_in_the_joints_scale():
     ("name", "at", "channels"),
     [
         ("viscous_friction", "joint2", (1,)),
+        ("viscous_friction", "tie", (0, 2)),  # an axis of the first joint and the third
         ("sensor_gain", "tau.joint2", (1,)),
         ("joint_elasticity", "joint2", (0, 1, 2)),  # the link behind it moves all
         ("payload_mass", "link1", (0, 1, 2)),
