@@ -349,7 +349,7 @@ def array(name, reference, *lengths, causality="output"):
 
 def test_arrays_have_a_bound_together_that_is_met_before_anything_is_made():
     """2000 of 100 000 elements took a minute and 1.3 GB; each for itself could be read."""
-    began = time.monotonic()
+    began = time.process_time()
     with pytest.raises(InputError, match=r"x\.fmu: arrays down to 'a1' have 200000 elements together; 100000 can be"):
         read_interface(described(array(f"a{k}", k, 100_000) for k in range(2000)), "x.fmu")
     inputs = [array("u", 0, 50_000, causality="input")]
@@ -358,7 +358,7 @@ def test_arrays_have_a_bound_together_that_is_met_before_anything_is_made():
     with pytest.raises(InputError, match="outputs depend on inputs 5050000 times; 5000000 can be read"):
         read_interface(described([*inputs, *sums], unknown), "x.fmu")
     assert len(read_interface(described([array("y", 0, 100_000)]), "x.fmu").variables) == 100_000
-    assert time.monotonic() - began < 10.0
+    assert time.process_time() - began < 10.0
 
 
 def test_a_text_input_cannot_be_connected_and_needs_not_to_be(files):
