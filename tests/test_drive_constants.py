@@ -39,8 +39,9 @@ def test_a_concealed_constant_is_found_to_within_two_deviations(found):
         assert (p.name, p.unit) == ("gain", "N*m/A")
         assert abs(p.value - true) < 2 * p.std < 0.04 * abs(true)
     levels = [p for p in found.parameters if p.effect == "coulomb_friction"]
-    assert [p.value for p in levels] == pytest.approx(3 * [LEVEL], rel=0.02)
-    assert all(found.fit[f"tau.{j}"]["holdout"]["relative"] < 0.05 for j in GAINS)
+    assert [p.value for p in levels] == pytest.approx(3 * [LEVEL], rel=0.03)
+    # What is left is the arm's disturbance, up to a seventh of the lightest joints' torque.
+    assert all(found.fit[f"tau.{j}"]["holdout"]["relative"] < 0.15 for j in GAINS)
 
 
 def test_what_a_constant_rests_on_is_said(found):

@@ -220,7 +220,7 @@ def test_joints_with_a_second_encoder_that_moves_in_every_recording_are_compared
         "b": table(joint1=3 * ramp, joint2=still),
         "c": table(joint2=still),
     }
-    monkeypatch.setattr(module, "read_recording", lambda path, *_: files[path])
+    monkeypatch.setattr(module, "read_motion", lambda _, path: files[path])
     monkeypatch.setattr(module, "condition", lambda dataset, joints, band: (dataset, joints, band))
     names = ("joint1", "joint2", "joint3")
     tree = SimpleNamespace(joints=[SimpleNamespace(name=n, kind="revolute") for n in names])

@@ -184,7 +184,9 @@ class Projected:
             matrix, seen = matrix * np.outer(self._weight, self._weight), seen * self._weight
             beside = self._weight[:, None] * beside
         self._turned = turned
-        self._low = cholesky(matrix + np.eye(n_always), lower=True)
+        # Sums of columns that differ by many orders of magnitude are positive definite but for their rounding.
+        rounding = 1e-14 * float(np.trace(matrix)) if n_always else 0.0
+        self._low = cholesky(0.5 * (matrix + matrix.T) + (1 + rounding) * np.eye(n_always), lower=True)
         self._seen = solve_triangular(self._low, seen, lower=True)
         self.null = float(-0.5 * (energy - self._seen @ self._seen + log_det) - np.sum(np.log(np.diag(self._low))))
         self._grams: list[Array] = [
