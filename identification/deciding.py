@@ -1,6 +1,6 @@
 """Every number that decides what a diagnosis says, with its unit and why it has the value it has.
 
-A test moves each one by a factor of two and sees an answer change (``tests/test_deciding.py``). Tolerances of solvers
+A test moves each one by a factor of two and sees an answer change (``tests/test_deciding_*.py``). Tolerances of solvers
 stay beside their solver, and what only words or pictures depend on beside those.
 """
 

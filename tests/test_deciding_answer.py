@@ -1,0 +1,102 @@
+"""Numbers of the answer, halved and doubled: what is confirmed, and what cannot be told apart."""
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+from explained import Explained
+from moved_numbers import FACTORS, move, planted
+
+from snarelab.identification.evidence import confirm as confirming
+from snarelab.identification.evidence import rounds
+from snarelab.identification.evidence.evidence import Projected
+from snarelab.identification.evidence.pool import Hypothesis, Item
+from snarelab.identification.evidence.search import Search
+from snarelab.models.effects import get_effect
+from snarelab.models.model import Placed
+
+
+def confirmed(monkeypatch, sure: float) -> bool:
+    name: Any = SimpleNamespace(placed=Placed(get_effect("sensor_bias"), "tau.joint1"))
+    monkeypatch.setattr(confirming, "foretold", lambda *_: None)
+    monkeypatch.setattr(confirming, "_without", lambda model, _: model)
+    monkeypatch.setattr(confirming, "_missed", lambda *_: confirming.Missed(sure, 1.0, (0.1, 0.2), cast(Any, None)))
+    found: Any = SimpleNamespace(names=(name,), model=None, fit=None)
+    return bool(confirming.confirm(found, [], [], {}, lambda _: None).names)
+
+
+def test_a_name_is_confirmed_from_one_standard_error_on(monkeypatch):
+    assert [confirmed(monkeypatch, x) for x in (0.6, 0.99, 1.01, 1.9)] == [False, False, True, True]
+    for factor in FACTORS:
+        with monkeypatch.context() as patch:
+            move(patch, "GATE", factor)
+            assert confirmed(patch, 0.6) is (factor < 1)
+            assert confirmed(patch, 1.9) is (factor < 1)
+
+
+def test_blocks_of_time(monkeypatch):
+    run: Any = SimpleNamespace(motion=SimpleNamespace(band=50.0))
+    x = np.ones(3000)
+    assert len(confirming.blocks(x, run)) == 20
+    for factor, count in zip(FACTORS, (40, 10), strict=True):
+        with monkeypatch.context() as patch:
+            move(patch, "BLOCK", factor)
+            assert len(confirming.blocks(x, run)) == count
+
+
+def rivals(share: float, cosine: float) -> list[bool]:
+    """Can a rival of this share be told apart, whose column stands at this cosine to the name's?"""
+    made = planted(1.0)
+    (x,) = made.columns.parts[0, 0]
+    x[:, 1] = cosine * x[:, 0] + np.sqrt(1 - cosine**2) * x[:, 2]
+    labels = [SimpleNamespace(amplitudes=[0]), SimpleNamespace(amplitudes=[0])]
+    items = [Item(i.index, i.spread, i.positive, False, y) for i, y in zip(made.items[:2], labels, strict=True)]
+    made = Explained(made.pieces, made.columns, items, 0)
+    several = [Hypothesis(f"h{k}", True, (i,), -3.0 * k, f"h{k}") for k, i in enumerate(items)]
+    run = Search(Projected(made.evidence(), (0,)), several)
+    (slot,) = run.answer()
+    object.__setattr__(slot, "shares", np.array([1 - share, share, 0.0]))
+    return [r.separable for r in rounds._rivals(run, slot, np.ones(1))]
+
+
+def test_a_rival_with_a_tenth_of_the_shares_is_not_told_apart(monkeypatch):
+    assert [rivals(x, 0.3) for x in (0.06, 0.099, 0.101, 0.19)] == [[True], [True], [False], [False]]
+    for factor in FACTORS:
+        with monkeypatch.context() as patch:
+            move(patch, "CLASS", factor)
+            assert rivals(0.06, 0.3) == [factor > 1]
+            assert rivals(0.19, 0.3) == [factor > 1]
+
+
+def test_what_adds_the_same_is_alike(monkeypatch):
+    """A cosine beyond twice 0.98 there is none: then nothing is alike, and at half of it too much."""
+    assert [rivals(0.01, x) for x in (0.6, 0.979, 0.981, 1.0)] == [[True], [True], [False], [False]]
+    for factor in FACTORS:
+        with monkeypatch.context() as patch:
+            move(patch, "ALIKE", factor)
+            assert rivals(0.01, 0.6) == [factor > 1]
+            assert rivals(0.01, 0.99) == [factor > 1]
+
+
+def becomes(alike: float) -> bool:
+    """Does a curve become the name whose law can add this share of what it adds?"""
+    made = planted(1.0)
+    (x,) = made.columns.parts[0, 0]
+    x[:, 1] = np.sqrt(alike) * x[:, 0] + np.sqrt(1 - alike) * x[:, 2]
+    labels = [SimpleNamespace(amplitudes=[0])] * 2
+    items = [Item(i.index, i.spread, i.positive, False, y) for i, y in zip(made.items[:2], labels, strict=True)]
+    made = Explained(made.pieces, made.columns, items, 0)
+    several = [Hypothesis("curve", False, (items[0],), -1.0), Hypothesis("name", True, (items[1],), -12.0)]
+    run = Search(Projected(made.evidence(), (0,)), several)
+    slots = run.answer()
+    assert [s.taken.hypothesis for s in slots] == [0]
+    return rounds._as_names(run, slots)[0].taken.hypothesis == 1
+
+
+def test_a_curve_becomes_the_name_that_it_nearly_is(monkeypatch):
+    assert [becomes(x) for x in (0.5, 0.74, 0.76, 0.9)] == [False, False, True, True]
+    for factor in FACTORS:
+        with monkeypatch.context() as patch:
+            move(patch, "NEARLY", factor)
+            assert becomes(0.5) is (factor < 1)
+            assert becomes(0.9) is (factor < 1)
