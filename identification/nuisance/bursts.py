@@ -45,17 +45,18 @@ class Bursts:
 def bursts(channel: Sequence[Left]) -> Bursts | None:
     """Whether one channel's residual comes in bursts: `BURST_SHARE` of it above `BURST_LOUD` times the median window.
 
-    Windows count that are at least half in motion, and by that half. It comes again if as much is left without the
+    A window is so much time in motion, wherever the joint stood between. It comes again if as much is left without the
     loudest window: what was there once, as a knock is, could not be held to any law of the arm's.
     """
     strength, parts = [], []
     for own in channel:
         length = max(round(BURST_WINDOW / own.step), 2)
-        for k in range(0, len(own.residual) - length + 1, length):
-            moves = own.moves[k : k + length]
-            if np.mean(moves) >= 0.5:
-                strength.append(float(np.mean(own.energy[k : k + length][moves])))
-                parts.append((own.residual[k : k + length], 1 / own.step))
+        moving = np.flatnonzero(own.moves)
+        for k in range(0, len(moving) - length + 1, length):
+            window = moving[k : k + length]
+            strength.append(float(np.mean(own.energy[window])))
+            first = max(int(np.median(window)) - length // 2, 0)
+            parts.append((own.residual[first : first + length], 1 / own.step))
     if len(strength) < FEWEST:
         return None
     z = np.maximum(np.array(strength), 0.0)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize
 
-from ..deciding import WANDER_PRIOR, WANDER_TIMES
+from ..deciding import ODDS_OF_CURVES, WANDER_PRIOR, WANDER_TIMES
 from .covariance import Covariance, Remembering
 
 Array = NDArray[np.float64]
@@ -69,8 +69,8 @@ class Noise:
 
     @property
     def log_prior(self) -> float:
-        """Of its wander."""
-        return -WANDER_PRIOR * self.wander / self.unit
+        """Of its wander, which has prior odds as whatever else has no name."""
+        return float(np.log(ODDS_OF_CURVES)) - WANDER_PRIOR * self.wander / self.unit if self.wander else 0.0
 
     def covariance(self, run: Run) -> Covariance:
         """K of a recording."""
