@@ -47,11 +47,10 @@ class Weighed:
     bare: Callable[[int], Noise]
     """A channel's noise where nothing is missing."""
 
-    def with_noise(self, c: int, noise: Noise) -> "Weighed":
-        """The same with another noise of one channel."""
-        covariances = [noise.covariance(row[c]) for row in self.runs]
+    def with_noise(self, c: int, noise: Noise, alone: Evidence) -> "Weighed":
+        """The same with another noise of one channel, whose evidence by itself has it already."""
         noises = tuple(noise if k == c else x for k, x in enumerate(self.noises))
-        return replace(self, evidence=self.evidence.with_covariances(c, covariances), noises=noises)
+        return replace(self, evidence=self.evidence.with_channel(c, alone), noises=noises)
 
 
 def torque_scale(train: Sequence[Experiment]) -> Array:

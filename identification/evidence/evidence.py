@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 
 from ..nuisance.covariance import Covariance
-from .pool import Columns, Item
+from .pool import Columns, Hypothesis, Item
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int_]
@@ -98,6 +98,32 @@ class Evidence:
         other._made = {key: x for key, x in self._made.items() if key[1] != c}
         for i, covariance in enumerate(covariances):
             other.channels[i][c] = replace(self.channels[i][c], covariance=covariance)
+        return other
+
+    def alone(self, c: int, pool: Sequence[Hypothesis]) -> "tuple[Evidence, list[Hypothesis], Index]":
+        """One channel by itself: its evidence, the hypotheses that reach it, and which always stand beside it."""
+        always = np.unique(np.concatenate([row[c].index for row in self.channels]))
+        at = self.where[c]
+        kept = [h for h in pool if at[h.items[0].index[0]] >= 0]
+        own = [replace(h, items=tuple(replace(x, index=at[x.index]) for x in h.items)) for h in kept]
+        other = copy(self)
+        other.channels = [[replace(row[c], index=np.searchsorted(always, row[c].index))] for row in self.channels]
+        other.items = tuple(x for h in own for x in h.items)
+        other.n_always, other.n_columns = len(always), len(self.numbers[c])
+        other._pools = [[row[c]] for row in self._pools]
+        other.numbers = [np.arange(other.n_columns)]
+        other.where = [np.arange(other.n_columns)]
+        other._made = {(i, 0): x for (i, k), x in self._made.items() if k == c}
+        return other, own, always
+
+    def with_channel(self, c: int, alone: "Evidence") -> "Evidence":
+        """The same with one channel as it became by itself: another covariance, and its products."""
+        other = copy(self)
+        other.channels = [list(row) for row in self.channels]
+        other._made = {key: x for key, x in self._made.items() if key[1] != c}
+        for i, row in enumerate(alone.channels):
+            other.channels[i][c] = replace(self.channels[i][c], covariance=row[0].covariance)
+        other._made |= {(i, c): x for (i, _), x in alone._made.items()}
         return other
 
     def energy(self, i: int, c: int) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 from ..deciding import TOLERANCES
 from ..nuisance.noise import Noise
 from .arm import Weighed
-from .evidence import Projected
+from .evidence import Evidence, Projected
 from .search import Search, Slot, Taken
 
 
@@ -35,13 +35,36 @@ def searched(
     masses = weighed.beside.tolerant
     tolerances = TOLERANCES if masses.stop > masses.start else TOLERANCES[:1]
     best = max((_best(weighed, recordings, barred, x) for x in tolerances), key=lambda b: b.value)
+    before = weighed
     for c in sorted(channels):
-        for noise in _others(weighed, c, best):
-            other = weighed.with_noise(c, noise(weighed.noises[c]))
-            tried = _best(other, recordings, barred, best.tolerance, best.taken)
-            if tried.value > best.value:
-                weighed, best = other, tried
+        weighed = _chosen(weighed, c, best, recordings, barred)
+    if weighed is not before:
+        best = _best(weighed, recordings, barred, best.tolerance)
     return weighed, best.search, best.search.answer(), best.tolerance
+
+
+def _chosen(weighed: Weighed, c: int, best: _Best, recordings: Sequence[int], barred: Collection[str]) -> Weighed:
+    """The noise of one channel that is likeliest beside the best set of explanations of that channel by itself."""
+    changes = _others(weighed, c, best)
+    if not changes:
+        return weighed
+    alone, pool, always = weighed.evidence.alone(c, weighed.pool)
+    out = {h for h, x in enumerate(pool) if x.key in barred}
+    weight = weighed.beside.weight(best.tolerance)[always]
+
+    def value(evidence: Evidence, noise: Noise) -> float:
+        search = Search(Projected(evidence, recordings, weight), pool, out)
+        return noise.log_prior + search.on.null + (search.run((), exchange=False)[0] if pool else 0.0)
+
+    own = weighed.noises[c]
+    first = most = value(alone, own)
+    for change in changes:
+        noise = change(own)
+        other = alone.with_covariances(0, [noise.covariance(row[c]) for row in weighed.runs])
+        tried = value(other, noise)
+        if tried > most:
+            own, alone, most = noise, other, tried
+    return weighed.with_noise(c, own, alone) if most > first else weighed
 
 
 def _others(weighed: Weighed, c: int, best: _Best) -> list[Callable[[Noise], Noise]]:
@@ -57,16 +80,10 @@ def _others(weighed: Weighed, c: int, best: _Best) -> list[Callable[[Noise], Noi
     return changes
 
 
-def _best(
-    weighed: Weighed,
-    recordings: Sequence[int],
-    barred: Collection[str],
-    tolerance: float,
-    start: Sequence[Taken] = (),
-) -> _Best:
-    """The best set that simple moves reach from a start."""
+def _best(weighed: Weighed, recordings: Sequence[int], barred: Collection[str], tolerance: float) -> _Best:
+    """The best set that simple moves reach from nothing."""
     out = {h for h, x in enumerate(weighed.pool) if x.key in barred}
     search = Search(Projected(weighed.evidence, recordings, weighed.beside.weight(tolerance)), weighed.pool, out)
-    gained, taken = search.run(start, exchange=False) if weighed.pool else (0.0, [])
+    gained, taken = search.run((), exchange=False) if weighed.pool else (0.0, [])
     prior = sum(x.log_prior for x in weighed.noises)
     return _Best(prior + search.on.null + gained, search, tuple(taken), tolerance)
