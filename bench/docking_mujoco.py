@@ -64,6 +64,7 @@ class Truth:
     ring: float = 0.15
     slack: float = 0.015
     cable: tuple[float, float] = (4e5, 2000.0)
+    damping: float = 0.6  # of contacts, as a ratio
 
 
 @dataclass
@@ -199,7 +200,7 @@ def harden(model: Any, truth: Truth) -> None:
         else:
             a, k = float(model.body_invweight0[body][0]), truth.stiffness
         pace = k * (1 - IMPEDANCE) * a
-        model.geom_solref[g] = [-pace, -2 * 0.6 * np.sqrt(pace)]
+        model.geom_solref[g] = [-pace, -2 * truth.damping * np.sqrt(pace)]
         model.geom_solimp[g] = [IMPEDANCE, IMPEDANCE, 1e-3, 0.5, 2]
 
 
