@@ -50,7 +50,7 @@ def test_momentum_and_energy_are_kept_to_the_latch(hover):
     assert momentum_drift(hover) < 1e-9
     ledger = energies(hover)
     assert ledger["motors"].max() > 30.0
-    assert np.abs(ledger["residual"]).max() < 2e-3 * ledger["motors"].max()
+    assert np.abs(ledger["residual"]).max() < 1e-4 * ledger["motors"].max()
     for name in ("lost in screw and carriage", "lost in cables", "lost in joints"):
         assert (np.diff(ledger[name]) > -1e-6).all()
 
