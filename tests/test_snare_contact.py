@@ -115,7 +115,7 @@ def contact_energy(q, v, fixed, moving):
 @pytest.mark.parametrize("overlap", [6e-5, 1e-4, 3e-4])
 def test_the_contacts_force_is_the_slope_of_its_energy(overlap):
     """Pressed with up to 5 kN, between two nodes of a cable that is bent and pulled: the docking's preload."""
-    q, v, fixed, moving = touching_state(0, overlap)
+    _, v, fixed, moving = touching_state(0, overlap)
     smooth = law_constants(P.with_values(friction=0.0, contact_damping=0.0, cable_pretension=2000.0))
     fixed = (*fixed[:5], smooth, *fixed[6:])
     positions, still = fixed[0].reshape(-1, 3), np.zeros((66, 3))

@@ -81,7 +81,8 @@ def giving_up(name):
     """A table whose state gives up after a moment, for where its own timeout leads; the rest is the program's."""
     states = dict(TABLE.states)
     state = states[name]
-    states[name] = dataclasses.replace(state, leave=(), after=9.0 if name == TABLE.start else 1.0)
+    after = {TABLE.start: 9.0, "PRELOAD": 6.0}.get(name, 1.0)  # PRELOAD: under its whole load
+    states[name] = dataclasses.replace(state, leave=(), after=after)
     assert states[name].timeout in WAY_OUT
     if name == "BACK_OFF":  # comes where a ball does not find its seat, which here all do
         states["SEAT"] = dataclasses.replace(states["SEAT"], leave=(), after=1.0, timeout=name)
