@@ -4,7 +4,7 @@ BIN := .venv/bin
 SOURCES := $(shell git ls-files --cached --others --exclude-standard '*.py' '*.toml' '*.urdf' '*.csv' '*.json' '*.c' '*.h' 'fmu/c/*.txt' 2>/dev/null | grep -v -e '^tests/' -e '^bench/' -e '^proof/')
 STUDIES := emps kuka bam tx40 cart free-floating ground-capture zero-g-rig orbit-inspection orbit-hover orbit-abort tolerance
 
-BENCHES := torque friction_fit diagnosis fast floating cosim fmu snare ecos_inspection tolerance
+BENCHES := torque friction_fit diagnosis joints fast floating cosim fmu snare ecos_inspection tolerance
 
 .PHONY: help demo test test-slow check studies bench accuracy fuzz kills hostile mutants proof ledger fmus docs clean $(STUDIES:%=study-%)
 

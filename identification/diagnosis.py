@@ -193,39 +193,41 @@ class Diagnosis:
     checks: tuple[Check, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
-        """The published form: plain dicts, lists, numbers and text."""
-        return {
-            "verdict": self.verdict,
-            "sentence": self.sentence,
-            "description": self.description,
-            "model": self.model,
-            "checks": [c.to_json() for c in self.checks],
-            "effects": [_finding(e) for e in self.effects],
-            "location": [
-                {
-                    "channel": p.channel,
-                    "share": p.share,
-                    "time_windows": [list(w) for w in p.time_windows],
-                    "where": p.where,
-                }
-                for p in self.location
-            ],
-            "fit": {
-                f.channel: {
-                    "train": vars(f.train),
-                    "holdout": vars(f.holdout),
-                    "noise_floor": f.noise_floor,
-                    "unit": f.unit,
-                }
-                for f in self.fit
-            },
-            "steps": [vars(s) for s in self.steps],
-            "candidates": [vars(c) for c in self.candidates],
-            "moved": [_published(m) for m in self.moved],
-            "limits": [vars(x) for x in self.limits],
-            "notes": list(self.notes),
-            "band": {"value": self.band, "unit": "Hz"},
-        }
+        """The published form: plain dicts, lists, numbers and text. JSON has no infinity: what is unknown is null."""
+        return _finite(
+            {
+                "verdict": self.verdict,
+                "sentence": self.sentence,
+                "description": self.description,
+                "model": self.model,
+                "checks": [c.to_json() for c in self.checks],
+                "effects": [_finding(e) for e in self.effects],
+                "location": [
+                    {
+                        "channel": p.channel,
+                        "share": p.share,
+                        "time_windows": [list(w) for w in p.time_windows],
+                        "where": p.where,
+                    }
+                    for p in self.location
+                ],
+                "fit": {
+                    f.channel: {
+                        "train": vars(f.train),
+                        "holdout": vars(f.holdout),
+                        "noise_floor": f.noise_floor,
+                        "unit": f.unit,
+                    }
+                    for f in self.fit
+                },
+                "steps": [vars(s) for s in self.steps],
+                "candidates": [vars(c) for c in self.candidates],
+                "moved": [vars(m) for m in self.moved],
+                "limits": [vars(x) for x in self.limits],
+                "notes": list(self.notes),
+                "band": {"value": self.band, "unit": "Hz"},
+            }
+        )
 
 
 def _finding(finding: Finding) -> dict[str, Any]:
@@ -235,12 +237,16 @@ def _finding(finding: Finding) -> dict[str, Any]:
         "margin": finding.margin,
         "gain": finding.gain,
         "probability": finding.probability,
-        "parameters": {name: _published(p) for name, p in finding.parameters.items()},
+        "parameters": {name: vars(p) for name, p in finding.parameters.items()},
         "evidence": finding.evidence,
         "rivals": [vars(r) for r in finding.rivals],
     }
 
 
-def _published(estimate: Estimate | Moved) -> dict[str, Any]:
-    """Fields by name; JSON has no infinity, so an unknown standard deviation is null."""
-    return vars(estimate) | {"std": estimate.std if np.isfinite(estimate.std) else None}
+def _finite(content: Any) -> Any:
+    """The same with null in place of numbers that are none."""
+    if isinstance(content, dict):
+        return {key: _finite(x) for key, x in content.items()}
+    if isinstance(content, list | tuple):
+        return [_finite(x) for x in content]
+    return None if isinstance(content, float) and not np.isfinite(content) else content

@@ -20,7 +20,9 @@ def confirmed(monkeypatch, sure: float) -> bool:
     name: Any = SimpleNamespace(placed=Placed(get_effect("sensor_bias"), "tau.joint1"))
     monkeypatch.setattr(confirming, "foretold", lambda *_: None)
     monkeypatch.setattr(confirming, "_without", lambda model, _: model)
-    monkeypatch.setattr(confirming, "_missed", lambda *_: confirming.Missed(sure, 1.0, (0.1, 0.2), cast(Any, None)))
+    monkeypatch.setattr(
+        confirming, "_missed", lambda *_: confirming.Missed(sure, 1.0, 0.2, (0.1, 0.2), cast(Any, None))
+    )
     found: Any = SimpleNamespace(names=(name,), model=None, fit=None)
     return bool(confirming.confirm(found, [], [], {}, lambda _: None).names)
 

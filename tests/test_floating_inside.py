@@ -28,7 +28,6 @@ def identified(folder, name, **inside):
     return {p["name"]: p for p in found["parameters"]}
 
 
-@pytest.mark.xfail(strict=True, reason="the one evidence names inertia errors in the tank's place")
 def test_propellant_slosh_is_named(tmp_path):
     got, fits = named(tmp_path, "propellant_slosh", tank=Tank(40.0, PLACE, 0.25, 0.05))
     # The bar is 15 %; what is seen is below 1 %, since the law leaves nothing out.

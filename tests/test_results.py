@@ -1,5 +1,6 @@
 """How results print and show themselves in a notebook, and what they pass on, from small invented answers."""
 
+import json
 import re
 from dataclasses import FrozenInstanceError, replace
 from html import unescape
@@ -51,6 +52,14 @@ def test_a_diagnosis_hands_out_what_it_holds():
     assert (one.verdict, one.sentence, one.steps) == ("missing_physics", "It is so & so.", STEPS)
     assert (one.effects, one.fit) == (SAID.effects, SAID.fit)
     assert one.to_json()["sentence"] == "It is so & so."
+
+
+def test_json_has_null_for_what_is_no_number():
+    """At a low band a channel was left without a sample, and its floor was infinite: the file could not be written."""
+    nothing = replace(spelt("x"), steps=(Step("as given", float("inf"), float("nan")),))
+    content = DiagnosisResult(nothing, MODEL).to_json()
+    assert content["steps"] == [{"label": "as given", "train": None, "holdout": None}]
+    assert json.loads(json.dumps(content, allow_nan=False)) == content
 
 
 def test_a_diagnosis_shows_verdict_steps_cards_and_notes():

@@ -72,6 +72,7 @@ def weigh(
     runs: list[list[Run]] | None = None,
     search: bool = True,
     nameless: Mapping[tuple[int, str], float] | None = None,
+    tuned: Mapping[str, Array] | None = None,
 ) -> Weighed:
     """Recordings under a fit.
 
@@ -92,10 +93,12 @@ def weigh(
         False leaves out all hypotheses: only the evidence of the fit itself is wanted.
     nameless : mapping of (channel, words) to float, optional
         Sizes of nameless curves that stand beside every explanation.
+    tuned : mapping of str to array, optional
+        Parameters of laws that were fitted by themselves.
     """
     assembly = found.assembly
     states = [assembly.evaluate(e, found.theta) for e in instruments]
-    along = Along(model, assembly, instruments, states, n_train, torque_scale(experiments[:n_train]))
+    along = Along(model, assembly, instruments, states, n_train, torque_scale(experiments[:n_train]), tuned or {})
     columns = Columns([len(e.measured) for e in experiments])
     nameless = nameless or {}
     by_words = curves(along, scales, columns, small=not search, more={words for _, words in nameless})

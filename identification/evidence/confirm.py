@@ -37,11 +37,12 @@ class Foretold:
 
 @dataclass(frozen=True)
 class Missed:
-    """What the held-out recordings lose without an effect: log density, its scatter, relative errors with and without
-    on the channel that misses it most, and the fit without."""
+    """What the held-out recordings lose without an effect: log density and its scatter; how far the two models' torques
+    are apart [RMS, share of the channel's]; relative errors with and without; and the fit without."""
 
     gain: float
     scatter: float
+    size: float
     trial: tuple[float, float]
     fit: Fit
 
@@ -51,12 +52,6 @@ class Missed:
         return self.gain / max(self.scatter, 1e-12)
 
     @property
-    def size(self) -> float:
-        """RMS torque that is missed, by what it adds to the error [share of the channel's RMS torque]."""
-        with_it, without_it = self.trial
-        return float(np.sqrt(max(without_it**2 - with_it**2, 0.0)))
-
-    @property
     def told(self) -> bool:
         """Whether it is missed beyond its scatter, and as more than any model has wrong."""
         return self.sure > GATE and self.size >= DISCREPANCY
@@ -64,7 +59,9 @@ class Missed:
 
 @dataclass(frozen=True)
 class Confirmed:
-    """Names that the held-out recordings confirmed and did not, what they miss of each, and the fit of what is left."""
+    """Names that the held-out recordings confirmed and did not, what they miss of each, and the fit of what is left.
+
+    What is missed, but is less than any model has wrong, is neither."""
 
     found: Found
     names: tuple[Name, ...]
@@ -106,13 +103,15 @@ def confirm(
             continue
         weakest = min(left, key=lambda k: (missed[k].told, missed[k].sure))
         if not missed[weakest].told and weakest not in stale:
-            rejected.append(left.pop(weakest))
-            weak[weakest] = missed.pop(weakest)
-            final = weak[weakest].fit
+            out, gone = left.pop(weakest), missed.pop(weakest)
+            final = gone.fit
+            if gone.sure <= GATE:
+                rejected.append(out)
+                weak[weakest] = gone
             model = _without(model, weakest)
             whole = foretold(model, final, found, train, held, scales)
             stale = set(left)
-            progress(f"confirming on the held-out recordings: {len(rejected)} not missed, {len(left)} left")
+            progress(f"confirming on the held-out recordings: {out.placed.key} is not missed, {len(left)} left")
     names = tuple(sorted(left.values(), key=lambda n: -missed[n.placed.key].size))
     return Confirmed(found, names, tuple(rejected), weak, missed, model, final, whole)
 
@@ -182,6 +181,15 @@ def _missed(
     c = list(name.channels)
     with_it, measured = channel_rms(final.assembly, held, final.theta)
     rms, _ = channel_rms(rest.assembly, held, rest.theta)
-    worst = c[int(np.argmax(rms[c] / measured[c] - with_it[c] / measured[c]))]
+    apart = _apart(final, rest, held)
+    worst = c[int(np.argmax(apart[c] / measured[c]))]
     trial = float(with_it[worst] / measured[worst]), float(rms[worst] / measured[worst])
-    return Missed(whole.density - other.density, scatter(0.5 * (other.blocks - whole.blocks)), trial, rest)
+    size = float(apart[worst] / measured[worst])
+    return Missed(whole.density - other.density, scatter(0.5 * (other.blocks - whole.blocks)), size, trial, rest)
+
+
+def _apart(one: Fit, other: Fit, held: Sequence[Experiment]) -> Array:
+    """RMS difference of two models' torques on some recordings, in the analysis band (J,)."""
+    torques = [[e.all_to_band(x.assembly.torque(e, x.theta)) for e in held] for x in (one, other)]
+    counted = np.maximum(np.sum([e.counted for e in held], axis=0), 1)
+    return np.sqrt(np.sum((np.concatenate(torques[0]) - np.concatenate(torques[1])) ** 2, axis=0) / counted)

@@ -7,6 +7,7 @@ masses, small curves. With S = K + A A' a hypothesis is H = C' S⁻¹ C and g = 
 nothing is ½ g' (H + κ⁻²)⁻¹ g - ½ log det(1 + κ² H). Letters: n samples, m columns, P parameters beside.
 """
 
+import functools
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
@@ -189,8 +190,10 @@ class Projected:
         self._low = cholesky(0.5 * (matrix + matrix.T) + (1 + rounding) * np.eye(n_always), lower=True)
         self._seen = solve_triangular(self._low, seen, lower=True)
         self.null = float(-0.5 * (energy - self._seen @ self._seen + log_det) - np.sum(np.log(np.diag(self._low))))
+        # Of one recording, they are its own, which many searches share.
         self._grams: list[Array] = [
-            np.sum([evidence.products(i, c).gram for i in recordings], axis=0) for c in range(len(evidence.where))
+            functools.reduce(np.add, [evidence.products(i, c).gram for i in recordings])
+            for c in range(len(evidence.where))
         ]
         self.beside_all = solve_triangular(self._low, beside, lower=True)
         self.score_all = score - self.beside_all.T @ self._seen

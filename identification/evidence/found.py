@@ -75,6 +75,8 @@ class Found:
     search: Search
     instruments: tuple[Experiment, ...]
     tolerance: float
+    tuned: Mapping[str, Array]
+    """Parameters of every law that rings, by its key, fitted by itself."""
 
     @property
     def nameless(self) -> dict[tuple[int, str], float]:

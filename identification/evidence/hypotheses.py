@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from math import factorial
 
@@ -17,7 +17,7 @@ from ..deciding import BENDS, ELSEWHERE, ODDS_OF_CURVES, ODDS_OF_NAMES, SLOPE
 from ..fitting.assembly import Assembly, Evaluation
 from ..fitting.experiment import Experiment, Scales
 from ..nuisance.curve import SMALL, Coordinates, family
-from ..search.candidates import Variant, candidate_columns, library, reduced, variants
+from ..search.candidates import MOST_OF_WHOLE, Variant, candidate_columns, library, reduced, variants
 from .pool import Columns, Hypothesis, Item
 
 Array = NDArray[np.float64]
@@ -28,6 +28,9 @@ MOST_GRID = 16
 
 FINE = 12
 """Points from which on a grid over one shape follows the law so finely that no curve need ride along."""
+
+SMALL_STEP = 0.02
+"""Relative change of a parameter from which its slope is taken."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +44,8 @@ class Along:
     n_train: int
     scale: Array
     """RMS torque of each channel in the training recordings (J,)."""
+    tuned: Mapping[str, Array] = field(default_factory=dict)
+    """Parameters of laws that were fitted by themselves, by their key: a point more of their grid."""
 
 
 def curves(
@@ -171,7 +176,8 @@ def _items(along: Along, p: Placed, by_words: Curves, columns: Columns) -> list[
             for bend in BENDS:
                 more = np.concatenate([at, bent.index]), np.concatenate([spread, bend * bent.spread])
                 items.append(Item(*more, np.concatenate([positive, free]), whole, some))
-    return items
+    fitted = _fitted(along, p, columns) if p.key in along.tuned else None
+    return items if fitted is None else [*items, fitted]
 
 
 def remembers(p: Placed) -> bool:
@@ -215,6 +221,32 @@ def _grid(assembly: Assembly, p: Placed) -> tuple[list[Variant], bool]:
         middle[i] = 2 / (1 / a.parameters[i] + 1 / b.parameters[i])
         finer += [replace(a, parameters=middle), b]
     return finer, True
+
+
+def rings(p: Placed) -> bool:
+    """Has a law a frequency of its own that no joint's motion tells: a tank, a boom on the base?"""
+    return bool(p.effect.states) and p.effect.at == "base"
+
+
+def _fitted(along: Along, p: Placed, columns: Columns) -> Item | None:
+    """A law at the parameters that it was fitted to by itself, and what each parameter's own size more would add."""
+    none = np.zeros(0, int)
+    v = Variant(p, along.tuned[p.key], none, np.zeros(1), np.full(1, MOST_OF_WHOLE))
+    parts = _made(along, v)
+    size = None if parts is None else _size(along, parts)
+    if parts is None or size is None or size[0] <= 1e-12:
+        return None
+    every = {c: [[x] for x in own] for c, own in parts.items()}
+    for i in np.flatnonzero(v.parameters):
+        changed = v.parameters.copy()
+        changed[i] *= 1 + SMALL_STEP
+        other = _made(along, replace(v, parameters=changed))
+        if other is not None:
+            for c, own in every.items():
+                for some, x, y in zip(own, parts[c], other[c], strict=True):
+                    some.append((y - x) / SMALL_STEP)
+    index = columns.add({c: [np.hstack(some) for some in own] for c, own in every.items()})
+    return Item(index, np.full(len(index), 1 / size[0]), np.arange(len(index)) == 0, label=v)
 
 
 def _made(along: Along, v: Variant) -> dict[int, list[Array]] | None:

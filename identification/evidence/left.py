@@ -32,7 +32,6 @@ def remainders(found: Found, train: Sequence[Experiment], held: Sequence[Experim
     """Nameless curves of the last search that the held-out recordings confirm."""
     n, search, slots = len(train), found.search, found.slots
     evidence = search.on.evidence
-    J = len(found.weighed.scale)
     both = Projected(evidence, range(n + len(held)), found.weighed.beside.weight(found.tolerance))
 
     def beside(some: Sequence[int]) -> tuple[float, Array]:
@@ -65,12 +64,13 @@ def remainders(found: Found, train: Sequence[Experiment], held: Sequence[Experim
         kept.remove(weak)
         made = {}
     # What is less than any model has wrong is not told.
-    rms = np.sqrt([np.mean(np.concatenate([row[c].residual for row in evidence.channels[:n]]) ** 2) for c in range(J)])
-    told = [
-        r
-        for r in made.values()
-        if np.sqrt(r.explained) * rms[r.channel] >= DISCREPANCY * found.weighed.scale[r.channel]
-    ]
+    members = Members(search.on, [(slots[k].taken.item, slots[k].taken.size) for k in made])
+    told = []
+    for k, remainder in made.items():
+        item, c = slots[k].taken.item, remainder.channel
+        own = [evidence.contribution(i, c, evidence.items[item], members.of(item)) for i in range(n)]
+        if np.sqrt(np.mean(np.concatenate(own) ** 2)) >= DISCREPANCY * found.weighed.scale[c]:
+            told.append(remainder)
     return tuple(sorted(told, key=lambda r: -r.explained))
 
 

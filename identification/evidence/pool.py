@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -54,6 +55,8 @@ class Columns:
     count: int = 0
     parts: dict[tuple[int, int], list[Array]] = field(default_factory=dict)
     numbers: dict[int, list[NDArray[np.int_]]] = field(default_factory=dict)
+    stacked: dict[tuple[int, int], Array] = field(default_factory=dict)
+    """Once asked for, side by side; ``parts`` are views of them."""
 
     def add(self, own: Mapping[int, Sequence[Array]]) -> NDArray[np.int_]:
         """Enter columns: for each channel one array (n, k) a recording, of the same k everywhere; their numbers."""
@@ -70,7 +73,12 @@ class Columns:
         """Numbers (m,) and columns (n, m) of a channel."""
         if channel not in self.numbers:
             return np.zeros(0, int), np.zeros((0, 0))
-        return np.concatenate(self.numbers[channel]), np.concatenate(self.parts[recording, channel], axis=1)
+        key, numbers = (recording, channel), np.concatenate(self.numbers[channel])
+        if key not in self.stacked or self.stacked[key].shape[1] < len(numbers):
+            whole = self.stacked[key] = np.concatenate(self.parts[key], axis=1)
+            edges = np.cumsum([0, *(x.shape[1] for x in self.parts[key])])
+            self.parts[key] = [whole[:, a:b] for a, b in pairwise(edges)]
+        return numbers, self.stacked[key]
 
     def has(self, channel: int, number: int) -> bool:
         """Is a column one of a channel's?"""

@@ -11,13 +11,13 @@ from ..deciding import ALIKE, CLASS, DRIVEN, LAW_ERROR, NEARLY, ROUNDS
 from ..fitting.base_parameters import BaseParameters
 from ..fitting.experiment import Experiment, Scales
 from ..fitting.fit import Fit, fit
-from ..search.candidates import free_parameters
+from ..search.candidates import free_parameters, library
 from ..search.closed_loop import planned
 from ..search.refit import assemble, refitted
 from ..search.rest import fitted
 from .arm import Weighed, weigh
 from .found import Found, Name, Trial
-from .hypotheses import remembers
+from .hypotheses import remembers, rings
 from .members import Members, log_bayes
 from .rival import RivalOdds
 from .search import Search, Slot, Taken
@@ -69,13 +69,14 @@ def search(
     noises = before.weighed.noises if before is not None else None
     opening: Weighed | None = None
     trials: tuple[Trial, ...] = before.trials if before is not None else ()
+    tuned = _tuned(model, base, scales, train, first, seed) if before is None else before.tuned
     channels = None if before is None else _reached_by(before.opening, barred)
     for number in range(1, ROUNDS + 1):
         progress(f"round {number}: weighing each effect at each place")
         if number == 1 and before is not None:
             weighed = before.opening
         else:
-            weighed = weigh(model, found, both, instruments, n, scales, noises)
+            weighed = weigh(model, found, both, instruments, n, scales, noises, tuned=tuned)
         weighed, made, slots, tolerance = searched(
             weighed, range(n), barred, range(len(weighed.noises)) if channels is None else channels
         )
@@ -110,8 +111,7 @@ def search(
         model = model.with_effects(placed, start)
         progress("refitting with " + ", ".join(f"{p.effect.name} at {p.at}" for p in placed))
         assembly = assemble(model, base, scales)
-        rings = any(p.effect.at == "base" and p.effect.states for p in placed)
-        found = refitted(found, assembly, fitted(assembly, train), rings, seed)
+        found = refitted(found, assembly, fitted(assembly, train), any(rings(p) for p in placed), seed)
         instruments = planned(found, train, instruments, others=held, driven=DRIVEN)
     assert opening is not None
     return Found(
@@ -127,7 +127,27 @@ def search(
         made,
         tuple(instruments),
         tolerance,
+        tuned,
     )
+
+
+def _tuned(
+    model: Model,
+    base: BaseParameters | None,
+    scales: Mapping[str, Scales],
+    train: Sequence[Experiment],
+    first: Fit,
+    seed: int,
+) -> dict[str, Array]:
+    """Parameters of every law that rings, fitted on top of the baseline by itself: between two points of a grid over
+    its frequency it explains nothing."""
+    found = {}
+    for p in library(model):
+        if rings(p):
+            assembly = assemble(model.with_effects([p], {}), base, scales)
+            alone = refitted(first, assembly, fitted(assembly, train), True, seed)
+            found[p.key] = alone.theta[assembly.index_of(p)]
+    return found
 
 
 def _error_of_laws(opening: Weighed, weighed: Weighed) -> Array:

@@ -20,6 +20,9 @@ Array = NDArray[np.float64]
 FEWEST = 12
 """Windows of which a median says something."""
 
+LEAST = 0.25
+"""Share of a window in motion of which a mean says something."""
+
 
 @dataclass(frozen=True)
 class Left:
@@ -45,28 +48,30 @@ class Bursts:
 def bursts(channel: Sequence[Left]) -> Bursts | None:
     """Whether one channel's residual comes in bursts: `BURST_SHARE` of it above `BURST_LOUD` times the median window.
 
-    Windows count that are at least half in motion, and by that half. It comes again if as much is left without the
-    loudest window: what was there once, as a knock is, could not be held to any law of the arm's.
+    A window counts by the time in motion in it. It comes again if as much is left without the loudest window: what was
+    there once, as a knock is, could not be held to any law of the arm's.
     """
-    strength, parts = [], []
+    strength, weight, parts = [], [], []
     for own in channel:
         length = max(round(BURST_WINDOW / own.step), 2)
         for k in range(0, len(own.residual) - length + 1, length):
             moves = own.moves[k : k + length]
-            if np.mean(moves) >= 0.5:
+            if np.mean(moves) >= LEAST:
                 strength.append(float(np.mean(own.energy[k : k + length][moves])))
+                weight.append(float(np.mean(moves)))
                 parts.append((own.residual[k : k + length], 1 / own.step))
     if len(strength) < FEWEST:
         return None
-    z = np.maximum(np.array(strength), 0.0)
-    over = np.maximum(z - BURST_LOUD * np.median(z), 0.0)
-    if (share := _share(over, z)) <= BURST_SHARE:
+    z, weight = np.maximum(np.array(strength), 0.0), np.array(weight)
+    over = weight * np.maximum(z - BURST_LOUD * np.median(z), 0.0)
+    whole = weight * z
+    if (share := _share(over, whole)) <= BURST_SHARE:
         return None
-    once = int(np.argmax(z))
+    once = int(np.argmax(over))
     f, power = periodogram(parts[once][0], parts[once][1], window="hann", nfft=1024)
     if f[np.argmax(power)] < 1 / BURST_WINDOW:
         return None  # no window holds a period of it
-    again = _share(np.delete(over, once), np.delete(z, once)) > BURST_SHARE
+    again = _share(np.delete(over, once), np.delete(whole, once)) > BURST_SHARE
     return Bursts(share, float(f[np.argmax(power)]), again)
 
 

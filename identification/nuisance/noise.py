@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize
 
-from ..deciding import WANDER_PRIOR, WANDER_TIMES
+from ..deciding import ODDS_OF_CURVES, WANDER_PRIOR, WANDER_TIMES
 from .covariance import Covariance, Remembering
 
 Array = NDArray[np.float64]
@@ -69,8 +69,8 @@ class Noise:
 
     @property
     def log_prior(self) -> float:
-        """Of its wander."""
-        return -WANDER_PRIOR * self.wander / self.unit
+        """Of its wander, which has prior odds as whatever else has no name."""
+        return float(np.log(ODDS_OF_CURVES)) - WANDER_PRIOR * self.wander / self.unit if self.wander else 0.0
 
     def covariance(self, run: Run) -> Covariance:
         """K of a recording."""
@@ -115,8 +115,15 @@ def learn(residuals: Sequence[Array], columns: Sequence[Array], runs: Sequence[R
     own = slice(0, 4 if freely else 5)
     found, _ = fast(_best(lambda x: _cost(fast(x), parts), start[own], wide[own], low[own], high[own]))
     averaged = [_averaged(r, c, run) for r, c, run in zip(residuals, columns, runs, strict=True)]
-    best = (np.inf, 0.0, WANDER_TIMES[0])
     own = slice(0, 2 if freely else 3)
+    start, wide = np.log(np.array([0.3, 0.1]) * size)[: 1 if freely else 2], np.array([1.5, 2.0])[: 1 if freely else 2]
+
+    def still(x: Array) -> float:
+        noise = Noise(float(np.exp(x[0])) + 1e-3 * size, 0.0, 1.0, 0.0, WANDER_TIMES[0], 0.0)
+        return _cost((noise, most if freely else float(np.exp(x[1]))), averaged)
+
+    x = _best(still, start, wide, start - 6, start + 3)
+    best = (still(x) + float(np.log(ODDS_OF_CURVES)), 0.0, WANDER_TIMES[0])
     for time in WANDER_TIMES:
 
         def slow(x: Array, time: float = time) -> tuple[Noise, float]:
