@@ -42,8 +42,6 @@ PLACE, TURN, TRAVEL, FORCE, TORQUE, MOTOR, PULL = 1e-5, 3e-5, 1e-6, 0.3, 0.05, 2
 """Noise of the pose [m, quaternion], the carriage's encoder [m], the target's load cell [N, N·m], the motor's force by
 its current [N], and the latches' strain gauges [N]."""
 RATE, STEP = 200.0, 2.5e-4
-LIGHT = 0.0462
-"""Travel under which the latches close [m]: half a kilonewton of preload is left."""
 _SMOOTH = 0.1
 
 
@@ -71,18 +69,13 @@ def truth_of(effect: str, rng: np.random.Generator) -> tuple[Truth, dict[str, fl
 
 def program(rng: np.random.Generator) -> tuple[Callable[[float], float], float, tuple[float, float]]:
     """Travel of a docking test by time [m], its length [s], and when its latches close [s]: out to the knob, along
-    until it sits, preload and most of it off again, latch, unload, and twice pushed off against the latches.
-
-    Latches that close under the whole preload hold it in the seat, and no push gets beyond it: neither their own
-    preload nor their play would show.
-    """
-    pull, seat, off = rng.uniform(10, 14) * 1e-3, rng.uniform(4, 6) * 1e-3, rng.uniform(1.2, 1.8) * 1e-3
-    preload, deep = 0.0573 + rng.uniform(0, 8e-4), 0.0155 + rng.uniform(0, 2e-4)
+    until it sits, preload, latch, unload, and twice pushed off against the latches."""
+    pull, seat, off = rng.uniform(10, 14) * 1e-3, rng.uniform(4, 6) * 1e-3, rng.uniform(0.6, 1.0) * 1e-3
+    preload, deep = 0.0573 + rng.uniform(0, 8e-4), 0.0183 + rng.uniform(0, 2e-4)
     legs = [(0.4, 0.004), (0.020 / pull, 0.024), (0.021 / seat, 0.045), (0.0123 / 5e-3, preload), (0.6, preload)]
-    legs += [((preload - LIGHT) / 8e-3, LIGHT), (0.5, LIGHT)]
     latch = sum(d for d, _ in legs)
     wait = rng.uniform(1.0, 3.0)
-    legs += [(1.6, LIGHT), (2.0, 0.0215), ((0.0215 - deep) / off, deep), (0.3, deep), (0.6, 0.0215), (wait, 0.0215)]
+    legs += [(1.6, preload), (2.6, 0.0215), ((0.0215 - deep) / off, deep), (0.3, deep), (0.6, 0.0215), (wait, 0.0215)]
     legs += [((0.0215 - deep) / off, deep), (0.3, deep), (0.6, 0.0215), (0.3, 0.0215)]
     knots = np.concatenate([[0.0], np.cumsum([d for d, _ in legs])])
     fine = np.arange(-2 * _SMOOTH, knots[-1] + 2 * _SMOOTH, 1e-3)

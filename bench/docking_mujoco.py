@@ -5,9 +5,8 @@ land beside them; a sphere's centre follows an edge rounded by its radius, so th
 boxes set back by it. MuJoCo's contact is a spring whose stiffness is normalised by mass, F = k δ / ((1 − d) A), A the
 inverse mass that it compiles for the bodies, d the impedance: k is chosen for the flanks' stiffness. The mount is its
 joints' springs, the cables a tendon that bears beyond its length, a latch a tendon whose spring has a dead band, and an
-actuator for its preload. The carriage has its own mass, dry friction and position loop. Friction is made to stick by
-MuJoCo's own remedy (`noslip`): its soft constraint creeps by micrometres a second, which unloads a seat as a latch does
-that loses its preload.
+actuator for its preload. The carriage has its own mass, dry friction and position loop. Friction
+is MuJoCo's soft constraint, which creeps: its own remedy (`noslip`) makes seats jam that statics says do not.
 """
 
 from collections.abc import Callable
@@ -251,7 +250,7 @@ def mjcf(truth: Truth, place: Array, turn: Rotation, travel: float, step: float)
         f'<general site="ball{i}" refsite="held{i}" gear="1 0 0 0 0 0" gaintype="fixed" gainprm="1"/>' for i in range(3)
     )
     return f"""<mujoco><option timestep="{step}" gravity="0 0 0" integrator="implicitfast" cone="elliptic"
- impratio="1000" iterations="50" tolerance="1e-12" noslip_iterations="20"/>
+ impratio="1000" iterations="50" tolerance="1e-12"/>
 <default><geom condim="3" friction="{t.friction} 0 0"/></default>
 <worldbody>{"".join(lines)}
 <site name="knob" pos="{-t.knob} 0 0"/>{"".join(f'<site name="held{i}" pos="-1 0 0"/>' for i in range(3))}

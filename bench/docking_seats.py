@@ -89,8 +89,8 @@ def damping_ratio(restitution: float) -> float:
         pace = np.sqrt(1 - ratio * ratio)
         return float(np.exp(-ratio / pace * (np.pi - np.arctan2(2 * ratio * pace, 1 - 2 * ratio * ratio))))
 
-    # MuJoCo's damping counts by the root of its impedance.
-    return float(brentq(lambda ratio: kept(ratio) - restitution, 1e-3, 0.7)) / float(np.sqrt(IMPEDANCE))
+    found: Any = brentq(lambda ratio: kept(ratio) - restitution, 1e-3, 0.7)
+    return float(found) / float(np.sqrt(IMPEDANCE))  # MuJoCo's damping counts by the root of its impedance
 
 
 def pushed_by_us(run: BodyRun, force: float) -> Pushed:
