@@ -5,8 +5,8 @@ land beside them; a sphere's centre follows an edge rounded by its radius, so th
 boxes set back by it. MuJoCo's contact is a spring whose stiffness is normalised by mass, F = k δ / ((1 − d) A), A the
 inverse mass that it compiles for the bodies, d the impedance: k is chosen for the flanks' stiffness. The mount is its
 joints' springs, the cables a tendon that bears beyond its length, a latch a tendon whose spring has a dead band, and an
-actuator for its preload. The carriage has its own mass, dry friction and position loop. Friction
-is MuJoCo's soft constraint, which creeps: its own remedy (`noslip`) makes seats jam that statics says do not.
+actuator for its preload. The carriage has its own mass, dry friction and position loop. Friction is MuJoCo's soft
+constraint, which creeps: its own remedy (`noslip`) makes seats jam that statics says do not.
 """
 
 from collections.abc import Callable
