@@ -102,10 +102,12 @@ def _watch(worker: int, link: int, parent: int, alarm: tuple[int, int], scratch:
         told = {descriptor for descriptor, _ in poll.poll(_GLANCE * 1000 if alone is None else 20)}
         woken = os.read(alarm[0], 4096) if alarm[0] in told else b""
         status = _reaped(worker)
-        if alone is None and (told - {alarm[0]} or signal.SIGTERM in woken or os.getppid() != parent):
+        for descriptor in (ended := told - {alarm[0]}):
+            poll.unregister(descriptor)
+        if alone is None and (ended or os.getppid() != parent):
             alone = time.monotonic()
-            for descriptor in told - {alarm[0]}:
-                poll.unregister(descriptor)
+        if signal.SIGTERM in woken:  # who sends it has waited
+            alone = -_GRACE
     _end_descendants(worker)
     shutil.rmtree(scratch, ignore_errors=True)
     if os.WIFSIGNALED(status):

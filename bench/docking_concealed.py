@@ -6,11 +6,8 @@ else; ``diagnose`` on the first, with the second held out. ``clean`` conceals no
 ``build/docking_concealed.jsonl`` and is not done again; the table is printed at the end.
 """
 
-import argparse
-import json
 import os
 import sys
-import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -25,6 +22,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from bench.concealing import main
 from bench.docking_mujoco import Seen, Truth, simulate
 from snarelab.identification.docking.diagnose import diagnose_dockings
 from snarelab.models.model_file import load_model
@@ -165,51 +163,15 @@ def run_case(effect: str, seed: int, folder: Path) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def table(rows: list[dict[str, Any]]) -> str:
-    """One line a case, and how many of each were right."""
-    lines = []
-    for r in sorted(rows, key=lambda r: (EFFECTS.index(r["effect"]), r["seed"])):
-        truth = ", ".join(f"{k} {v:.3g}" if isinstance(v, float) else str(v) for k, v in r["truth"].items())
-        found = ", ".join(f"{k} {v:.3g}" for k, v in (r["found"] or {}).items())
-        lines.append(
-            f"{'ok ' if r['right'] else 'BAD'} {r['effect']:<20}{r['seed']:>3}  {truth} | {found or '–'} | "
-            f"{', '.join(r['named']) or r['verdict']} ({r['cpu']:.0f} s CPU)"
-        )
-    for effect in EFFECTS:
-        own = [r["right"] for r in rows if r["effect"] == effect]
-        if own:
-            lines.append(f"{effect}: {sum(own)} of {len(own)}")
-    return "\n".join(lines)
-
-
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", type=int, nargs="+", default=[1])
-    parser.add_argument("--only", nargs="+", choices=EFFECTS, default=EFFECTS)
-    parser.add_argument("--out", type=Path, default=ROOT / "build" / "docking_concealed.jsonl")
-    parser.add_argument("--keep", type=Path, help="folder for the recordings; made there once")
-    parser.add_argument("--record", action="store_true", help="make the recordings only")
-    given = parser.parse_args()
-    given.out.parent.mkdir(parents=True, exist_ok=True)
-    rows = [json.loads(line) for line in given.out.read_text().splitlines()] if given.out.exists() else []
-    with tempfile.TemporaryDirectory() as scratch:
-        folder = given.keep or Path(scratch)
-        folder.mkdir(parents=True, exist_ok=True)
-        for seed in given.seeds:
-            for effect in given.only:
-                if any((r["effect"], r["seed"]) == (effect, seed) for r in rows):
-                    continue
-                if given.record:
-                    record(effect, seed, folder)
-                    continue
-                rows.append(run_case(effect, seed, folder))
-                with given.out.open("a") as file:
-                    file.write(json.dumps(rows[-1]) + "\n")
-                print(table(rows[-1:]).splitlines()[0], flush=True)
-    if rows:
-        print(table(rows))
-    return 0
+def line(row: dict[str, Any]) -> str:
+    """A case in words: what is concealed, what was found and named, and the processor time."""
+    truth = ", ".join(f"{k} {v:.3g}" if isinstance(v, float) else str(v) for k, v in row["truth"].items())
+    found = ", ".join(f"{k} {v:.3g}" for k, v in (row["found"] or {}).items())
+    return (
+        f"{'ok ' if row['right'] else 'BAD'} {row['effect']:<20}{row['seed']:>3}  {truth} | {found or '–'} | "
+        f"{', '.join(row['named']) or row['verdict']} ({row['cpu']:.0f} s CPU)"
+    )
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(__doc__ or "", EFFECTS, run_case, record, line, ROOT / "build" / "docking_concealed.jsonl"))

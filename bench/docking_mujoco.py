@@ -5,7 +5,8 @@ land beside them; a sphere's centre follows an edge rounded by its radius, so th
 boxes set back by it. MuJoCo's contact is a spring whose stiffness is normalised by mass, F = k δ / ((1 − d) A), A the
 inverse mass that it compiles for the bodies, d the impedance: k is chosen for the flanks' stiffness. The mount is its
 joints' springs, the cables a tendon that bears beyond its length, a latch a tendon whose spring has a dead band, and an
-actuator for its preload. The carriage has its own mass, dry friction and position loop.
+actuator for its preload. The carriage has its own mass, dry friction and position loop. Friction is MuJoCo's soft
+constraint, which creeps: its own remedy (`noslip`) makes seats jam that statics says do not.
 """
 
 from collections.abc import Callable
@@ -64,6 +65,7 @@ class Truth:
     ring: float = 0.15
     slack: float = 0.015
     cable: tuple[float, float] = (4e5, 2000.0)
+    damping: float = 0.6  # of contacts, as a ratio
 
 
 @dataclass
@@ -199,7 +201,7 @@ def harden(model: Any, truth: Truth) -> None:
         else:
             a, k = float(model.body_invweight0[body][0]), truth.stiffness
         pace = k * (1 - IMPEDANCE) * a
-        model.geom_solref[g] = [-pace, -2 * 0.6 * np.sqrt(pace)]
+        model.geom_solref[g] = [-pace, -2 * truth.damping * np.sqrt(pace)]
         model.geom_solimp[g] = [IMPEDANCE, IMPEDANCE, 1e-3, 0.5, 2]
 
 

@@ -6,11 +6,8 @@ on the first, with the second held out. ``clean`` conceals nothing. Every case d
 ``build/snare_concealed.jsonl`` and is not done again; the table is printed at the end.
 """
 
-import argparse
-import json
 import os
 import sys
-import tempfile
 import time
 from pathlib import Path
 from typing import Any
@@ -23,6 +20,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from bench.concealing import main
 from bench.snare_rods import Seen, Truth, moved, simulate
 from snarelab.identification.snare.diagnose import diagnose_captures
 from snarelab.models.model_file import load_model
@@ -133,54 +131,23 @@ def run_case(effect: str, seed: int, folder: Path) -> dict[str, Any]:
     return {
         "effect": effect, "seed": seed, "size": size, "named": named, "found": values.get(effect),
         "rank": ranked.index(effect) + 1 if effect in ranked else None, "verdict": answer["verdict"],
+        "right": named == [effect] or (effect == "clean" and not named),
         "merged": [r["name"] for e in answer["effects"] for r in e["rivals"] if not r["separable"]],
         "holdout": kinds, "seconds": time.perf_counter() - begun, "cpu": sum(os.times()[:4]) - cpu,
         "candidates": {c["name"]: [c["score"], c["explained"]] for c in answer["candidates"]},
     }  # fmt: skip
 
 
-def table(rows: list[dict[str, Any]]) -> str:
-    """One line a case."""
-    lines = [f"{'concealed':<22}{'seed':>5}{'size':>10}{'found':>10}{'rank':>6}  named; held-out motion mm, force N"]
-    for r in sorted(rows, key=lambda r: (EFFECTS.index(r["effect"]), r["seed"])):
-        found = "–" if r["found"] is None else f"{r['found']:.3g}"
-        (p0, p1), (f0, f1) = r["holdout"]["pos"], r["holdout"]["force"]
-        lines.append(
-            f"{r['effect']:<22}{r['seed']:>5}{r['size']:>10.3g}{found:>10}{r['rank'] or 0:>6}  "
-            f"{', '.join(r['named']) or r['verdict']}; {1e3 * p0:.2f} → {1e3 * p1:.2f}, {f0:.2f} → {f1:.2f} "
-            f"({r['seconds']:.0f} s)"
-        )
-    return "\n".join(lines)
-
-
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", type=int, nargs="+", default=[1])
-    parser.add_argument("--only", nargs="+", choices=EFFECTS, default=EFFECTS)
-    parser.add_argument("--out", type=Path, default=ROOT / "build" / "snare_concealed.jsonl")
-    parser.add_argument("--keep", type=Path, help="folder for the recordings; made there once")
-    parser.add_argument("--record", action="store_true", help="make the recordings only")
-    given = parser.parse_args()
-    given.out.parent.mkdir(parents=True, exist_ok=True)
-    rows = [json.loads(line) for line in given.out.read_text().splitlines()] if given.out.exists() else []
-    with tempfile.TemporaryDirectory() as scratch:
-        folder = given.keep or Path(scratch)
-        folder.mkdir(parents=True, exist_ok=True)
-        for seed in given.seeds:
-            for effect in given.only:
-                if any((r["effect"], r["seed"]) == (effect, seed) for r in rows):
-                    continue
-                if given.record:
-                    record(effect, seed, folder)
-                    continue
-                rows.append(run_case(effect, seed, folder))
-                with given.out.open("a") as file:
-                    file.write(json.dumps(rows[-1]) + "\n")
-                print(table(rows[-1:]).splitlines()[1], flush=True)
-    if rows:
-        print(table(rows))
-    return 0
+def line(row: dict[str, Any]) -> str:
+    """A case in words: concealed, found, its rank, what was named, and held-out motion [mm] and force [N]."""
+    found = "–" if row["found"] is None else f"{row['found']:.3g}"
+    (p0, p1), (f0, f1) = row["holdout"]["pos"], row["holdout"]["force"]
+    return (
+        f"{'ok ' if row['right'] else 'BAD'} {row['effect']:<22}{row['seed']:>5}{row['size']:>10.3g}{found:>10}"
+        f"{row['rank'] or 0:>6}  {', '.join(row['named']) or row['verdict']}; {1e3 * p0:.2f} → {1e3 * p1:.2f} mm, "
+        f"{f0:.2f} → {f1:.2f} N ({row['seconds']:.0f} s)"
+    )
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(__doc__ or "", EFFECTS, run_case, record, line, ROOT / "build" / "snare_concealed.jsonl"))

@@ -165,7 +165,7 @@ def momentum_drift(d: Docked) -> float:
 
 def energies(d: Docked) -> dict[str, Array]:
     """Energies (n,) since the start [J]: what both motors have put in, and where it is; ``residual`` is the rest."""
-    table, c = d.whole.run.recording, d.capture
+    table = d.whole.run.recording
 
     def own(name: str) -> Array:
         values = column(table, f"effector.energy.{name}")
@@ -175,13 +175,8 @@ def energies(d: Docked) -> dict[str, Array]:
         values = column(table, f"snare.energy.{name}")
         return values - values[0]
 
-    def worked(impulse: Array, rate: Array) -> Array:
-        middle = 0.5 * (rate[1:] + rate[:-1])
-        return np.concatenate([[0.0], np.cumsum(np.einsum("ni,ni->n", np.diff(impulse, axis=0), middle))])
-
-    ring = snare("ring_work") + worked(c.impulse, c.tip[:, 1]) + worked(c.angular_impulse, c.tip[:, 2])
     ledger = {
-        "motors": ring + own("motor"),
+        "motors": snare("ring_motor") + own("motor"),
         "cables, strain": snare("strain"),
         "cables' motion and contacts": snare("kinetic") + snare("overlap"),
         "bodies' motion": own("kinetic"),

@@ -147,6 +147,11 @@ class OwnProcess(Participant):
                 self._link.send(([], ("close", None)))
             with contextlib.suppress(subprocess.TimeoutExpired):
                 self._process.wait(_FAREWELL)
+        self._kill()
+
+    def _kill(self) -> None:
+        """End a process that had its time: its warden waits no longer for it."""
+        self._process.terminate()
         self._end()
 
     def _ask(self, what: str, content: Any) -> Any:
@@ -165,7 +170,7 @@ class OwnProcess(Participant):
     def _receive(self) -> Any:
         try:
             if not self._link.poll(self._timeout):
-                self._end()
+                self._kill()
                 raise StepError(
                     f"{self.name}: gave no answer for {self._timeout:g} s {self._doing}; its process was ended"
                 )
@@ -175,7 +180,7 @@ class OwnProcess(Participant):
         try:
             kind, content = pickle.loads(answer)
         except Exception:  # the participant has written to where answers go
-            self._end()
+            self._kill()
             raise StepError(f"{self.name}: its process gave no proper answer {self._doing}, and was ended") from None
         if kind == "done":
             return content
@@ -186,7 +191,7 @@ class OwnProcess(Participant):
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(_FAREWELL)
         code = self._process.poll()
-        self._end()
+        self._kill()
         if code is None:
             return StepError(f"{self.name}: its process broke off {self._doing}, and was ended")
         how = f"was killed by {signal.Signals(-code).name}" if code and code < 0 else f"ended with status {code}"

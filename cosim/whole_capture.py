@@ -34,9 +34,9 @@ _FRAME = [
     for kind, axes in (("pos", "xyz"), ("quat", "wxyz"), ("vel", "xyz"), ("omega", "xyz"))
     for axis in axes
 ]
-SIZES = {"CLOSE": 2.5e-3, "SLIDE": 5e-3, "OPEN": 5e-3, "EXTEND": 5e-3, "CLEAR": 5e-3}
-"""Macro steps by the program's state [s]; `USUAL` where it is in none of these."""
-USUAL = 2.5e-3
+SIZES = dict.fromkeys(("CLOSE", "PULL", "SEAT", "BACK_OFF", "UNLOAD"), 2.5e-3)
+"""Macro steps by the program's state [s], where bodies meet or part; `USUAL` in all others."""
+USUAL = 5e-3
 AFTER = 1.0
 """How long a run goes on in its last state [s]."""
 

@@ -187,9 +187,9 @@ def test_a_daemon_of_an_fmu_ends_with_its_run(hostile, mark):
 def test_an_fmu_that_hangs_at_its_start_or_end_is_not_waited_for_long(hostile, mark):
     left = OwnProcess(Fmu, hostile, timeout=0.5)
     begun = time.monotonic()
-    with pytest.raises(StepError, match="gave no answer for 5 s at its start"):
+    with pytest.raises(StepError, match="gave no answer for 3 s at its start"):
         left.initialize(0.0, {"fault": START_HANG})
-    assert time.monotonic() - begun < 15.0
+    assert time.monotonic() - begun < 8.0
     right = OwnProcess(Fmu, hostile, timeout=0.5)
     right.initialize(0.0, {"fault": END_HANG})
     right.close()

@@ -8,7 +8,7 @@ from scipy.optimize import minimize_scalar
 from scipy.spatial.transform import Rotation
 
 from snarelab.models.snare.bow import give
-from snarelab.models.snare.contact import CONTACT_SIZE, MOST_CONTACTS, find_contacts
+from snarelab.models.snare.contact import CONTACT_SIZE, MOST_CONTACTS, add_pin_contact, find_contacts
 from snarelab.models.snare.crossing import find_crossings
 from snarelab.models.snare.cubic import combine, first_weights, weights
 from snarelab.models.snare.ends import REACTION
@@ -100,6 +100,33 @@ def test_jacobian_is_the_derivative_of_the_forces(n_pin):
         given = dense(system_jacobian(q, v, fixed, moving, *factors), len(q)) @ project
         found = differences(q, v, fixed, moving, of) @ project
         assert np.max(np.abs(given - found)) < worst * np.max(np.abs(found))
+
+
+def contact_energy(q, v, fixed, moving):
+    """Stored in the contacts with the pin [J], without friction and damping."""
+    positions = (fixed[0] + q)[: 66 * 3].reshape(-1, 3)
+    contacts = moving[2]
+    count = find_contacts(positions, N, SIZE, fixed[4], moving[0], fixed[5], P.cable_radius, contacts)
+    law = fixed[5]
+    assert count
+    return sum(powers(law, c[3], c[4], (0.0, 0.0, 1.0), (0.0, 0.0, 0.0))[0] for c in contacts[:count])
+
+
+@pytest.mark.parametrize("overlap", [6e-5, 1e-4, 3e-4])
+def test_the_contacts_force_is_the_slope_of_its_energy(overlap):
+    """Pressed with up to 5 kN, between two nodes of a cable that is bent and pulled: the docking's preload."""
+    _, v, fixed, moving = touching_state(0, overlap)
+    smooth = law_constants(P.with_values(friction=0.0, contact_damping=0.0, cable_pretension=2000.0))
+    fixed = (*fixed[:5], smooth, *fixed[6:])
+    positions, still = fixed[0].reshape(-1, 3), np.zeros((66, 3))
+    forces = np.zeros((66, 3))
+    push, _ = add_pin_contact(positions, still, N, SIZE, fixed[4], moving[0], smooth, P.cable_radius, moving[2], forces)
+    rng = np.random.default_rng(0)
+    size = np.linalg.norm(push)
+    for _ in range(5):
+        way = rng.normal(size=(66, 3)) * np.tile([[1e-3], [0.05]], (33, 1))
+        ahead, behind = (contact_energy(sign * 1e-4 * way.ravel(), v, fixed, moving) for sign in (1, -1))
+        assert np.sum(forces * way) == pytest.approx((behind - ahead) / 2e-4, abs=2e-5 * size * 1e-3)
 
 
 def crossing_state():

@@ -89,7 +89,7 @@ def test_restore_and_repeat_is_bitwise_also_elsewhere_and_after_a_failed_step():
     saved, first = other.save(), go(other, 10)
     other.restore(saved)
     pose = other.target_pose()
-    nearest = pose.position + pose.rotation @ [0, 0.004, 0.002]  # into the cable that comes, at 4 m/s
+    nearest = pose.position + pose.rotation @ [0, 0.006, 0.003]  # into the cable that comes, at 7 m/s
     other.move_target(Pose(nearest, pose.rotation, STILL, STILL))
     with pytest.raises(
         SnareStepError,

@@ -228,7 +228,7 @@ def test_moments_are_about_the_middle_of_the_step_and_momentum_about_the_worlds_
     np.testing.assert_allclose(of("impulse.pin"), [0.0, 0.0, 2.0])
     np.testing.assert_allclose(of("momentum.linear"), [1.0, 0.0, 0.0])
     np.testing.assert_allclose(of("momentum.angular"), np.cross(ORIGIN, [1.0, 0.0, 0.0]))
-    assert [shown[f"energy.{name}"] for name in snare_impulses._ENERGIES] == list(range(7))
+    assert [shown[f"energy.{name}"] for name in snare_impulses._ENERGIES] == list(range(8))
     one.initialize()
     assert not one._passed.any()
     assert not one._momentum.any()

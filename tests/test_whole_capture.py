@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from snarelab.cosim.docked import (
+    CABLE_STRENGTH,
     ball_shares,
     docked_of,
     energies,
@@ -49,7 +50,7 @@ def test_momentum_and_energy_are_kept_to_the_latch(hover):
     assert momentum_drift(hover) < 1e-9
     ledger = energies(hover)
     assert ledger["motors"].max() > 30.0
-    assert np.abs(ledger["residual"]).max() < 2e-3 * ledger["motors"].max()
+    assert np.abs(ledger["residual"]).max() < 1e-4 * ledger["motors"].max()
     for name in ("lost in screw and carriage", "lost in cables", "lost in joints"):
         assert (np.diff(ledger[name]) > -1e-6).all()
 
@@ -66,21 +67,44 @@ def test_what_is_not_seated_does_not_count(hover):
     assert margin(out, P) == -1.0
 
 
+TABLE = read_table()
+WAY_OUT = ("OPEN", "UNLOAD")
+ABORTED_FROM = [
+    name
+    for name, state in TABLE.states.items()
+    if {state.timeout, *(t.to for t in state.leave)} & {*WAY_OUT} and name not in (*WAY_OUT, "EXTEND")
+]
+"""Where the program may give up: what its table says, so that a new state is tested too."""
+
+
+def giving_up(name):
+    """A table whose state gives up after a moment, for where its own timeout leads; the rest is the program's."""
+    states = dict(TABLE.states)
+    state = states[name]
+    after = {TABLE.start: 9.0, "PRELOAD": 6.0}.get(name, 1.0)  # PRELOAD: under its whole load
+    states[name] = dataclasses.replace(state, leave=(), after=after)
+    assert states[name].timeout in WAY_OUT
+    if name == "BACK_OFF":  # comes where a ball does not find its seat, which here all do
+        states["SEAT"] = dataclasses.replace(states["SEAT"], leave=(), after=1.0, timeout=name)
+    return dataclasses.replace(TABLE, states=states)
+
+
+def test_there_are_seven_states_to_give_up_in():
+    assert ABORTED_FROM == ["CLOSE", "SLIDE", "PULL", "SEAT", "BACK_OFF", "PRELOAD", "LATCH"]
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("state", ["CLOSE", "SLIDE"])
+@pytest.mark.parametrize("state", ABORTED_FROM)
 def test_broken_off_in_a_state_it_ends_a_second_free_of_contact(state):
-    """A table whose state gives up after a moment; the rest is the program's own way out."""
-    table = read_table()
-    after, way_out = (9.0, "OPEN") if state == "CLOSE" else (2.0, "UNLOAD")
-    early = dataclasses.replace(table.states[state], leave=(), after=after, timeout=way_out)
-    d = docked_of(
-        co_simulate_whole(setting("hover"), table=dataclasses.replace(table, states={**table.states, state: early}))
-    )
+    d = docked_of(co_simulate_whole(setting("hover"), table=giving_up(state)))
+    path = [name for name, _, _ in d.whole.phases]
     assert d.whole.fault == ""
-    assert d.whole.final == "ABORTED"
+    assert d.whole.final == "ABORTED", path
+    assert state in path
+    assert set(path[path.index(state) + 1 :]) <= {*WAY_OUT, "EXTEND", "CLEAR", "ABORTED"}, path
     recording = d.whole.run.recording
     touching = sum(
         recording[key].to_numpy() for key in recording.variables if str(key).split(" ")[0].endswith(".touching")
     )
     assert d.times[-1] - d.times[touching > 0].max(initial=0.0) >= 1.0
-    assert d.tension.max() < 8000.0
+    assert d.tension.max() < CABLE_STRENGTH

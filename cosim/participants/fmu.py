@@ -14,7 +14,7 @@ from ..fmi_calls import CompiledCalls, Instance, Vector, address
 from ..fmi_variables import Slot, read_interface
 from ..participant import Causality, Participant, StepError
 
-_START, _TOOL_START = 5.0, 60.0  # s to initialise however short a step may be, without and with a tool to start
+_START, _TOOL_START = 3.0, 60.0  # s to initialise however short a step may be, without and with a tool to start
 
 
 class Fmu(Participant):

@@ -20,7 +20,7 @@ from ...models.snare.momentum import left_over, momentum
 from ..participant import Variable
 from .snare import SnareParticipant
 
-_ENERGIES = ("ring_work", "strain", "kinetic", "overlap", "target", "damped", "friction")
+_ENERGIES = ("ring_work", "ring_motor", "strain", "kinetic", "overlap", "target", "damped", "friction")
 
 
 class ImpulseSnareParticipant(SnareParticipant):

@@ -10,6 +10,7 @@ import numpy as np
 from ...errors import InputError
 from ...models.docking.bench_setup import DockingTree
 from ...models.model import Model
+from ..parameter_list import parameter_list
 from .answer import channel_rms, channel_sizes, estimates, with_found
 from .fit import Linear, fit, linearised, normal, priors, shift_columns, start
 from .recording import Record, load_records, unit_of
@@ -35,21 +36,7 @@ class IdentifiedDockings:
 
     def to_json(self) -> dict[str, Any]:
         """The published form."""
-        made = estimates(self.given, self.fit, self.weighed)
-        parameters = [
-            {
-                "effect": p.effect.name,
-                "at": p.at,
-                "name": name,
-                "value": e.value,
-                "std": e.std if np.isfinite(e.std) else None,
-                "unit": e.unit,
-                "at_bound": e.at_bound,
-                "identifiable": bool(np.isfinite(e.std)),
-            }
-            for p in self.fit.at.placed
-            for name, e in made[p.key].items()
-        ]
+        parameters = parameter_list(self.fit.at.placed, estimates(self.given, self.fit, self.weighed))
         fits: dict[str, Any] = {}
         for role, records, found in (("train", self.train, self.fit), ("holdout", self.holdout, self.held)):
             if found is not None:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...models.model import Model
+from ..parameter_list import parameter_list
 from .answer import estimates, with_found
 from .channels import channel_errors
 from .fit import Fit, evaluate, fit, normal, with_slopes
@@ -31,21 +32,7 @@ class IdentifiedCaptures:
 
     def to_json(self) -> dict[str, Any]:
         """The published form."""
-        made = estimates(self.train, self.fit)
-        parameters = [
-            {
-                "effect": p.effect.name,
-                "at": p.at,
-                "name": name,
-                "value": e.value,
-                "std": e.std if np.isfinite(e.std) else None,
-                "unit": e.unit,
-                "at_bound": e.at_bound,
-                "identifiable": bool(np.isfinite(e.std)),
-            }
-            for p in self.fit.placed
-            for name, e in made[p.key].items()
-        ]
+        parameters = parameter_list(self.fit.placed, estimates(self.train, self.fit))
         fits: dict[str, Any] = {}
         for role, captures, found in (("train", self.train, self.fit), ("holdout", self.holdout, self.held)):
             if found is not None:

@@ -139,7 +139,7 @@ class MonolithicCapture:
         pull = data.GetAECoordinates()[self._ends].reshape(6, 3)
         self._wrench, _, contacts, _ = measure(
             a.others(data.GetODE2Coordinates()), a.others(data.GetODE2Coordinates_t()), a.fixed, a.moving,
-            self._section, pull, a.ends, a.end_speeds, a.frame, a.ring_spin(),
+            self._section, pull, a.ends, a.frame, a.ring_spin(),
         )  # fmt: skip
         if len(contacts) and self.first_contact is None:
             self.first_contact = time

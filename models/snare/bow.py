@@ -40,6 +40,13 @@ def give_change(law, fraction, size):
 
 
 @compiled
+def give_bend(law, fraction, size):
+    """d²e/ds² at ξ [1/(N·m)]."""
+    part, turn = fraction * (1.0 - fraction), 1.0 - 2 * fraction
+    return 6 * law[4] * size * part * (turn * turn - part)
+
+
+@compiled
 def bow_shape(law, fraction, size):
     """B at ξ [m²/N], and dB/ds [m/N]."""
     part = size * size * fraction * (1.0 - fraction)
@@ -97,6 +104,14 @@ def lateral_pull(law, element, size, gradient):
         for k in range(3):
             gradient[a, k] = stiffness * gradient[a, k] + by_bend * bend_of[a, k] + by_change * change_of[a, k]
     return pull - bending * bend, stiffness / size
+
+
+@compiled
+def stiffness_change(law, element, size):
+    """−dk/dσ [N·m]."""
+    bend = combine(second_weights(0.5, size), element)
+    slope, soft = softening(law, size, dot(bend, bend))
+    return law[AXIAL] * slope / (size * (1 + soft) ** 2)
 
 
 @compiled

@@ -12,9 +12,9 @@ array: position of its foot, velocity, angular velocity, and the three rows of i
 
 import numpy as np
 
-from .bow import bow_shape, give, give_change, lateral_pull
+from .bow import bow_shape, give, give_bend, give_change, lateral_pull, stiffness_change
 from .cubic import combine, first_weights, second_weights, weights
-from .law import force, hertz_overlap
+from .law import force, hertz_push
 from .pin import distance, surface
 from .vector import add, add_scaled, compiled, cross, dot, rotate, rotate_back, row, scale, subtract
 
@@ -24,6 +24,8 @@ MOST_CONTACTS, CONTACT_SIZE = 24, 5
 """Rows and columns of the list of contacts: cable's element, cylinder, ξ, gap, e."""
 NEAR = 1e-4
 """Gap of the cubic below which its bow is looked at [m]; bows are some micrometres."""
+TRIALS, CLOSE = 20, 1e-9
+"""Most steps to where a bowed cable touches, and how near in ξ is near enough."""
 
 
 @compiled
@@ -59,25 +61,45 @@ def closest_fraction(cylinder, pin, element, low, high, size):
 
 
 @compiled
-def bowed(law, element, size, cylinder, pin, fraction, gap, scratch):
-    """Where the beam touches that the cubic stands for (see `bow`): ξ, gap, and e.
+def slope_change(law, fraction, size, curvature, push, stiff):
+    """Derivative of h + ½ e' f by s [1/m], as the force follows; never below a tenth of the cubic's own, h_s."""
+    change = give_change(law, fraction, size)
+    own = 0.5 * give_bend(law, fraction, size) - 0.25 * stiff * change * change
+    return max(curvature + own * push, 0.1 * curvature)
 
-    Its slope differs from the cubic's by ½ e' f + b', so that the closest point lies elsewhere by that over −h_s.
+
+@compiled
+def bowed(law, element, size, cylinder, pin, fraction, radius, scratch):
+    """Where the beam touches that the cubic stands for (see `bow`): ξ, gap, and e; ``fraction`` is the cubic's own ξ.
+
+    There the energy of the contact is least along the cable, which makes its force the gradient of that energy:
+    h + ½ e' f + b' = 0, in which n turns with the point: dn/ds = H r', see `pin`.
     """
     rotation = pin[3:6]
-    _, curvature = slope_of_distance(cylinder, pin, element, fraction, size)
-    y = rotate_back(rotation, subtract(combine(weights(fraction, size), element), row(pin, 0)))
-    _, normal, _, _, _, _ = surface(cylinder, y)
-    bend = dot(rotate(rotation, normal), combine(second_weights(0.5, size), element))
+    curved = rotate_back(rotation, combine(second_weights(0.5, size), element))
     pull, stiffness = lateral_pull(law, element, size, scratch)
-    shape, shape_change = bow_shape(law, fraction, size)
-    gap += pull * bend * shape
-    soft = give(law, fraction, size) - stiffness * (bend * shape) ** 2
-    if gap < 0.0:
-        push = law[0] * hertz_overlap(law, gap, soft) ** 1.5
-        slope = 0.5 * give_change(law, fraction, size) * push
-        slope += (pull - push * stiffness * bend * shape) * bend * shape_change
-        fraction = min(max(fraction - slope / (curvature * size), 0.0), 1.0)
+    gap, soft = 0.0, 0.0
+    for _ in range(TRIALS):
+        slope, curvature = slope_of_distance(cylinder, pin, element, fraction, size)
+        y = rotate_back(rotation, subtract(combine(weights(fraction, size), element), row(pin, 0)))
+        tangent = rotate_back(rotation, combine(first_weights(fraction, size), element))
+        away, normal, sharp, across, roundness, around = surface(cylinder, y)
+        bend = dot(normal, curved)
+        turning = sharp * dot(across, tangent) * dot(across, curved)
+        turning += roundness * dot(around, tangent) * dot(around, curved)
+        shape, shape_change = bow_shape(law, fraction, size)
+        gap = away - radius + pull * bend * shape
+        soft = give(law, fraction, size) - stiffness * (bend * shape) ** 2
+        if gap >= 0.0:
+            break
+        push, stiff = hertz_push(law, gap, soft)
+        slope += 0.5 * give_change(law, fraction, size) * push
+        slope += (pull - push * stiffness * bend * shape) * (bend * shape_change + shape * turning)
+        before = fraction
+        fraction -= slope / (size * slope_change(law, fraction, size, curvature, push, stiff))
+        fraction = min(max(fraction, 0.0), 1.0)
+        if abs(fraction - before) < CLOSE:
+            break
     return fraction, gap, soft
 
 
@@ -107,7 +129,7 @@ def find_contacts(positions, n_elements, size, cylinders, pin, law, radius, cont
                         point = combine(weights(fraction, size), element)
                         gap = distance(cylinder, rotate_back(rotation, subtract(point, row(pin, 0)))) - radius
                         if gap < NEAR and count < contacts.shape[0]:
-                            fraction, gap, soft = bowed(law, element, size, cylinder, pin, fraction, gap, scratch)
+                            fraction, gap, soft = bowed(law, element, size, cylinder, pin, fraction, radius, scratch)
                             if gap < 0.0:
                                 contacts[count, 0] = first_row
                                 contacts[count, 1] = part
@@ -141,9 +163,10 @@ def contact_force(positions, velocities, size, cylinders, pin, law, contact, wit
     pull, stiffness = lateral_pull(law, element, size, within)
     shape, _ = bow_shape(law, fraction, size)
     pull -= size_of * stiffness * share * shape
+    softer = size_of * (share * shape) ** 2 * stiffness_change(law, element, size)  # −½ f (B n · r''_m)² ∂k/∂q
     for a in range(4):
         for k in range(3):
-            within[a, k] = shape * (share * within[a, k] + pull * normal[k] * n2[a])
+            within[a, k] = shape * (share * within[a, k] + pull * normal[k] * n2[a]) + softer * curved[k] * n2[a]
     turn = size_of * shape * pull  # the normal turns as the point moves
     push = add_scaled(push, turn * bend * dot(across, curved), across)
     push = add_scaled(push, turn * roundness * dot(around, curved), around)

@@ -138,11 +138,11 @@ def _add_line_jacobian(first, pin, line, factors, triplets, count):
 
 
 @compiled
-def measure(q, rates, fixed, moving, section, pull, ends, end_speeds, effector, ring_spin):
+def measure(q, rates, fixed, moving, section, pull, ends, effector, ring_spin):
     """Read a state after a step.
 
-    `pull` is the force of the cables on the rings at the six `ends`, which move at `end_speeds`; `effector` is the end
-    effector's frame, `ring_spin` the rotating ring's angular velocity in the world.
+    `pull` is the force of the cables on the rings at the six `ends`; `effector` is the end effector's frame,
+    `ring_spin` the rotating ring's angular velocity in the world.
 
     Returns
     -------
@@ -153,7 +153,7 @@ def measure(q, rates, fixed, moving, section, pull, ends, end_speeds, effector, 
     array (n_contacts, 6)
         Contact points on the pin, and forces on the cable there.
     float
-        Power of the rings on the cables [W].
+        Power of the rings' moments on the cables [W]; their forces' work follows from where the ends go.
     """
     _, n_elements, size, _, cylinders, law, radius, stiffness, friction, _ = fixed
     pin, _, contacts, crossings, fittings = moving
@@ -175,7 +175,6 @@ def measure(q, rates, fixed, moving, section, pull, ends, end_speeds, effector, 
     power = 0.0
     for end in range(6):
         turn = cross(subtract(row(ends, end), row(effector, 0)), row(pull, end))
-        power -= dot(row(pull, end), row(end_speeds, end))
         moment = end_moment(positions, n_elements, stiffness, fittings, end)
         power -= dot(moment, row(effector, 2) if end % 2 == 0 else ring_spin)
         for k in range(3):

@@ -34,9 +34,10 @@ class SnareHistory:
     contact_points, contact_forces : tuples of arrays (n_contacts, 3)
         One entry a time: where the cables touch the pin [m], and the force on the cable there [N].
     energies : dict of arrays (n_times,)
-        [J]: ``ring_work`` (of the rings on the cables since the start), ``strain``, ``kinetic`` (cables),
-        ``overlap`` (elastic, in contacts), ``target`` (motion, spring and weight, from the start), ``damped``
-        (in cables and contacts) and ``friction``, both lost since the start.
+        [J]: ``ring_work`` (of the rings on the cables since the start), ``ring_motor`` (the part of it that turning
+        the ring took; the rest came with the end effector), ``strain``, ``kinetic`` (cables), ``overlap`` (elastic, in
+        contacts), ``target`` (motion, spring and weight, from the start), ``damped`` (in cables and contacts) and
+        ``friction``, both lost since the start.
     first_contact : float or None
         When a cable first touched the pin [s]; None if never.
     """

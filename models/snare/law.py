@@ -60,6 +60,15 @@ def hertz_overlap(law, gap, soft):
 
 
 @compiled
+def hertz_push(law, gap, soft):
+    """f = K x^1.5 [N], and how it grows with the overlap, e in series [N/m]."""
+    x = hertz_overlap(law, gap, soft)
+    root = sqrt(x)
+    slope = 1.5 * law[0] * root
+    return law[0] * root * x, slope / (1.0 + soft * slope)
+
+
+@compiled
 def lag(law, x, soft):
     """τ e k² [N·s/m]."""
     slope = 1.5 * law[0] * sqrt(x)

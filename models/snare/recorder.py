@@ -13,7 +13,13 @@ from .line import LOCAL, line_pull
 
 _IMPULSE = slice(0, 3)
 _RING_WORK, _DAMPED, _FRICTION = 3, 4, 5
-_PIN_IMPULSE, _TIME = slice(6, 12), 12
+_PIN_IMPULSE, _TIME, _EFFECTOR_WORK = slice(6, 12), 12, 13
+
+
+def moved(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """How far a (6, 3) frame has gone [m], and how it has turned, as a small rotation vector [rad]; (6,)."""
+    turn = 0.5 * np.cross(before[3:], after[3:], axis=0).sum(axis=1)
+    return np.concatenate([after[0] - before[0], turn])
 
 
 class Recorder:
@@ -38,8 +44,9 @@ class Recorder:
         self.effector_wrench = np.zeros(6)
         self._energies = np.zeros(7)
         self._rates = np.zeros(12)  # time derivatives of the totals before the time
-        self._totals = np.zeros(13)
+        self._totals = np.zeros(14)
         self._contacts = np.zeros((0, 6))
+        self._pull, self._placed, self._frame = np.zeros((6, 3)), np.zeros((6, 3)), assembly.frame.copy()
         self.touching: tuple[int, ...] = ()
         """Cables that touch the pin, after the last step."""
         self.changed = False
@@ -53,14 +60,21 @@ class Recorder:
         self._totals[_TIME] = time
 
     def after_step(self, time: float) -> None:
-        """Add a step to the sums by the trapezoidal rule; a second call at the same time changes nothing."""
+        """Add a step to the sums by the trapezoidal rule; a second call at the same time changes nothing.
+
+        The work of forces on what has a place is their mean over the step times the way made: the solver's velocities
+        are not the means of its displacements.
+        """
         step = time - self._totals[_TIME]
         if step <= 0:
             return
         before, touching = self._rates, self.touching
+        wrench, pull, ends, frame = self.effector_wrench, self._pull, self._placed, self._frame
         self._read(time)
         self.changed |= self.touching != touching
         self._totals[:_TIME] += 0.5 * step * (before + self._rates)
+        self._totals[_RING_WORK] -= 0.5 * np.sum((pull + self._pull) * (self._placed - ends))
+        self._totals[_EFFECTOR_WORK] += 0.5 * (wrench + self.effector_wrench) @ moved(frame, self._frame)
         self._totals[_TIME] = time
         if len(self._contacts) and self.first_contact is None:
             self.first_contact = time
@@ -71,8 +85,9 @@ class Recorder:
         pull = self._data.GetAECoordinates()[self._ends].reshape(6, 3)  # of the cables on the rings
         wrench, self._energies, contacts, work = measure(
             self._data.GetODE2Coordinates(), self._data.GetODE2Coordinates_t(), a.fixed, a.moving, self._section,
-            pull, a.ends, a.end_speeds, a.frame, a.ring_spin(),
+            pull, a.ends, a.frame, a.ring_spin(),
         )  # fmt: skip
+        self._pull, self._placed, self._frame = pull.copy(), a.ends.copy(), a.frame.copy()
         self.pin_wrench, self.effector_wrench = wrench[:6], wrench[6:]
         self._contacts = contacts
         rows = a.moving[2][: len(contacts), 0]
@@ -105,6 +120,7 @@ class Recorder:
         totals, now = self._totals, self._energies
         return {
             "ring_work": float(totals[_RING_WORK]),
+            "ring_motor": float(totals[_RING_WORK] + totals[_EFFECTOR_WORK]),
             "strain": float(now[STRAIN]),
             "kinetic": float(now[KINETIC]),
             "overlap": float(now[OVERLAP]),
@@ -129,13 +145,17 @@ class Recorder:
             self._contacts,
             pin,
             self.touching,
+            self._pull,
+            self._placed,
+            self._frame,
         )
         return self._totals.copy(), latest, self.first_contact
 
     def restore(self, totals: np.ndarray, latest: tuple[Any, ...], first_contact: float | None) -> None:
         """Take back what `save` gave."""
         self._totals[:] = totals
-        self._rates, self.pin_wrench, self.effector_wrench, self._energies, self._contacts, pin, self.touching = latest
+        self._rates, self.pin_wrench, self.effector_wrench, self._energies, self._contacts, pin = latest[:6]
+        self.touching, self._pull, self._placed, self._frame = latest[6:]
         self._assembly.pin[:] = pin
         self._assembly.lift()
         self.first_contact = first_contact
@@ -226,6 +246,7 @@ class Recorder:
             contact_forces=tuple(r["contacts"][:, 3:] for r in rows),
             energies={
                 "ring_work": totals[:, _RING_WORK],
+                "ring_motor": totals[:, _RING_WORK] + totals[:, _EFFECTOR_WORK],
                 "strain": energies[:, STRAIN],
                 "kinetic": energies[:, KINETIC],
                 "overlap": energies[:, OVERLAP],

@@ -56,17 +56,10 @@ def momentum_ledger(run: Run, capture: Capture) -> Momentum:
 def energy_ledger(run: Run, capture: Capture, start: Setting, passive: Passive) -> dict[str, Array]:
     """Energies (n,) since the start [J]: ``motor`` is what the ring's motor has put in, the others where it is now.
 
-    The ring's work on the cables is the snare's own sum; what the effector's motion takes of it, impulse by impulse, is
-    added to make the motor's. ``residual``: the motor's work less all else, the error of all steps and couplings.
+    ``residual``: the motor's work less all else, the error of all steps and couplings.
     """
     table = run.recording
-    speed, spin = capture.tip[:, 1], capture.tip[:, 2]
-
-    def power_sum(impulse: Array, rate: Array) -> Array:
-        return np.concatenate([[0.0], np.cumsum(np.einsum("ni,ni->n", np.diff(impulse, axis=0), _middle(rate)))])
-
-    given = power_sum(capture.impulse, speed) + power_sum(capture.angular_impulse, spin)
-    snare = {name: column(table, f"snare.energy.{name}") for name in ("ring_work", "strain", "kinetic", "overlap")}
+    snare = {name: column(table, f"snare.energy.{name}") for name in ("ring_motor", "strain", "kinetic", "overlap")}
     lost = column(table, "snare.energy.damped"), column(table, "snare.energy.friction")
     rotation = capture.base[:, 3:]
     twist = np.hstack([np.einsum("nji,nj->ni", rotation, capture.base[:, k]) for k in (1, 2)])
@@ -74,7 +67,7 @@ def energy_ledger(run: Run, capture: Capture, start: Setting, passive: Passive) 
     rubbing = np.einsum("nj,nj->n", makkar(passive.friction, rates)[0], rates)
     bent = 0.5 * passive.stiffness * np.sum((capture.q - capture.q[0]) ** 2, axis=1)
     ledger = {
-        "motor": snare["ring_work"] + given,
+        "motor": snare["ring_motor"],
         "cables, strain": snare["strain"] - snare["strain"][0],
         "cables, motion": snare["kinetic"],
         "contacts": snare["overlap"],
