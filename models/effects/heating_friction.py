@@ -1,8 +1,9 @@
 """Heating friction: grease thins as the joint warms, and its friction falls with the heat that it has taken up.
 
-The heat is that of a friction that does not depend on speed, so that it comes in with the distance travelled, and leaves
-by Newton's cooling; ``warmth`` is its share of what peak speed would hold up for ever. Where the joint's temperature was
-recorded (``temp.<joint>``), ``per_kelvin`` is the fall by what it reads above 20 °C. What friction is when cold is other effects'.
+The heat is that of a friction that does not depend on speed, so that it comes in with the distance travelled, and
+leaves by Newton's cooling; ``warmth`` is its share of what peak speed would hold up for ever. Where the joint's
+temperature was recorded (``temp.<joint>``), ``per_kelvin`` is the fall by what it reads above 20 °C. What friction is
+when cold is other effects'.
 """
 
 import casadi as ca
@@ -27,7 +28,8 @@ EFFECT = Effect(
     family="joint friction",
     at="joint",
     sentence="friction that falls as the joint warms",
-    equation="-(fall * warmth + per_kelvin * (temperature - 20)) * sgn(qd), time * warmth' = |qd| / peak speed - warmth",
+    equation="-(fall * warmth + per_kelvin * (temperature - 20)) * sgn(qd), "
+    "time * warmth' = |qd| / peak speed - warmth",
     source="Bittencourt, Wernholt, Sander-Tavallaey and Brogårdh (2010); Newton (1701)",
     parameters=(
         Parameter("fall", "T", "friction lost once warm from running at peak speed", low=0.0),
@@ -46,6 +48,6 @@ EFFECT = Effect(
     states=("warmth",),
     rate=_rate,
     from_zero=True,
-    experiment="let {at} rest until it is cold, then repeat one motion without a pause and compare its first minute with "
-    "its last",
+    experiment="let {at} rest until it is cold, then repeat one motion without a pause and compare its first minute "
+    "with its last",
 )
