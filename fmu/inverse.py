@@ -88,8 +88,7 @@ class _Follower:
             states["memory"] = memory = ca.vertcat(*(ledger.state(x) for x in ca.vertsplit(first)))
 
         def at_rest(p: Placed, signals: list[_Signals]) -> list[ca.SX]:
-            n = len(p.effect.states)
-            found = ca.SX.zeros(n) if p.effect.from_zero else self.laws.steady(p, signals[0])
+            found = self.laws.steady(p, signals[0])
             states[p.key] = ca.vertcat(*(ledger.state(x) for x in ca.vertsplit(found)))
             return [found]
 

@@ -116,7 +116,9 @@ class PlacedLaws:
         return ca.vertcat(*p.effect.advance(signals, later, self._parameters[p.key], h))
 
     def steady(self, p: Placed, signals: Mapping[str, ca.SX]) -> ca.SX:
-        """Hidden states with zero rate at given signals."""
+        """Hidden states with zero rate at given signals, or zero where they accumulate."""
+        if p.effect.from_zero:
+            return ca.SX.zeros(len(p.effect.states))
         x = ca.SX.sym("x", len(p.effect.states))
         return root(self.rate(p, {**signals, **dict(zip(p.effect.states, ca.vertsplit(x), strict=True))}), x)
 

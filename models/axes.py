@@ -1,5 +1,7 @@
 """Places for joint effects: a joint, or an axis along a combination of joints, such as a motor of a coupled wrist.
 
+The sum and the difference of two neighbours, ``joint1+joint2`` and ``joint1-joint2``, are axes without being stated.
+
 With w = along · q, an effect's law reads w, its rates and the load back · load, and gives a torque f along w; by
 virtual work the joints feel ``along * f``. ``back`` is how the joints move where w alone moves, along · back = 1.
 """
@@ -77,6 +79,8 @@ class _Joint(Protocol):
     def name(self) -> str: ...
     @property
     def kind(self) -> Literal["revolute", "prismatic"]: ...
+    @property
+    def parent(self) -> int: ...
 
 
 class _Tree(Protocol):
@@ -86,13 +90,27 @@ class _Tree(Protocol):
     def axes(self) -> Sequence[Axis]: ...
 
 
+def neighbours(tree: _Tree, first: int = 0) -> tuple[Axis, ...]:
+    """Sum and difference of every two joints of one kind of which one carries the other, from joint ``first`` on."""
+    found = []
+    for joint in tree.joints[first:]:
+        if not first <= joint.parent < len(tree.joints) or tree.joints[joint.parent].kind != joint.kind:
+            continue
+        other = tree.joints[joint.parent].name
+        for word, sign in (("+", 1.0), ("-", -1.0)):
+            along = {other: 1.0, joint.name: sign}
+            back = {name: x / 2 for name, x in along.items()}
+            found.append(Axis(f"{other}{word}{joint.name}", along, back, joint.kind))
+    return tuple(found)
+
+
 def place(tree: _Tree, at: str) -> Place:
     """The joint or the axis of a name; KeyError where there is none. Joints that are held have no part in an axis."""
     names = [joint.name for joint in tree.joints]
     if at in names:
         one = np.eye(len(names))[names.index(at)]
         return Place(at, one, one, tree.joints[names.index(at)].kind)
-    axis = next((axis for axis in tree.axes if axis.name == at), None)
+    axis = next((axis for axis in (*tree.axes, *neighbours(tree)) if axis.name == at), None)
     if axis is None:
         raise KeyError(at)
     along, back = (np.array([x.get(name, 0.0) for name in names]) for x in (axis.along, axis.back))

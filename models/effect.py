@@ -131,6 +131,9 @@ class Effect:
     acts_on : "torque" or "position"
         Joint effects only: the law gives a torque at the joint, or a displacement of the link behind the joint
         (a vector: displacement, its rate, its second rate), which changes the torque of every joint.
+    neighbours : "", "too" or "only"
+        Joint effects only: whether the effect is tried, unasked, along the sum and the difference of two joints of
+        which one carries the other, beside every joint or instead of it.
     dissipates : bool
         True where the law's power ``qd * torque`` can never be negative; the contract test holds it to that.
     contains : tuple of str
@@ -166,6 +169,7 @@ class Effect:
     advance: Callable[[Symbols, Symbols, Symbols, ca.SX], list[ca.SX]] | None = None
     from_zero: bool = False
     acts_on: Literal["torque", "position"] = "torque"
+    neighbours: Literal["", "too", "only"] = ""
     dissipates: bool = False
     contains: tuple[str, ...] = ()
     at_rest: bool = False

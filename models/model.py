@@ -7,6 +7,7 @@ from pathlib import Path
 from ..errors import InputError
 from ..recordings.cuts import Cuts
 from ..recordings.signals import Signal
+from .axes import neighbours
 from .docking.bench_setup import DockingTree, docking_places
 from .effect import Effect
 from .floating.tree import n_carriers
@@ -114,6 +115,8 @@ def places(effect: Effect, tree: Tree) -> tuple[str, ...]:
     if isinstance(tree, DockingTree):
         return docking_places(effect.at)
     carriers = n_carriers(tree)
+    if effect.neighbours == "only":
+        return tuple(axis.name for axis in neighbours(tree, carriers))
     if effect.at == "joint":
         return tuple(j.name for j in tree.joints[carriers:])
     if effect.at == "link":
@@ -130,6 +133,10 @@ def places(effect: Effect, tree: Tree) -> tuple[str, ...]:
 
 def all_places(effect: Effect, tree: Tree) -> tuple[str, ...]:
     """The same, and axes that are not one joint's own: an effect acts there only where it is asked for by name."""
-    if effect.at != "joint" or effect.acts_on != "torque":
-        return places(effect, tree)
-    return (*places(effect, tree), *(axis.name for axis in tree.axes if len(axis.along) > 1))
+    own = places(effect, tree)
+    if effect.at != "joint" or effect.acts_on != "torque" or isinstance(tree, SnareTree | DockingTree):
+        return own
+    unasked = neighbours(tree, n_carriers(tree)) if effect.neighbours == "too" else ()
+    stated = [axis for axis in tree.axes if len(axis.along) > 1]
+    same = [axis.along for axis in stated]
+    return (*own, *(axis.name for axis in (*stated, *(axis for axis in unasked if axis.along not in same))))

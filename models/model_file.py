@@ -15,7 +15,7 @@ from ..recordings.cuts import read_cuts
 from ..recordings.mixes import read_signal
 from ..recordings.read import SUFFIXES
 from ..recordings.signals import FORMS, FREE, Signal, is_signal, joint_of
-from .axes import read_axes
+from .axes import neighbours, read_axes
 from .docking.bench_setup import read_bench
 from .effects import get_effect
 from .floating.tree import UNNAMED, n_carriers, read_floating
@@ -254,7 +254,7 @@ def _placed(path: Path, entries: Any, tree: Tree) -> tuple[Placed, ...]:
         if effect.at == "sensor":
             allowed += tuple(f"q_link.{j.name}" for j in encoded)
         if effect.at == "joint" and effect.acts_on == "torque":
-            allowed += tuple(axis.name for axis in tree.axes)
+            allowed += tuple(axis.name for axis in (*tree.axes, *neighbours(tree, n_carriers(tree))))
         if at is not None and at not in allowed:
             raise InputError(f"{path}: {name} at {at!r}; this model has {', '.join(allowed)}")
         hold = entry.get("hold", []) if isinstance(entry, dict) else []

@@ -135,6 +135,32 @@ def ripple(s, cosine, sine, period):
     return np.real((cosine - 1j * sine) * np.exp(2j * np.pi * s["q"] / period))
 
 
+def by_quadrant(s, driving_loss, braking_loss):
+    """What a motor supplies by the efficiency of its gear in each quadrant, less what the load asks for."""
+    driven = s["load"] / (1 / (1 + driving_loss))
+    held_back = s["load"] * (1 - braking_loss)
+    return np.where(np.sign(s["load"]) == np.sign(s["qd"]), driven, held_back) - s["load"]
+
+
+def saturated(s, excess, knee, no_load_speed):
+    """Logged torque by a table: one for one between a motor's lines from stall to no-load speed, steeper outside."""
+    shift = knee * s["qd"] / no_load_speed
+    x = s["value"] + shift
+    far = 50.0
+    table = [-far * (1 + excess) + excess * knee, -knee, knee, far * (1 + excess) - excess * knee]
+    return np.interp(x, [-far, -knee, knee, far], table) - shift
+
+
+def warmed(s, fall, per_kelvin, time):
+    """Newton's cooling of what friction heats, by SciPy's linear system."""
+    warmth = lsim(([[-1 / time]], [[1 / time]], [[1.0]], [[0.0]]), np.abs(s["qd"]) / s["speed_scale"], TIME)[1]
+    return -(fall * np.ravel(warmth) + per_kelvin * (s["temperature"] - 20.0)) * np.sign(s["qd"])
+
+
+def bumper(s, above, below, where):
+    return np.interp(s["q"], [where - 9, where, where + 9], [-9 * below, 0.0, 9 * above])
+
+
 def sprung_link(s, stiffness, damping):
     inertia = s["inertia"][0]
 
@@ -293,6 +319,11 @@ REFERENCES = {
     "load_dependent_friction": Reference({"coefficient": 0.12}, lambda s, c: c * np.copysign(s["load"], s["qd"])),
     "position_dependent_friction": Reference({"cosine": 0.6, "sine": -0.8, "period": 1.3}, friction_table),
     "presliding_hysteresis": Reference({"level": 3.0, "travel": 0.08, "by_load": 0.05}, late_friction),
+    "gear_efficiency": Reference({"driving_loss": 0.25, "braking_loss": 0.1}, by_quadrant),
+    "motor_saturation": Reference({"excess": 0.6, "knee": 1.4, "no_load_speed": 9.0}, saturated, likeness=0.1),
+    "heating_friction": Reference({"fall": 3.0, "per_kelvin": 0.2, "time": 5.0}, warmed, tolerance=0.1),
+    "joint_spring": Reference({"stiffness": 6.0, "torque_at_zero": 2.4}, spring),
+    "end_stop": Reference({"above": 30.0, "below": 4.0, "where": 0.6}, bumper, likeness=0.01),
     "rotor_inertia": Reference({"inertia": 0.4}, lambda s, inertia: np.gradient(inertia * s["qd"], DT, edge_order=2)),
     "torque_ripple": Reference({"cosine": 0.3, "sine": 0.5, "period": 0.21}, ripple),
     "joint_elasticity": Reference({"stiffness": 3000.0, "damping": 15.0}, sprung_link),

@@ -36,7 +36,15 @@ def signals():
     rng = np.random.default_rng(3)
     points = rng.normal(size=(TIME.size, 6, 3))
     masses = rng.uniform(0.5, 2.0, size=(TIME.size, 6))
-    columns = {"q": q, "qd": qd, "qdd": qdd, "load": load(TIME), "inertia": 2.0, "temperature": 20.0, "time": TIME}
+    columns = {
+        "q": q,
+        "qd": qd,
+        "qdd": qdd,
+        "load": load(TIME),
+        "inertia": 2.0,
+        "temperature": 20 + 0.5 * TIME,
+        "time": TIME,
+    }
     columns |= {"speed_scale": np.abs(qd).max(), "value": value(TIME)}
     scalars = {name: np.broadcast_to(column, TIME.shape) for name, column in columns.items()}
     links = {"phi": inertial_parameters(masses, points), "tip": rng.normal(size=(TIME.size, 3))}

@@ -63,7 +63,7 @@ class Law:
     def steady(self, signals):
         """Hidden states that stay; zero where they accumulate, and at a base."""
         zero = np.zeros(len(self.effect.states))
-        if self.effect.at == "base" or not len(zero):
+        if self.effect.at == "base" or self.effect.from_zero or not len(zero):
             return zero
         return root(lambda x: self(signals, x)[1], zero, tol=1e-14).x
 
@@ -99,7 +99,8 @@ class Native:
             if law.effect.at == "sensor":
                 channel = f"sensor.{law.at}"
                 value = found.get(channel, self._channel(law, q))
-                found[channel] = law({"value": value, "time": duration}, states[law.key])[0][0]
+                own = self._signals(law, duration, q, qd) | {"value": value}
+                found[channel] = law(own, states[law.key])[0][0]
         return found
 
     def _split(self, y):
@@ -126,10 +127,20 @@ class Native:
         if law.effect.at == "boom":
             link = [k.name for k in self.tree.links].index(law.at)
             return {"spread": boom_map(self.tree, link, q[None])[1][0], "time": t}
-        if law.effect.at not in ("joint", "slide"):
+        if law.effect.at not in ("joint", "slide", "sensor"):
             return {"time": t}
-        j = self.names.index(law.at)
-        return {"q": q[j], "qd": qd[j], "time": t, "speed_scale": self.values.get(f"speed_scale.{law.at}", 0.0)}
+        along = self._along(law)
+        speed = self.values.get(f"speed_scale.{law.at}", 0.0)
+        return {"q": along @ q, "qd": along @ qd, "time": t, "speed_scale": speed}
+
+    def _along(self, law):
+        """A joint's own coordinate (J,), or the sum or difference of two."""
+        at = law.at.partition(".")[2] if law.effect.at == "sensor" else law.at
+        if at in self.names:
+            return np.eye(self.n)[self.names.index(at)]
+        sign = "+" if "+" in at else "-"
+        one, other = (self.names.index(name) for name in at.split(sign))
+        return np.eye(self.n)[one] + (1 if sign == "+" else -1) * np.eye(self.n)[other]
 
     def _felt(self, law, q, value):
         """What a law's numbers do to the base and the joints."""
@@ -137,7 +148,7 @@ class Native:
         if law.effect.at == "base":
             felt[:6] = value
         elif law.effect.at == "joint":
-            felt[self.base + self.names.index(law.at)] = -value[0]
+            felt[self.base :] = -self._along(law) * value[0]
         else:
             felt[self.base :] = -place_map(self.tree, law.effect.at, law.at, q[None])[0] @ value
         return felt

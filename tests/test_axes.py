@@ -17,6 +17,8 @@ from snarelab.fmu.inverse import inverse_equations
 from snarelab.identification.fitting.base_parameters import base_parameters
 from snarelab.identification.fitting.experiment import Experiment
 from snarelab.models.axes import Axis, place
+from snarelab.models.effects import get_effect
+from snarelab.models.model import places
 from snarelab.models.model_file import load_model
 from snarelab.models.model_write import save_model
 
@@ -168,6 +170,32 @@ def test_virtual_work_at_an_axis(tmp_path):
     np.testing.assert_allclose(np.sum(change * experiment.motion.qd, axis=1), 3.0 * w**2, atol=1e-9)
     here = place(tree, "tie")
     assert here.along @ here.back == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("at", "sign"), [("joint1+joint2", 1.0), ("joint1-joint2", -1.0)])
+def test_a_spring_between_two_joints_follows_from_its_energy(tmp_path, at, sign):
+    tree, body = three_joints(tmp_path)
+    experiment = Experiment(motion([j.kind for j in tree.joints]), body)
+    assembly = build((tree, body), experiment, placed(("joint_spring", at)))
+    change = assembly.torque(experiment, np.array([7.0, -2.0])) - assembly.torque(experiment, np.zeros(2))
+
+    def energy(q):
+        return 3.5 * (q[:, 0] + sign * q[:, 1]) ** 2 - 2.0 * (q[:, 0] + sign * q[:, 1])
+
+    q = experiment.motion.q
+    slopes = [(energy(q + 1e-5 * d) - energy(q - 1e-5 * d)) / 2e-5 for d in np.eye(3)]
+    np.testing.assert_allclose(change, np.stack(slopes, axis=1), atol=1e-7)
+
+
+def test_neighbours_are_places_for_a_spring_unasked(tmp_path):
+    tree, _ = three_joints(tmp_path)
+    # The third joint slides: an angle and a length are not added.
+    assert places(get_effect("joint_spring"), tree) == ("joint1+joint2", "joint1-joint2")
+    recorded(tmp_path, "a", 1.0)
+    path = write(tmp_path, "", '{ name = "coulomb_friction", at = "joint2-joint3" }', "pair.toml")
+    assert [p.key for p in load_model(path).effects] == ["coulomb_friction.joint2-joint3"]
+    with pytest.raises(InputError, match=r"joint1\+joint2"):
+        load_model(write(tmp_path, "", '{ name = "joint_spring", at = "joint1" }', "wrong.toml"))
 
 
 @pytest.mark.parametrize("laws", [("rotor_inertia",), ("rotor_inertia", "load_dependent_friction", "viscous_friction")])

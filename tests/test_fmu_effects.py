@@ -47,6 +47,10 @@ SYSTEMS = {
             "presliding_hysteresis": {"level": 2.0, "travel": 0.02},
             "torque_ripple": {"cosine": 0.7, "sine": 0.4, "period": 0.3},
             "harness_stiffness": {"stiffness": 20.0, "torque_at_zero": 1.0},
+            "gear_efficiency": {"driving_loss": 0.2, "braking_loss": 0.05},
+            "heating_friction": {"fall": 20.0, "time": 2.0},
+            "end_stop": {"above": 30.0, "below": 4.0, "where": 0.1},
+            "joint_spring": {"stiffness": 8.0, "torque_at_zero": 1.5},
             "rotor_inertia": {"inertia": 0.8},
             "payload_mass": {"mass": 2.0, "x": 0.1, "y": -0.05, "z": 0.02},
             "com_offset": {"x": 0.02, "y": 0.01, "z": -0.01},
@@ -56,10 +60,11 @@ SYSTEMS = {
             "sensor_bias": {"offset": 0.3},
             "sensor_drift": {"rate": 0.2},
             "sensor_delay": {"delay": 0.01},
+            "motor_saturation": {"excess": 0.5, "knee": 3.0, "no_load_speed": 4.0},
         },
         ([0.3, -0.5], [0.9, -0.7]),
         [12.0, -4.0],
-        ("sensor_gain", "sensor_bias", "sensor_drift", "sensor_delay"),
+        ("sensor_gain", "sensor_bias", "sensor_drift", "sensor_delay", "motor_saturation"),
     ),
     "rig": System(
         'system = "zero_g_rig"',
@@ -93,7 +98,7 @@ SPRINGS = {"joint_elasticity": {"stiffness": 400.0, "damping": 2.0}}
 SPRINGS["backlash"] = SPRINGS["joint_elasticity"] | {"gap": 0.004}
 CASES = [(kind, name) for kind, system in SYSTEMS.items() for name in system.cases]
 NARROW = {"sensor_gain": "tau.joint1", "sensor_bias": "tau.joint1", "sensor_drift": "tau.joint2"}
-NARROW |= {"sensor_delay": "q.joint2"}
+NARROW |= {"sensor_delay": "q.joint2", "motor_saturation": "tau.joint1"}
 
 
 def test_no_effect_of_the_vocabulary_is_left_out():

@@ -218,7 +218,9 @@ def _grid(assembly: Assembly, p: Placed) -> tuple[list[Variant], bool]:
     finer = [grid[0]]
     for a, b in pairwise(grid):
         middle = a.parameters.copy()
-        middle[i] = 2 / (1 / a.parameters[i] + 1 / b.parameters[i])
+        one, other = a.parameters[i], b.parameters[i]
+        # Periods are halved between by their number in the travel; a place may be zero, or on either side of it.
+        middle[i] = 2 / (1 / one + 1 / other) if one * other > 0 else 0.5 * (one + other)
         finer += [replace(a, parameters=middle), b]
     return finer, True
 
