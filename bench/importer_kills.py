@@ -3,7 +3,7 @@
 ``python bench/importer_kills.py [--kills 200] [--seed 1] [--log FILE] [KIND ...]`` over these importers, each with FMUs
 that have Python beside them (`snarelab.fmu.hosted`):
 
-- ``c``: a program without any Python in it (``tests/fmu_host.c``);
+- ``c``: a program without any Python in it (``tests/helpers/fmu_host.c``);
 - ``python``: FMPy's calls from Python, writing a row at each step;
 - ``cosim``: ``snarelab cosim`` with such an FMU and one in C, which hangs after a while.
 

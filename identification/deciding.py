@@ -1,7 +1,7 @@
 """Every number that decides what a diagnosis says, with its unit and why it has the value it has.
 
-A test moves each one by a factor of two and sees an answer change (``tests/test_deciding_*.py``). Tolerances of solvers
-stay beside their solver, and what only words or pictures depend on beside those.
+A test moves each one by a factor of two and sees an answer change (``tests/identification/test_deciding_*.py``).
+Tolerances of solvers stay beside their solver, and what only words or pictures depend on beside those.
 """
 
 # Prior odds, before the recordings are looked at. Shared by the vocabulary's effects, and by the places of each.

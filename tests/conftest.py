@@ -16,7 +16,8 @@ from snarelab.models.c_library import find_compiler
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.append(str(ROOT))  # bench/ holds the independent plant; it is not part of the package
-sys.path.append(str(ROOT / "tests"))  # what several files of tests share
+sys.path.append(str(ROOT / "tests" / "helpers"))  # what several files of tests share
+sys.path.append(str(ROOT / "tests"))  # for fuzz/
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # A shell starts what runs in the background deaf to Ctrl-C, and so would be what the tests start.
