@@ -10,16 +10,18 @@ import json
 import sys
 from importlib.metadata import distribution
 from pathlib import Path
+from typing import Any
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 
 import numpy as np
 import pandas as pd
-import pinocchio as pin
+import pinocchio
 
 from bench.fast import cost
 from bench.results import write_result
 
+pin: Any = pinocchio  # its names come from a compiled module
 ROBOTS = {
     "UR5": "ur_description/urdf/ur5_robot.urdf",
     "Go2": "go2_description/urdf/go2.urdf",
