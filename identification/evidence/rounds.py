@@ -253,16 +253,25 @@ def _rivals(search: Search, slot: Slot, amplitudes: Array) -> tuple[RivalOdds, .
 
 
 def likeness(search: Search, own: int, amplitudes: Array, energy: float, other: int) -> float:
-    """Largest share of what an item adds that another hypothesis's law by itself can add as well [0 to 1]."""
+    """Largest share of what an item adds that another hypothesis's law by itself can add as well [0 to 1].
+
+    Amplitudes that cannot be negative are not: friction that falls with heat is none that grows.
+    """
     best, on = 0.0, search.on
     start = sum(len(h.items) for h in search.pool[:other])
     for number, item in enumerate(search.pool[other].items, start):
         k = max(len(item.label.amplitudes), 1)
         cross = (amplitudes @ on.curvature(own, number))[:k]
         curvature = on.own(number)[:k, :k]
-        ridge = 1e-9 * np.trace(curvature) + 1e-300
-        solved = np.linalg.solve(curvature + ridge * np.eye(k), cross)
-        best = max(best, float(cross @ solved) / max(energy, 1e-300))
+        curvature = curvature + (1e-9 * np.trace(curvature) + 1e-300) * np.eye(k)
+        free = np.arange(k)
+        while len(free):
+            solved = np.linalg.solve(curvature[np.ix_(free, free)], cross[free])
+            negative = item.positive[free] & (solved < 0)
+            if not negative.any():
+                best = max(best, float(cross[free] @ solved) / max(energy, 1e-300))
+                break
+            free = free[~negative]
     return best
 
 
