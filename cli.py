@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from . import __version__
-from .arguments import Once, positive
+from .arguments import positive
 from .cosim.command import add_parser as add_cosim
 from .errors import InputError, nearest, one_line
 from .exit_status import status_of
@@ -107,7 +107,13 @@ def _parser() -> argparse.ArgumentParser:
     p = commands.add_parser("diagnose", help="find, name and add the physics that a model leaves out")
     p.add_argument("model", metavar="MODEL.toml")
     p.add_argument("recordings", nargs="+", metavar="RECORDING")
-    p.add_argument("--holdout", required=True, action=Once, metavar="RECORDING", help="held out, for the proof only")
+    p.add_argument(
+        "--holdout",
+        required=True,
+        action="append",
+        metavar="RECORDING",
+        help="held out, for the proof; may be repeated",
+    )
     p.add_argument("--json", metavar="OUT.json", help="where to write the result; - for standard output")
     p.add_argument("--report", metavar="OUT.html", help="where to write the report, one self-contained page")
     p.add_argument("--save-model", metavar="NEW.toml", help="where to write the model with what was found")
@@ -190,7 +196,7 @@ def _diagnose(given: argparse.Namespace) -> None:
     from .recordings import demand_suffix, write_recording
 
     outputs = [given.report, given.save_model, given.next_experiment]
-    _writable(given.json, outputs, [*given.recordings, given.holdout])
+    _writable(given.json, outputs, [*given.recordings, *given.holdout])
     model, planned = load_model(given.model), None
     if given.next_experiment:
         demand_suffix(given.next_experiment)
@@ -228,7 +234,8 @@ def _origin(given: argparse.Namespace, model: "Model") -> "Provenance":
     from .report.provenance import provenance
 
     recordings = [("Training", recording) for recording in given.recordings]
-    files = [("Model", given.model), ("Robot", model.urdf), *recordings, ("Held-out", given.holdout)]
+    held = [("Held-out", recording) for recording in given.holdout]
+    files = [("Model", given.model), ("Robot", model.urdf), *recordings, *held]
     return provenance(f"snarelab {shlex.join(given.words)}", files)
 
 

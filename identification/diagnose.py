@@ -21,6 +21,7 @@ from .fitting.base_parameters import base_parameters
 from .fitting.constants import notes_on, settled, with_constants
 from .fitting.experiment import Experiment, demand_apart, load_experiments, scales, with_silence
 from .fitting.fit import Fit, channel_rms
+from .fitting.friction_curve import friction_curves
 from .fitting.recorded import read_all, with_recorded_joints
 from .identify import demand_one_process, inertial_values, physical
 from .links.answer import with_links
@@ -40,7 +41,7 @@ class Answer:
 def diagnose(
     model: Model,
     recordings: Sequence[str | Path],
-    holdout: str | Path,
+    holdout: str | Path | Sequence[str | Path],
     *,
     progress: Callable[[str], None] = lambda _: None,
     seed: int = 0,
@@ -54,8 +55,8 @@ def diagnose(
     model : Model
     recordings : sequence of path
         Fitted and searched.
-    holdout : path
-        Confirms what the others named; nothing is fitted to it, and no search sees it.
+    holdout : path, or sequence of them
+        Confirm what the others named; nothing is fitted to them, and no search sees them.
     progress : callable
         Told in a few words what is under way.
     seed : int
@@ -70,31 +71,32 @@ def diagnose(
     InputError
         Whatever is wrong with the recordings, a holdout that is one of them, or ``jobs`` for another system.
     """
-    demand_apart(recordings, holdout)
+    held = demand_apart(recordings, holdout)
     if isinstance(model.tree, SnareTree):
         # Loaded here: numba takes longer to load than a short arm to fit.
         from .snare.diagnose import diagnose_captures
 
-        return Answer(*diagnose_captures(model, recordings, holdout, progress=progress, seed=seed, jobs=jobs))
+        return Answer(*diagnose_captures(model, recordings, held, progress=progress, seed=seed, jobs=jobs))
     demand_one_process(model, jobs)
     if isinstance(model.tree, DockingTree):
         from .docking.diagnose import diagnose_dockings
 
-        return Answer(*diagnose_dockings(model, recordings, holdout, progress=progress))
+        return Answer(*diagnose_dockings(model, recordings, held, progress=progress))
     progress("reading and conditioning the recordings")
     prepare(effects().values())
-    *read, held = read_all(model, [*recordings, holdout])
-    model = with_recorded_joints(model, [*read, held])
+    read = read_all(model, [*recordings, *held])
+    model = with_recorded_joints(model, read)
     body = RigidBody(model.tree)
-    checks = early_checks(model, [*read, held])
+    checks = early_checks(model, read)
     if contradict(checks) and not anyway:
         return Answer(data_fault(model, checks), model)
     given = model
-    model, (*read, held), said = with_constants(model, [*read, held], len(recordings))
-    train = with_silence(load_experiments(model, recordings, body, datasets=read))
+    count = len(recordings)
+    model, read, said = with_constants(model, read, count)
+    train = with_silence(load_experiments(model, recordings, body, datasets=read[:count]))
     band = min(e.motion.band for e in train)
-    locked = with_silence(load_experiments(model, [holdout], body, band, datasets=[held]))
-    checks = run_checks(model, [*read, held], [*train, *locked], checks, progress)
+    locked = with_silence(load_experiments(model, held, body, band, datasets=read[count:]))
+    checks = run_checks(model, read, [*train, *locked], checks, progress)
     if contradict(checks) and not anyway:
         return Answer(data_fault(model, checks, [*train, *locked]), given)
     base = base_parameters(body) if model.inertia == "free" else None
@@ -107,12 +109,22 @@ def diagnose(
     of_links = tuple(p for p in model.effects if p.at.startswith("q_link."))
     after = replace(model, effects=(*final.assembly.placed, *of_links), values=values)
     links, compared = diagnose_links(
-        model, recordings, holdout, body, final.assembly, final.theta, scales(train), band, progress=progress, seed=seed
+        model,
+        recordings,
+        held,
+        body,
+        final.assembly,
+        final.theta,
+        scales(train),
+        band,
+        progress=progress,
+        seed=seed,
     )
     if links:
         diagnosis, after = with_links(diagnosis, after, links, compared)
     notes = (*model.tree.notes, *said, *notes_on(final), *diagnosis.notes)
-    return Answer(replace(diagnosis, checks=checks, notes=notes), settled(after))
+    curves = tuple(friction_curves(final, train))
+    return Answer(replace(diagnosis, checks=checks, notes=notes, curves=curves), settled(after))
 
 
 def _steps(decided: Decided, final: Fit, train: Sequence[Experiment], locked: Sequence[Experiment]) -> tuple[Step, ...]:

@@ -143,6 +143,39 @@ class Trace:
     after: Array
 
 
+@dataclass(frozen=True, eq=False)
+class FrictionCurve:
+    """Friction at one place over the speeds that the joint travelled.
+
+    Parameters
+    ----------
+    at : str
+        The joint.
+    kind : "joint" or "slide"
+        Torque at the joint, or force at each contact of the hang units' slides that it moves.
+    effects : tuple of str
+        Effects that add up to it.
+    speed : array (n,)
+        [rad/s or m/s]
+    value, std : array (n,)
+        Friction and its standard deviation [unit]; the band is two of them either side.
+    unit : str
+    """
+
+    at: str
+    kind: str
+    effects: tuple[str, ...]
+    speed: Array
+    value: Array
+    std: Array
+    unit: str
+
+    def to_json(self) -> dict[str, Any]:
+        """The published form."""
+        numbers = {name: getattr(self, name).tolist() for name in ("speed", "value", "std")}
+        return {"at": self.at, "kind": self.kind, "effects": list(self.effects), **numbers, "unit": self.unit}
+
+
 @dataclass(frozen=True)
 class Diagnosis:
     """The whole answer.
@@ -174,6 +207,8 @@ class Diagnosis:
         Analysis band's edge [Hz].
     checks : tuple of Check
         What of the recordings and the model is not as it should be; a ``data_fault`` where they contradict each other.
+    curves : tuple of FrictionCurve
+        Friction of each joint over its speed, of all laws there together, with its deviation.
     """
 
     verdict: Literal["data_fault", "missing_physics", "adequate", "unknown_effect"]
@@ -191,9 +226,11 @@ class Diagnosis:
     notes: tuple[str, ...]
     band: float
     checks: tuple[Check, ...] = ()
+    curves: tuple[FrictionCurve, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """The published form: plain dicts, lists, numbers and text. JSON has no infinity: what is unknown is null."""
+        curves = {"curves": [c.to_json() for c in self.curves]} if self.curves else {}
         return _finite(
             {
                 "verdict": self.verdict,
@@ -226,6 +263,7 @@ class Diagnosis:
                 "limits": [vars(x) for x in self.limits],
                 "notes": list(self.notes),
                 "band": {"value": self.band, "unit": "Hz"},
+                **curves,
             }
         )
 

@@ -27,7 +27,7 @@ def diagnose(
     model: ModelLike,
     recordings: RecordingLike | Sequence[RecordingLike],
     *,
-    holdout: RecordingLike,
+    holdout: RecordingLike | Sequence[RecordingLike],
     progress: Callable[[str], None] = lambda _: None,
     seed: int = 0,
     jobs: int | None = None,
@@ -41,7 +41,7 @@ def diagnose(
         What is believed.
     recordings : path, xarray.Dataset or pandas.DataFrame, or a sequence of them
         Fitted and searched. A table in memory has the columns of a file: ``time``, ``q.<joint>``, ``tau.<joint>``.
-    holdout : path, xarray.Dataset or pandas.DataFrame
+    holdout : the same
         Locked away for the proof; may not be one of the others.
     progress : callable
         Told in a few words what is under way, for example ``print``.
@@ -82,10 +82,10 @@ def diagnose(
     >>> found.save_model("arm3-new.toml")
     """
     given = _model(model)
-    with as_files([*_several(recordings), holdout]) as paths:
-        answer = diagnosing.diagnose(
-            given, paths[:-1], paths[-1], progress=progress, seed=seed, jobs=jobs, anyway=anyway
-        )
+    train, locked = _several(recordings), _several(holdout)
+    with as_files([*train, *locked]) as paths:
+        fitted, held = paths[: len(train)], paths[len(train) :]
+        answer = diagnosing.diagnose(given, fitted, held, progress=progress, seed=seed, jobs=jobs, anyway=anyway)
     return DiagnosisResult(answer.diagnosis, answer.model)
 
 

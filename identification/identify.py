@@ -94,18 +94,7 @@ class Identified:
         }
         curves = friction_curves(found, self.train)
         if curves:
-            answer["curves"] = [
-                {
-                    "at": c.at,
-                    "kind": c.kind,
-                    "effects": list(c.effects),
-                    "speed": c.speed.tolist(),
-                    "value": c.value.tolist(),
-                    "std": c.std.tolist(),
-                    "unit": c.unit,
-                }
-                for c in curves
-            ]
+            answer["curves"] = [c.to_json() for c in curves]
         if self.inertia is not None:
             answer["inertia"] = {
                 "physical": not self.inertia.changed,

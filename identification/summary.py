@@ -5,7 +5,7 @@ from math import inf
 from typing import Any
 
 from .diagnosis import Diagnosis, Finding, Step
-from .report.words import chance, unit_words, with_std, words
+from .report.words import chance, measured, unit_words, words
 
 _LABEL = 60
 
@@ -54,8 +54,7 @@ def check_lines(checks: Sequence[Mapping[str, Any]]) -> list[str]:
 
 def value_words(name: str, value: float, std: float | None, unit: str) -> str:
     """``level 20.39 ± 0.05 N``."""
-    shown, spread = with_std(value, inf if std is None else std)
-    return f"{words(name)} {shown} ± {spread} {unit_words(unit)}".rstrip()
+    return f"{words(name)} {measured(value, inf if std is None else std, unit)}"
 
 
 def indistinguishable(findings: Sequence[Finding]) -> list[tuple[Finding, str, str]]:

@@ -4,6 +4,7 @@ Rows that a fit sees and rows that it does not may so come from one file.
 """
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -56,3 +57,8 @@ def part_of(path: str | Path) -> Part:
             f"{path}: the part from {found.start:g} s to {found.stop:g} s is empty; write it as FILE@FROM:TO"
         )
     return found
+
+
+def several(recordings: str | Path | Sequence[str | Path]) -> tuple[str | Path, ...]:
+    """One recording or several, as several."""
+    return (recordings,) if isinstance(recordings, str | Path) else tuple(recordings)

@@ -63,10 +63,15 @@ figcaption{margin-top:.35rem;max-width:50rem}
 details{margin:1rem 0}
 summary{cursor:pointer;color:var(--accent)}
 .on-paper{display:none}
+.kept{display:inline-block}
 .provenance{font-size:.85rem}
 code{font-size:.92em}
 .card>h3{margin-bottom:.25rem}
 footer{margin:3rem auto 2rem;color:var(--quiet);font-size:.85rem}
+@media screen and (max-width:40rem){.names .n{text-align:left}.names thead{display:none}
+.names tr,.names th,.names td{display:block;border:0;padding:0}.names tr{border-bottom:1px solid var(--line);padding:.4rem 0}
+.names .n{display:inline-block;margin-right:1.2rem}.names td:nth-child(3)::before{content:"probability "}
+.names td:nth-child(4)::before{content:"share "}}
 @media (max-width:40rem){.bar{display:none}th,td{padding-right:.7rem}
 .facts{grid-template-columns:1fr}.facts dd{margin-bottom:.4rem}}
 @media print{:root{--paper:#fff;--ink:#000;--quiet:#444;--line:#bbb;--card:#fff;--accent:#000;--plate:#fff}
@@ -81,7 +86,8 @@ grid-template-columns:max-content 1fr max-content 1fr}
 #answer h2{margin:.4rem 0 .2rem;padding-top:.2rem;font-size:11pt}
 #answer h3{font-size:9pt}#answer figure,#answer p,#answer h3,#answer .scroll{margin:.25rem 0}
 #answer table,#answer figcaption{font-size:8.5pt}#answer th,#answer td{padding-top:.1rem;padding-bottom:.1rem}
-#answer .plot img{max-height:75mm;width:auto;max-width:100%}#answer .provenance{font-size:7.5pt}
+#answer .plot img{max-height:62mm;width:auto;max-width:100%}#answer .provenance{font-size:7pt;line-height:1.2;row-gap:0}
+#answer .plate{padding:0}.provenance code{font-size:1em}
 .status{-webkit-print-color-adjust:exact;print-color-adjust:exact}.bar,.bar i{print-color-adjust:exact}
 details::details-content{content-visibility:visible;block-size:auto}}
 """

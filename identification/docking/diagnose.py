@@ -7,6 +7,7 @@ from pathlib import Path
 from ...errors import InputError
 from ...models.docking.bench_setup import DockingTree
 from ...models.model import Model
+from ...recordings.part import several
 from ..deciding import SECOND_CHOICES
 from ..diagnosis import Diagnosis
 from .answer import report_on, with_found
@@ -19,7 +20,7 @@ from .search import search
 def diagnose_dockings(
     model: Model,
     recordings: Sequence[str | Path],
-    holdout: str | Path,
+    holdout: str | Path | Sequence[str | Path],
     *,
     progress: Callable[[str], None] = lambda _: None,
 ) -> tuple[Diagnosis, Model]:
@@ -30,7 +31,7 @@ def diagnose_dockings(
     model : Model
         Of a docking.
     recordings : sequence of path
-    holdout : path
+    holdout : path, or sequence of them
         Looked at for the proof only.
     progress : callable
 
@@ -48,9 +49,9 @@ def diagnose_dockings(
         raise InputError("recordings: none is given; give one or more")
     begun = time.monotonic()
     progress("reading the recordings")
-    records = load_records(model, [*recordings, holdout])
+    records = load_records(model, [*recordings, *several(holdout)])
     runs = Runs(model.tree.setup, records)
-    train, held = range(len(recordings)), [len(recordings)]
+    train, held = range(len(recordings)), range(len(recordings), len(records))
     found = search(runs, train, model, progress=progress)
     best = confirm(runs, train, held, model, found, progress)
     rejected = {n.placed.key: n for n in best.rejected}

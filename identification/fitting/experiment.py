@@ -19,7 +19,7 @@ from ...models.rig.kinematics import sling_map
 from ...models.rig.rig import Rig
 from ...models.rigid_body import RigidBody
 from ...recordings.condition import Motion, condition
-from ...recordings.part import part_of
+from ...recordings.part import part_of, several
 from .floating_terms import as_carriers, twist_noise, wheel_impulse, with_base, with_twist
 from .recorded import read_all, read_motion
 
@@ -261,8 +261,21 @@ def _without_gaps_in(tensions: Mapping[str, Array], dataset: xr.Dataset) -> xr.D
     return dataset.assign({name: dataset[name].where(xr.DataArray(good, dims="time")) for name in names})
 
 
-def demand_apart(recordings: Sequence[str | Path], holdout: str | Path) -> None:
-    """Refuse a held-out recording that is fitted too (InputError)."""
+def demand_apart(
+    recordings: Sequence[str | Path], holdout: str | Path | Sequence[str | Path]
+) -> tuple[str | Path, ...]:
+    """The held-out recordings; refuses none, one that is fitted too, and one given twice (InputError)."""
+    held = several(holdout)
+    if not held:
+        raise InputError("holdout: none is given; give one or more recordings that the fit does not see")
+    for k, one in enumerate(held):
+        _demand_unseen(recordings, one)
+        if any(part_of(one).overlaps(part_of(other)) for other in held[:k]):
+            raise InputError(f"{one}: is held out twice, or parts of it are; give each once")
+    return held
+
+
+def _demand_unseen(recordings: Sequence[str | Path], holdout: str | Path) -> None:
     part = part_of(holdout)
     for one in map(part_of, recordings):
         held, fitted = part.file, one.file

@@ -4,14 +4,13 @@ Parameters of a friction law trade off against one another, and none may be know
 from the parameters' joint covariance S through the law's derivative G (the delta method): var f = diag(G S G').
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ...models.axes import Place, place
 from ...models.hidden_state import evaluate_law, reads
 from ...models.model import Placed
+from ..diagnosis import FrictionCurve
 from .experiment import Experiment
 from .fit import Fit
 
@@ -19,34 +18,6 @@ Array = NDArray[np.float64]
 
 POINTS = 61
 """Speeds at which a curve is drawn, evenly over the speeds travelled and dense near rest."""
-
-
-@dataclass(frozen=True, eq=False)
-class FrictionCurve:
-    """Friction at one place over the speeds that the joint travelled.
-
-    Parameters
-    ----------
-    at : str
-        The joint.
-    kind : "joint" or "slide"
-        Torque at the joint, or force at each contact of the hang units' slides that it moves.
-    effects : tuple of str
-        Effects that add up to it.
-    speed : array (POINTS,)
-        [rad/s or m/s]
-    value, std : array (POINTS,)
-        Friction and its standard deviation [unit]; the band is two of them either side.
-    unit : str
-    """
-
-    at: str
-    kind: str
-    effects: tuple[str, ...]
-    speed: Array
-    value: Array
-    std: Array
-    unit: str
 
 
 def friction_curves(found: Fit, experiments: list[Experiment] | tuple[Experiment, ...]) -> list[FrictionCurve]:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ...models.model import Model, Placed
 from ...models.rigid_body import RigidBody
+from ...recordings.part import several
 from ..fitting.assembly import Assembly
 from ..fitting.experiment import Experiment, Scales
 from .pair import Pair, PairFit, fit_pair, held_out, load_links, pair_of
@@ -86,7 +87,7 @@ class LinkDiagnosis:
 def diagnose_links(
     model: Model,
     recordings: Sequence[str | Path],
-    holdout: str | Path,
+    holdout: str | Path | Sequence[str | Path],
     body: RigidBody,
     assembly: Assembly,
     theta: Array,
@@ -117,7 +118,7 @@ def diagnose_links(
     """
     joints, links = load_links(model, recordings, body, band)
     if joints:
-        also, locked = load_links(model, [holdout], body, band)
+        also, locked = load_links(model, several(holdout), body, band)
         joints = tuple(j for j in joints if j in also)
     if not joints:
         return (), []

@@ -7,7 +7,13 @@ from ...report.provenance import Provenance
 from ..diagnosis import Diagnosis, Finding
 from ..summary import indistinguishable
 from .fit import comparison, most_changed
-from .words import chance, percent, unit_words, with_std, words
+from .words import chance, measured, percent, words
+
+
+_MOST = 14
+"""Names for which the first printed sheet has room."""
+_FEW = 5
+"""Lines of what is alike, and of what to do next, for which it has room."""
 
 
 def answer(diagnosis: Diagnosis, origin: Provenance) -> tuple[str, str, str]:
@@ -26,8 +32,10 @@ def answer(diagnosis: Diagnosis, origin: Provenance) -> tuple[str, str, str]:
 
 def _names(diagnosis: Diagnosis) -> str:
     shares = {(c.name, c.at): c.explained for c in diagnosis.candidates}
+    shown = sorted(diagnosis.effects, key=lambda finding: -finding.probability)[:_MOST]
+    shown = [finding for finding in diagnosis.effects if finding in shown]
     rows = []
-    for finding in diagnosis.effects:
+    for finding in shown:
         name = words(finding.name)
         share = shares.get((finding.name, finding.at))
         rows.append(
@@ -39,23 +47,34 @@ def _names(diagnosis: Diagnosis) -> str:
             ]
         )
     caption = "What the model leaves out. Share: of the residual's energy that it explains by itself; shares overlap"
-    return table(caption, ["Effect", "Value ± deviation", "Probability", "Share"], rows, numeric=(2, 3))
+    heads = ["Effect", "Value ± deviation", "Probability", "Share"]
+    more = len(diagnosis.effects) - len(shown)
+    rest = paragraph(f"And {more} more that are less likely: see what is missing, below.") if more else ""
+    return f'<div class="names">{table(caption, heads, rows, numeric=(2, 3))}</div>{rest}'
 
 
 def _values(finding: Finding) -> str:
     said = []
     for name, estimate in finding.parameters.items():
-        value, std = with_std(estimate.value, estimate.std)
         bound = " (at its bound)" if estimate.at_bound else ""
-        said.append(f"{escape(words(name))} {value} ± {std} {escape(unit_words(estimate.unit))}{bound}".rstrip())
-    return "<br>".join(said) or "–"
+        text = f"{words(name)} {measured(estimate.value, estimate.std, estimate.unit)}{bound}"
+        said.append(f"<span class=\"kept\">{escape(text)}</span>")
+    return "; ".join(said) or "–"
 
 
 def _alike(diagnosis: Diagnosis) -> str:
     pairs = indistinguishable(diagnosis.effects)
     if not pairs:
         return paragraph("Every name was told apart from its rivals by these recordings.")
-    return "".join(paragraph(f"{words(finding.name)} at {finding.at}, or {rival}") for finding, rival, _ in pairs)
+    lines = [f"{words(finding.name)} at {finding.at}, or {rival}" for finding, rival, _ in pairs]
+    return "".join(map(paragraph, _first(lines, _FEW)))
+
+
+def _first(lines: list[str], most: int) -> list[str]:
+    """So many lines as there is room for; the last says how many stand below."""
+    if len(lines) <= most:
+        return lines
+    return [*lines[: most - 1], f"And {len(lines) - most + 1} more, below with their names."]
 
 
 def _next(diagnosis: Diagnosis) -> str:
@@ -65,7 +84,7 @@ def _next(diagnosis: Diagnosis) -> str:
         if experiment
     )
     if experiments:
-        return "".join(paragraph(f"{text}.".replace("..", ".")) for text in experiments)
+        return "".join(paragraph(f"{text}.".replace("..", ".")) for text in _first(list(experiments), _FEW))
     return paragraph(
         {
             "missing_physics": "Take the improved model (--save-model) and diagnose it on a third recording: is it "

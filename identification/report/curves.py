@@ -7,8 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ...report.drawing import AFTER, BEFORE, GREY, drawing, margins, svg
-from ..diagnosis import Array, Trace
-from .words import unit_words
+from ..diagnosis import Array, FrictionCurve, Trace
+from .words import unit_words, words
 
 _BINS = 40
 _FEWEST = 8
@@ -43,6 +43,29 @@ def residual_curves(traces: Sequence[Trace], changed: bool) -> bytes | None:
         handles, names = row[0].get_legend_handles_labels()
         figure.legend(handles, names, loc="upper left", ncols=2, bbox_to_anchor=(0.06, 1.0))
         return svg(figure)
+
+
+def friction_over_speed(curve: FrictionCurve) -> bytes:
+    """All friction of one joint over its speed, with a band of two standard deviations either side."""
+    unit = _COORDINATE_UNIT.get(curve.unit, "")
+    with drawing():
+        figure = Figure(figsize=(5.4, 2.8))
+        axes = figure.subplots()
+        figure.subplots_adjust(**margins(figure, 0.75, 0.15, 0.5, 0.15))
+        axes.axhline(0, color=GREY, linewidth=0.6)
+        axes.axvline(0, color=GREY, linewidth=0.6)
+        low, high = curve.value - 2 * curve.std, curve.value + 2 * curve.std
+        axes.fill_between(curve.speed, low, high, color=AFTER, alpha=0.25, linewidth=0)
+        axes.plot(curve.speed, curve.value, color=AFTER, linewidth=1.6)
+        axes.set_xlabel(f"speed of {curve.at} [{unit}/s]" if unit else f"speed of {curve.at}")
+        axes.set_ylabel(f"friction [{unit_words(curve.unit)}]")
+        return svg(figure)
+
+
+def friction_words(curve: FrictionCurve) -> str:
+    """What stands in the picture of a friction curve."""
+    laws = ", ".join(words(name) for name in curve.effects)
+    return f"Friction of {curve.at} over its speed, of all laws there together: {laws}."
 
 
 def binned(coordinate: Array, residual: Array, bins: int = _BINS) -> tuple[Array, Array, Array]:

@@ -7,7 +7,8 @@ from html import escape
 from ...report.drawing import BEFORE
 from ...report.html import bar, figure, flag, folded, headline, paragraph, table
 from ...report.zoom import Curve, Strip, zoomable
-from ..diagnosis import Diagnosis, Finding, Limit, Location, Rival, Trace
+from ..diagnosis import Diagnosis, Finding, FrictionCurve, Limit, Location, Rival, Trace
+from .curves import friction_over_speed, friction_words
 from .figures import residual_over_time
 from .words import chance, number, percent, spans, unit_words, with_std, words
 
@@ -48,7 +49,8 @@ def missing(diagnosis: Diagnosis) -> tuple[str, str, str]:
     text = paragraph(diagnosis.description)
     if diagnosis.verdict == "unknown_effect":
         return "missing", "What is known about it", f'<article class="card">{text}</article>\n'
-    cards = "".join(_card(place, group) for place, group in _by_place(diagnosis.effects).items())
+    curves = {curve.at: curve for curve in diagnosis.curves if curve.kind == "joint"}
+    cards = "".join(_card(place, group, curves.get(place)) for place, group in _by_place(diagnosis.effects).items())
     if diagnosis.description:
         cards += f'<article class="card"><h3>Without a name</h3>\n{text}</article>\n'
     return "missing", "What is missing", cards
@@ -140,8 +142,8 @@ def _by_place(findings: Sequence[Finding]) -> dict[str, list[Finding]]:
     return groups
 
 
-def _card(place: str, findings: Sequence[Finding]) -> str:
-    """All that was found at one place: a table of names and values, with evidence and rivals folded away."""
+def _card(place: str, findings: Sequence[Finding], curve: FrictionCurve | None) -> str:
+    """All that was found at one place: a table of values, its friction as one curve, evidence and rivals folded."""
     rows, details = [], ""
     for finding in findings:
         name = words(finding.name)
@@ -158,6 +160,9 @@ def _card(place: str, findings: Sequence[Finding]) -> str:
         details += folded(f"Why {name} at {finding.at}", paragraph(finding.evidence) + _rivals(finding.rivals))
     heads = ["Effect", "Probability", "Parameter", "Value", "Deviation", "Unit", ""]
     found = table(f"Found at {place}", heads, rows, (1, 3, 4), False)
+    if curve and any(finding.name in curve.effects for finding in findings):
+        text = friction_words(curve)
+        found += figure(friction_over_speed(curve), text, f"{text} Band: two standard deviations.", small=True)
     return f'<article class="card"><h3>{escape(place)}</h3>\n{found}{details}</article>\n'
 
 

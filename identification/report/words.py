@@ -67,6 +67,15 @@ def with_std(value: float, std: float) -> tuple[str, str]:
     return _fixed(value / 10.0**size, size - last) + power, _fixed(std / 10.0**size, size - last) + power
 
 
+def measured(value: float, std: float, unit: str = "") -> str:
+    """A value with its standard deviation and unit: ``20.39 ± 0.05 N``, ``(9.9 ± 0.2) × 10⁻⁵ rad``."""
+    shown, spread = with_std(value, std)
+    (number_, times, power), (deviation, _, same) = shown.partition("\u2009×"), spread.partition("\u2009×")
+    if times and power == same:
+        shown, spread = f"({number_}", f"{deviation}){times}{power}"
+    return f"{shown} ± {spread} {unit_words(unit)}".rstrip()
+
+
 def spans(windows: tuple[tuple[float, float], ...], most: int = 8) -> str:
     """Time windows in seconds, the first few of many."""
     text = ", ".join(f"{start:.1f}–{end:.1f}" for start, end in windows[:most])

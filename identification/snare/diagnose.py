@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from ...models.model import Model
+from ...recordings.part import several
 from ..diagnosis import Diagnosis
 from .answer import report_on, with_found
 from .search import search
@@ -14,7 +15,7 @@ from .sets import sets_of
 def diagnose_captures(
     model: Model,
     recordings: Sequence[str | Path],
-    holdout: str | Path,
+    holdout: str | Path | Sequence[str | Path],
     *,
     progress: Callable[[str], None] = lambda _: None,
     seed: int = 0,
@@ -27,7 +28,7 @@ def diagnose_captures(
     model : Model
         Of a capture.
     recordings : sequence of path
-    holdout : path
+    holdout : path, or sequence of them
         Looked at for the proof only.
     progress : callable
     seed : int
@@ -46,7 +47,7 @@ def diagnose_captures(
     """
     begun = time.monotonic()
     progress("reading the recordings")
-    with sets_of(model, recordings, [holdout], jobs) as (train, locked):
+    with sets_of(model, recordings, several(holdout), jobs) as (train, locked):
         found = search(model, train, locked, progress=progress, seed=seed)
     seconds, count = time.monotonic() - begun, train.runs.count
     return report_on(model, found, train.captures, locked.captures, seconds, count), with_found(model, found.last)

@@ -1,7 +1,9 @@
 """Every kind of page in a browser: axe's findings, the keyboard, paper, no scripts; its console and the network."""
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 from browser import opened, playing
@@ -17,7 +19,9 @@ from proof.seal import Seal
 from snarelab.fmu.description import About
 from snarelab.fmu.equations import Variable
 from snarelab.fmu.page import page as fmu_page
+from snarelab.identification.diagnosis import Diagnosis, FrictionCurve
 from snarelab.identification.report.page import write_report
+from snarelab.report.provenance import Provenance
 from snarelab.studies.page import Section, write_page
 from snarelab.tolerance.report import summarise
 
@@ -118,6 +122,48 @@ def test_paper_hides_and_cuts_nothing(browser: Browser, pages: dict[str, Path], 
             .map(x => x.outerHTML.slice(0, 80))""")
         assert cut == []
         assert page.locator(".on-paper:visible").count() == (kind == "study")
+
+
+def crowded(kind: str) -> Diagnosis:
+    """Twenty names on ten joints of a diagnosis, each with three values, rivals that are alike, and curves."""
+    made = VERDICTS[kind]()
+    speed = np.linspace(-1.0, 1.0, 61)
+    curve = FrictionCurve(
+        "joint5", "joint", ("stribeck_friction",), speed, np.tanh(speed / 0.1), np.full(61, 0.1), "N*m"
+    )
+    if not made.effects:
+        return made
+    names = tuple(replace(made.effects[1], at=f"joint{5 + k}", probability=0.95 - 0.01 * k) for k in range(20))
+    return replace(made, effects=names, curves=(curve,))
+
+
+@pytest.mark.parametrize("make", [*VERDICTS.values(), lambda: crowded("missing_physics")])
+def test_the_answer_is_one_printed_sheet(browser: Browser, tmp_path: Path, make) -> None:
+    origin = Provenance(
+        "snarelab diagnose arm.toml " + "a_recording_of_some_length.csv " * 4 + "--holdout b.csv --report r.html",
+        tuple((role, f"{role}.csv", "0" * 64) for role in ("Model", "Robot", "Training", "Training", "Held-out")),
+        (("snarelab", "0.1.0"), ("Python", "3.13.1"), ("casadi", "3.8.2"), ("drake", "1.51.1"), ("numpy", "2.4.6")),
+    )
+    write_report(make(), tmp_path / "report.html", origin)
+    with opened(browser, tmp_path / "report.html", size=(680, 1009)) as page:  # A4 less its margins
+        page.emulate_media(media="print")
+        answer = page.locator("#answer").bounding_box()
+        assert answer is not None
+        assert answer["y"] + answer["height"] <= 1009
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_crowded_answer_is_whole_on_a_phone(browser: Browser, tmp_path: Path, scheme) -> None:
+    write_report(crowded("missing_physics"), tmp_path / "report.html")
+    with opened(browser, tmp_path / "report.html", scheme, (390, 900)) as page:
+        names = page.locator("#answer .names .scroll")
+        assert names.evaluate("x => x.scrollWidth <= x.clientWidth")
+        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+        assert page.locator("#answer .names tbody tr").count() == 14
+        text = page.locator("#answer").inner_text()
+        assert "And 6 more" in text
+        found = Axe().run(page.main_frame, options=AXE).response
+        assert [x["id"] for x in found["violations"] if x["impact"] in ("serious", "critical")] == []
 
 
 def test_without_scripts_the_plots_are_plain(browser: Browser, pages: dict[str, Path]) -> None:
