@@ -11,7 +11,7 @@ from .words import chance, measured, percent, words
 
 _MOST = 8
 """Names for which the first printed sheet has room."""
-_FEW = 4
+_FEW = 3
 """Lines of what is alike, and of what to do next, for which it has room."""
 
 
