@@ -165,7 +165,7 @@ def _compiled(folder: Path) -> Path:
     host = folder / "fmu_host"
     compiler, _ = find_compiler("", os.environ["PATH"])
     headers = Path(fmpy.__file__).parent / "c-code"
-    source = ROOT / "tests" / "fmu_host.c"
+    source = ROOT / "tests" / "helpers" / "fmu_host.c"
     subprocess.run([*compiler, "-DFMI=2", f"-I{headers}", "-w", str(source), "-o", str(host), "-ldl"], check=True)
     return host
 

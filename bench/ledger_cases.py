@@ -1,7 +1,7 @@
 """The ledger's entries: where each recording comes from, what is concealed in it, and how the tool is asked."""
 
 # pyright: reportMissingImports=false
-# (the folder of tests is put on the path here)
+# (folders of tests are put on the path here)
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path.append(str(ROOT / "tests"))  # the pendulum and the free-floating arms are those of the tests
+# The pendulum and the free-floating arms are those of the tests.
+sys.path += [str(ROOT / "tests" / "helpers"), str(ROOT / "tests" / "models" / "floating")]
 
 import proof.run as proof_run
 from bench.drake_servicer import Tank, Wheel, model, record

@@ -69,7 +69,8 @@ code{font-size:.92em}
 .card>h3{margin-bottom:.25rem}
 footer{margin:3rem auto 2rem;color:var(--quiet);font-size:.85rem}
 @media screen and (max-width:40rem){.names .n{text-align:left}.names thead{display:none}
-.names tr,.names th,.names td{display:block;border:0;padding:0}.names tr{border-bottom:1px solid var(--line);padding:.4rem 0}
+.names tr,.names th,.names td{display:block;border:0;padding:0}
+.names tr{border-bottom:1px solid var(--line);padding:.4rem 0}
 .names .n{display:inline-block;margin-right:1.2rem}.names td:nth-child(3)::before{content:"probability "}
 .names td:nth-child(4)::before{content:"share "}}
 @media (max-width:40rem){.bar{display:none}th,td{padding-right:.7rem}

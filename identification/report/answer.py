@@ -9,10 +9,9 @@ from ..summary import indistinguishable
 from .fit import comparison, most_changed
 from .words import chance, measured, percent, words
 
-
-_MOST = 14
+_MOST = 8
 """Names for which the first printed sheet has room."""
-_FEW = 5
+_FEW = 3
 """Lines of what is alike, and of what to do next, for which it has room."""
 
 
@@ -58,7 +57,7 @@ def _values(finding: Finding) -> str:
     for name, estimate in finding.parameters.items():
         bound = " (at its bound)" if estimate.at_bound else ""
         text = f"{words(name)} {measured(estimate.value, estimate.std, estimate.unit)}{bound}"
-        said.append(f"<span class=\"kept\">{escape(text)}</span>")
+        said.append(f'<span class="kept">{escape(text)}</span>')
     return "; ".join(said) or "–"
 
 

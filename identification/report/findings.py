@@ -142,7 +142,7 @@ def _by_place(findings: Sequence[Finding]) -> dict[str, list[Finding]]:
     return groups
 
 
-def _card(place: str, findings: Sequence[Finding], curve: FrictionCurve | None) -> str:
+def _card(place: str, findings: Sequence[Finding], curve: FrictionCurve | None = None) -> str:
     """All that was found at one place: a table of values, its friction as one curve, evidence and rivals folded."""
     rows, details = [], ""
     for finding in findings:
