@@ -178,7 +178,7 @@ def test_hidden_states_move_with_the_joint():
 def test_every_joint_torque_of_the_registry_runs():
     """Any registered joint friction can act, with its usual parameters; one that dissipates never adds energy."""
     for name, effect in effects().items():
-        if effect.at != "joint" or effect.acts_on != "torque":
+        if effect.at != "joint" or effect.acts_on != "torque" or effect.neighbours == "only":
             continue
         values = {p.name: 0.1 for p in effect.parameters if p.low == 0.0 and not p.grid}
         motion = wheel(name, values)
