@@ -164,7 +164,8 @@ def test_a_crowded_answer_is_whole_on_a_phone(browser: Browser, tmp_path: Path, 
         assert "And 12 more" in text
         # The page's script makes what scrolls reachable by key once it is laid out.
         page.wait_for_function(
-            "[...document.querySelectorAll('.scroll,.plate')].every(x => x.scrollWidth <= x.clientWidth || x.tabIndex === 0)"
+            "[...document.querySelectorAll('.scroll,.plate')]"
+            ".every(x => x.scrollWidth <= x.clientWidth || x.tabIndex === 0)"
         )
         found = Axe().run(page.main_frame, options=AXE).response
         assert [x["id"] for x in found["violations"] if x["impact"] in ("serious", "critical")] == []
