@@ -19,6 +19,7 @@ from documentation import DOCS, PAGES, ROOT, blocks, read
 import snarelab
 import snarelab.identification.diagnose as diagnosing
 from snarelab.cli import _parser, main
+from snarelab.recordings.part import several
 
 SNARELAB = (".venv/bin/snarelab", "snarelab")
 
@@ -121,7 +122,7 @@ def each_diagnosis_once():
     made, diagnose = {}, diagnosing.diagnose
 
     def remembered(model, recordings, holdout, **options):
-        bytes_of = [Path(p).read_bytes() if Path(p).is_file() else str(p) for p in (*recordings, holdout)]
+        bytes_of = [Path(p).read_bytes() if Path(p).is_file() else str(p) for p in (*recordings, *several(holdout))]
         key = repr((model.urdf and model.urdf.read_bytes(), model.effects, model.values, bytes_of))
         if key not in made:
             made[key] = diagnose(model, recordings, holdout, **options)

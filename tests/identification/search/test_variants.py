@@ -137,7 +137,9 @@ def keys(model):
 
 def test_every_effect_is_tried_at_every_place_that_has_it_not():
     whole = keys(arm())
-    at_joints = {f"{e.name}.joint{k}" for e in effects().values() if e.at == "joint" for k in (1, 2)}
+    joints = [e for e in effects().values() if e.at == "joint"]
+    at_joints = {f"{e.name}.joint{k}" for e in joints if e.neighbours != "only" for k in (1, 2)}
+    at_joints |= {f"{e.name}.joint1{sign}joint2" for e in joints if e.neighbours for sign in "+-"}
     at_links = {f"{e.name}.link{k}" for e in effects().values() if e.at == "link" for k in (1, 2)}
     sensors = {f"{e.name}.tau.joint{k}" for e in effects().values() if e.at == "sensor" for k in (1, 2)}
     assert whole == at_joints | at_links | sensors | {"sensor_delay.q.joint1", "sensor_delay.q.joint2"}
