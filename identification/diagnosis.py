@@ -208,7 +208,7 @@ class Diagnosis:
     checks : tuple of Check
         What of the recordings and the model is not as it should be; a ``data_fault`` where they contradict each other.
     curves : tuple of FrictionCurve
-        Friction of each joint over its speed, of all laws there together, with its deviation.
+        Friction of each joint over its speed, of the laws that depend on speed alone, with its deviation.
     """
 
     verdict: Literal["data_fault", "missing_physics", "adequate", "unknown_effect"]

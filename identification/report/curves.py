@@ -46,7 +46,7 @@ def residual_curves(traces: Sequence[Trace], changed: bool) -> bytes | None:
 
 
 def friction_over_speed(curve: FrictionCurve) -> bytes:
-    """All friction of one joint over its speed, with a band of two standard deviations either side."""
+    """Friction of one joint that depends on speed alone, with a band of two standard deviations either side."""
     unit = _COORDINATE_UNIT.get(curve.unit, "")
     with drawing():
         figure = Figure(figsize=(5.4, 2.8))
@@ -65,7 +65,7 @@ def friction_over_speed(curve: FrictionCurve) -> bytes:
 def friction_words(curve: FrictionCurve) -> str:
     """What stands in the picture of a friction curve."""
     laws = ", ".join(words(name) for name in curve.effects)
-    return f"Friction of {curve.at} over its speed, of all laws there together: {laws}."
+    return f"Friction of {curve.at} over its speed, of the laws there that depend on speed alone: {laws}."
 
 
 def binned(coordinate: Array, residual: Array, bins: int = _BINS) -> tuple[Array, Array, Array]:
