@@ -19,9 +19,10 @@ from .diagnosis import Diagnosis, Step
 from .evidence.diagnose import Decided, decide
 from .fitting.base_parameters import base_parameters
 from .fitting.constants import notes_on, settled, with_constants
-from .fitting.experiment import Experiment, demand_apart, load_experiments, scales, with_silence
+from .fitting.experiment import Experiment, load_experiments, scales, with_silence
 from .fitting.fit import Fit, channel_rms
 from .fitting.friction_curve import friction_curves
+from .fitting.held_out import demand_apart
 from .fitting.recorded import read_all, with_recorded_joints
 from .identify import demand_one_process, inertial_values, physical
 from .links.answer import with_links

@@ -20,9 +20,10 @@ from .fitting.assembly import Assembly
 from .fitting.base_parameters import INERTIAL, BaseParameters, base_parameters
 from .fitting.consistent_inertia import ConsistentInertia, consistent_inertia
 from .fitting.constants import notes_on, settled, with_constants
-from .fitting.experiment import Experiment, demand_apart, load_experiments, scales, with_silence
+from .fitting.experiment import Experiment, load_experiments, scales, with_silence
 from .fitting.fit import Fit, channel_rms, fit
 from .fitting.friction_curve import friction_curves, identifiable
+from .fitting.held_out import demand_apart
 from .fitting.recorded import read_all, with_recorded_joints
 
 if TYPE_CHECKING:

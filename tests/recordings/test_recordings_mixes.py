@@ -8,7 +8,7 @@ import pytest
 
 from snarelab.cli import main
 from snarelab.errors import InputError
-from snarelab.identification.fitting.experiment import demand_apart
+from snarelab.identification.fitting.held_out import demand_apart
 from snarelab.models.model_file import load_model
 from snarelab.models.model_write import save_model
 from snarelab.recordings import JointKind, Signal, read_recording

@@ -16,12 +16,12 @@ from snarelab.identification.fitting.experiment import (
     Bridge,
     Experiment,
     Scales,
-    demand_apart,
     load_experiments,
     scales,
     with_silence,
     without_torque,
 )
+from snarelab.identification.fitting.held_out import demand_apart
 from snarelab.identification.fitting.recorded import motion_signals
 
 N = 6
