@@ -102,6 +102,7 @@ def test_harness_bias_and_late_sensor_are_told_apart(tmp_path):
     assert parameters(found, "sensor_bias", "tau.joint1")["offset"] == pytest.approx(2.0, rel=0.1)
 
 
+@pytest.mark.slow
 def test_springy_drive_is_named_with_its_stiffness(tmp_path):
     found = diagnosed(
         tmp_path,

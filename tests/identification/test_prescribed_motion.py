@@ -108,7 +108,7 @@ def test_named_placed_and_nothing_else(concealed, name, at, parameter, value, er
 
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
-@pytest.mark.parametrize("joint", [0, 2])
+@pytest.mark.parametrize("joint", [0, pytest.param(2, marks=pytest.mark.slow)])
 def test_a_joint_that_stands_at_exactly_zero_is_no_obstacle(tmp_path, joint):
     found = diagnosed(tmp_path, "rotor_inertia", [joint])
     (only,) = found.effects

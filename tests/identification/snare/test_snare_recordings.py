@@ -249,6 +249,7 @@ def test_an_umbilical_on_a_pendulum_is_named_and_told_by_its_stiffness(tmp_path)
     assert np.sqrt(np.mean((along["pos.target.z"].values - known) ** 2)) < 1e-3
 
 
+@pytest.mark.slow
 def test_a_pendulum_alone_is_told_well_and_what_would_have_shown(tmp_path):
     model = written(tmp_path, PLAIN + '[capture]\ntarget = "pendulum"\nline_length = 2.0\n')
     train, held = (

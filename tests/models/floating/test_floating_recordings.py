@@ -84,6 +84,7 @@ def in_a_plane(text):
     return text
 
 
+@pytest.mark.slow
 def test_external_torque_is_named(tmp_path):
     torque = (0.1, -0.05, 0.2)
     train, held = (recorded(tmp_path / f"{k}.csv", k, torque) for k in (1, 2))
