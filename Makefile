@@ -27,7 +27,7 @@ studies: $(filter-out study-tolerance,$(STUDIES:%=study-%)) ## every study but t
 test: .venv/installed ## set up, then the tests
 	$(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist worksteal
 
-test-slow: .venv/installed ## the tests of whole studies and captures, which `make test` leaves out: four minutes; CI runs them
+test-slow: .venv/installed ## the tests of whole studies and captures, which `make test` leaves out: ten minutes; CI runs them
 	$(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist loadfile -m slow
 
 check: .venv/installed ## formatting, lint and types
