@@ -36,7 +36,7 @@ def _files() -> dict[str, Path]:
 
 @cache
 def modules() -> dict[str, set[str]]:
-    """Which modules each module imports, wherever in its file it does so."""
+    """Which modules each module imports, wherever in its file it does so, by name in a text too."""
     files = _files()
     return {name: _imported(name, path, set(files)) - {name} for name, path in files.items()}
 
@@ -52,6 +52,8 @@ def _imported(name: str, path: Path, known: set[str]) -> set[str]:
     }
     found = set()
     for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and f"{node.value}".startswith("snarelab."):
+            found |= {f"{node.value}".removeprefix("snarelab.")} & known  # by name, when it is needed
         if not isinstance(node, ast.ImportFrom) or node in types_only:
             continue
         if node.level:
