@@ -56,9 +56,12 @@ def with_links(
     offsets = tuple(f for f in findings if f.name == "sensor_bias")
     moving = tuple(f for f in findings if f.name != "sensor_bias")
     verdict, description = diagnosis.verdict, diagnosis.description
-    sentences = [diagnosis.sentence]
+    sentences, spoken_of = [diagnosis.sentence], diagnosis.foremost
     if findings:
-        said = _sentence(moving or offsets, fits)
+        changed = [f for f in fits if f.holdout.rms_after < f.holdout.rms_before]
+        worst = max(changed or fits, key=lambda f: f.holdout.rms_before)
+        spoken_of = worst.channel if first else spoken_of
+        said = _sentence(moving or offsets, worst)
         if verdict == "adequate":
             sentences = ["The torques ask for nothing that these recordings can show."]
         sentences = [said, *sentences] if first else [*sentences, said]
@@ -81,6 +84,7 @@ def with_links(
         traces=(*torques.traces, *(t for link in links for t in traces_of(link))),
         limits=(*torques.limits, *(x for link in links for x in limits_of(link))),
         notes=(*torques.notes, *(n for link in links for n in notes_of(link))),
+        foremost=spoken_of,
     )
     return answer, _model(model, links)
 
@@ -106,8 +110,8 @@ def _fit(link: LinkDiagnosis) -> ChannelFit:
     )
 
 
-def _sentence(findings: Sequence[Finding], fits: Sequence[ChannelFit]) -> str:
-    """What the encoders say, first the kind that is named at most joints."""
+def _sentence(findings: Sequence[Finding], worst: ChannelFit) -> str:
+    """What the encoders say, first the kind that is named at most joints, and the channel that differed most."""
     if not findings:
         return ""
     by_name: dict[str, list[str]] = {}
@@ -121,8 +125,6 @@ def _sentence(findings: Sequence[Finding], fits: Sequence[ChannelFit]) -> str:
     said = f"Link and motor encoders differ by {'; '.join(words)}."
     if all(f.name == "sensor_bias" for f in findings):
         return said
-    changed = [f for f in fits if f.holdout.rms_after < f.holdout.rms_before]
-    worst = max(changed or fits, key=lambda f: f.holdout.rms_before)
     before, after = (length(x, worst.unit) for x in (worst.holdout.rms_before, worst.holdout.rms_after))
     return (
         f"{said} With that added, the difference left on {worst.channel}, on the held-out recording, "

@@ -20,7 +20,10 @@ _MOVED = 2.0
 
 
 def most_changed(diagnosis: Diagnosis) -> list[Trace]:
-    """One trace a channel, held-out where there is one; the channel that changed most first."""
+    """One trace a channel, held-out where there is one; the headline's channel first, then what changed most.
+
+    Of several recordings, the one on which the channel changed most.
+    """
     return [max(_shown(diagnosis, channel), key=_change) for channel in _channels(diagnosis)]
 
 
@@ -173,9 +176,13 @@ def _shown(diagnosis: Diagnosis, channel: str) -> list[Trace]:
 
 
 def _channels(diagnosis: Diagnosis) -> list[str]:
-    """Channels with traces, those whose residual changed most first."""
+    """Channels with traces: the one that the headline speaks of, then those whose residual changed most."""
     names = dict.fromkeys(trace.channel for trace in diagnosis.traces)
-    return sorted(names, key=lambda name: max(map(_change, _shown(diagnosis, name))), reverse=True)
+
+    def rank(name: str) -> tuple[bool, tuple[float, float]]:
+        return name == diagnosis.foremost, max(map(_change, _shown(diagnosis, name)))
+
+    return sorted(names, key=rank, reverse=True)
 
 
 def _change(trace: Trace) -> tuple[float, float]:
