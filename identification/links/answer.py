@@ -58,10 +58,8 @@ def with_links(
     verdict, description = diagnosis.verdict, diagnosis.description
     sentences, spoken_of = [diagnosis.sentence], diagnosis.foremost
     if findings:
-        changed = [f for f in fits if f.holdout.rms_after < f.holdout.rms_before]
-        worst = max(changed or fits, key=lambda f: f.holdout.rms_before)
-        spoken_of = worst.channel if first else spoken_of
-        said = _sentence(moving or offsets, worst)
+        spoken_of = _foremost(fits).channel if first else spoken_of
+        said = _sentence(moving or offsets, fits)
         if verdict == "adequate":
             sentences = ["The torques ask for nothing that these recordings can show."]
         sentences = [said, *sentences] if first else [*sentences, said]
@@ -110,8 +108,14 @@ def _fit(link: LinkDiagnosis) -> ChannelFit:
     )
 
 
-def _sentence(findings: Sequence[Finding], worst: ChannelFit) -> str:
-    """What the encoders say, first the kind that is named at most joints, and the channel that differed most."""
+def _foremost(fits: Sequence[ChannelFit]) -> ChannelFit:
+    """Of the encoders that differ less with what was named, the one that differed most before."""
+    changed = [f for f in fits if f.holdout.rms_after < f.holdout.rms_before]
+    return max(changed or fits, key=lambda f: f.holdout.rms_before)
+
+
+def _sentence(findings: Sequence[Finding], fits: Sequence[ChannelFit]) -> str:
+    """What the encoders say, first the kind that is named at most joints."""
     if not findings:
         return ""
     by_name: dict[str, list[str]] = {}
@@ -125,6 +129,7 @@ def _sentence(findings: Sequence[Finding], worst: ChannelFit) -> str:
     said = f"Link and motor encoders differ by {'; '.join(words)}."
     if all(f.name == "sensor_bias" for f in findings):
         return said
+    worst = _foremost(fits)
     before, after = (length(x, worst.unit) for x in (worst.holdout.rms_before, worst.holdout.rms_after))
     return (
         f"{said} With that added, the difference left on {worst.channel}, on the held-out recording, "

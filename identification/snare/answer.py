@@ -82,11 +82,9 @@ def report_on(
         for t in sorted(found.opening, key=lambda t: -t.explained)
         if np.isfinite(t.score)
     )
-    positions = [f for f in fits if f.unit == "m"]
-    worst = foremost(findings, fits) if findings else max(positions, key=lambda f: f.holdout.rms_before)
     return Diagnosis(
         verdict,
-        _sentence(findings, worst, description) + _corrected(corrected),
+        _sentence(findings, fits, description) + _corrected(corrected),
         description,
         model.name,
         findings,
@@ -99,7 +97,7 @@ def report_on(
         _limits(model, found, train),
         tuple(notes),
         BAND,
-        foremost=worst.channel,
+        foremost=_foremost(findings, fits).channel,
     )
 
 
@@ -178,7 +176,15 @@ def _unexplained(fits: Sequence[ChannelFit]) -> str:
     return f"{' and '.join(found)} are left that no effect of a capture explains: check the set-up's sizes and masses"
 
 
-def _sentence(findings: Sequence[Finding], worst: ChannelFit, description: str) -> str:
+def _foremost(findings: Sequence[Finding], fits: Sequence[ChannelFit]) -> ChannelFit:
+    """What the sentence speaks of: the channel that names made best, or the motion that is told worst."""
+    if findings:
+        return foremost(findings, fits)
+    return max((f for f in fits if f.unit == "m"), key=lambda f: f.holdout.rms_before)
+
+
+def _sentence(findings: Sequence[Finding], fits: Sequence[ChannelFit], description: str) -> str:
+    worst = _foremost(findings, fits)
     if findings:
         return (
             f"The model leaves out {named(findings)}. With that added, the error of {worst.channel} on the held-out "
