@@ -90,8 +90,14 @@ grid-template-columns:max-content 1fr max-content 1fr}
 #answer .plot img{max-height:62mm;width:auto;max-width:100%}#answer .provenance{font-size:7pt;line-height:1.2;row-gap:0}
 #answer .plate{padding:0}.provenance code{font-size:1em}
 .status{-webkit-print-color-adjust:exact;print-color-adjust:exact}.bar,.bar i{print-color-adjust:exact}
-details::details-content{content-visibility:visible;block-size:auto}}
+details:not([open]){display:none}
+section:not(#answer){font-size:9pt;line-height:1.35}section:not(#answer)>h2{font-size:12pt;margin:.9rem 0 .3rem;
+padding-top:.3rem}h3{font-size:10pt}.card{margin:.5rem 0}.card h4{font-size:9pt;margin:.4rem 0 .1rem}
+section:not(#answer) :is(th,td){padding-top:.1rem;padding-bottom:.1rem}figure,.scroll,p{margin:.35rem 0}
+figcaption,.quiet{font-size:8pt}.plot img{max-height:52mm;width:auto;max-width:100%}footer{margin:.6rem auto}}
 """
+
+_FOLDED = '<p class="on-paper">Parts that are folded on the screen are not printed: open them, and print again.</p>'
 
 # What scrolls sideways on a narrow window can be reached by key; not every browser sees to that by itself.
 _SCROLLING = """
@@ -129,7 +135,7 @@ def page(title: str, header: str, sections: Sequence[tuple[str, str, str]], foot
         '<link rel="icon" href="data:,">\n'
         f"<title>{escape(title)}</title>\n<style>{style}</style></head>\n<body>\n<header>{header}</header>\n"
         f'<nav aria-label="Sections">{links}</nav>\n<main>\n{body}\n</main>\n'
-        f"<footer>{escape(footer)}</footer>\n{packed}<script>{script}</script>\n</body>\n</html>\n"
+        f"<footer>{escape(footer)}{_FOLDED if '<details>' in body else ''}</footer>\n{packed}<script>{script}</script>\n</body>\n</html>\n"
     )
 
 

@@ -16,8 +16,13 @@ from .outcome import FOLDER, Quantity
 _KINDS = {
     "predicted": "Comes out of the model; nothing was set to meet the paper's number.",
     "calibrated": "A free parameter of the model was set to meet the paper's number: agreement here proves nothing.",
-    "reference": "Ours alone; there is no number to compare with.",
+    "reference": "Ours, to know; no agreement is claimed, and the paper has no number for it.",
 }
+_BESIDE = (
+    "Ours, to know; no agreement is claimed. Where the paper has a number, it is shown for its size: it measures "
+    "something else."
+)
+"""Of ``reference``, where the paper's number stands beside one."""
 
 # Where there is room, the playback stays in sight beside the plots that it moves.
 _PLAYBACK = """<style>@media screen and (min-width:90rem){body>*{max-width:120rem}
@@ -147,7 +152,9 @@ def _numbers(quantities: Sequence[Quantity]) -> str:
         for q in quantities
     ]
     used = {q.kind for q in quantities}
-    kinds = "".join(f"<dt>{kind}</dt><dd>{text}</dd>" for kind, text in _KINDS.items() if kind in used)
+    beside = any(q.kind == "reference" and q.paper is not None for q in quantities)
+    said = {**_KINDS, "reference": _BESIDE} if beside else _KINDS
+    kinds = "".join(f"<dt>{kind}</dt><dd>{text}</dd>" for kind, text in said.items() if kind in used)
     heads = ["quantity", "unit", "paper", "ours", "interval", "kind"]
     return table("", heads, rows, numeric=(2, 3, 4)) + f'<dl class="facts">{kinds}</dl>\n'
 

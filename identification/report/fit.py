@@ -147,11 +147,12 @@ def parameters(diagnosis: Diagnosis) -> tuple[str, str, str]:
 
 
 def notes(diagnosis: Diagnosis) -> tuple[str, str, str]:
-    """Conditioning and excitation in words, and the limits of detection unless they were shown already."""
+    """Conditioning and excitation in words; the limits of detection, folded, unless they were shown already."""
     items = "".join(f"<li>{escape(note)}</li>\n" for note in diagnosis.notes)
     content = f"<ul>{items}</ul>\n" if items else ""
     if diagnosis.verdict != "adequate":
-        content += detection_limits(diagnosis)
+        limits = detection_limits(diagnosis)
+        content += folded("The smallest effects that would have been seen", limits) if diagnosis.limits else limits
     return "notes", "Notes", content or paragraph("Nothing to remark on the conditioning or excitation.")
 
 

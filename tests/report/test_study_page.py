@@ -13,7 +13,7 @@ from study_pages import QUANTITIES, moving, picture
 
 from snarelab.errors import InputError
 from snarelab.report.playback import Playback
-from snarelab.studies.outcome import write_result
+from snarelab.studies.outcome import Quantity, write_result
 from snarelab.studies.page import Section, write_page
 
 
@@ -39,6 +39,18 @@ def test_page_says_the_finding_first_and_explains_the_kinds(tmp_path: Path, monk
     result = write_result("demo", QUANTITIES, 1.0)
     first, *_, named = json.loads(result.read_text())["quantities"]
     assert (first["paper"], named["ours"]) == (2.6, "joint_elasticity at joint2, <odd>")
+
+
+@pytest.mark.parametrize(
+    ("paper", "words"), [(None, "the paper has no number for it."), (0.0027, "it measures something else.")]
+)
+def test_reference_is_explained_by_what_stands_beside_it(tmp_path, monkeypatch, paper, words):
+    monkeypatch.chdir(tmp_path)
+    spread = Quantity("mean_spread_y", "m", 0.0031, "reference", paper)
+    text = write_page("demo", "Suspended test", "It swings.", [spread]).read_text(encoding="utf-8")
+    (said,) = re.findall(r"<dt>reference</dt><dd>(.*?)</dd>", text)
+    assert said.endswith(words)
+    assert ("no number" in said) is (paper is None)
 
 
 @pytest.mark.parametrize(

@@ -281,7 +281,12 @@ LIMIT = Limit("coulomb_friction", "joint1", "level", 0.5, "N*m")
 def test_notes_close_with_the_limits_of_detection_unless_these_were_shown():
     said = diagnosis(notes=("a < b", "c"), limits=(LIMIT,))
     items = "<ul><li>a &lt; b</li>\n<li>c</li>\n</ul>\n"
-    assert fit.notes(said) == ("notes", "Notes", items + findings.detection_limits(said))
+    key, heading, content = fit.notes(said)
+    assert (key, heading) == ("notes", "Notes")
+    assert content.startswith(items + "<details><summary>")
+    assert content.endswith(findings.detection_limits(said) + "</details>\n")
+    none = replace(said, limits=())
+    assert fit.notes(none)[2] == items + findings.detection_limits(none)
     assert fit.notes(replace(said, verdict="adequate"))[2] == items
     quiet = fit.notes(diagnosis(verdict="adequate"))[2]
     assert quiet == "<p>Nothing to remark on the conditioning or excitation.</p>\n"
