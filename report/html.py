@@ -124,6 +124,7 @@ def page(title: str, header: str, sections: Sequence[tuple[str, str, str]], foot
         for key, heading, content in sections
     )
     style, script = STYLE, _SCROLLING
+    folded_away = _FOLDED if "<details>" in body else ""
     if ' data-time-axes="' in body:
         style, script = style + time_cursor.STYLE, script + time_cursor.SCRIPT
     packed = ""
@@ -135,7 +136,7 @@ def page(title: str, header: str, sections: Sequence[tuple[str, str, str]], foot
         '<link rel="icon" href="data:,">\n'
         f"<title>{escape(title)}</title>\n<style>{style}</style></head>\n<body>\n<header>{header}</header>\n"
         f'<nav aria-label="Sections">{links}</nav>\n<main>\n{body}\n</main>\n'
-        f"<footer>{escape(footer)}{_FOLDED if '<details>' in body else ''}</footer>\n{packed}<script>{script}</script>\n</body>\n</html>\n"
+        f"<footer>{escape(footer)}{folded_away}</footer>\n{packed}<script>{script}</script>\n</body>\n</html>\n"
     )
 
 
