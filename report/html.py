@@ -73,7 +73,7 @@ footer{margin:3rem auto 2rem;color:var(--quiet);font-size:.85rem}
 .names tr{border-bottom:1px solid var(--line);padding:.4rem 0}
 .names .n{display:inline-block;margin-right:1.2rem}.names td:nth-child(3)::before{content:"probability "}
 .names td:nth-child(4)::before{content:"share "}}
-@media (max-width:40rem){.bar{display:none}th,td{padding-right:.7rem}
+@media (max-width:40rem){.bar{display:none}th,td{padding-right:.7rem}.wide td:not(.n),tbody th{min-width:0}
 .facts{grid-template-columns:1fr}.facts dd{margin-bottom:.4rem}}
 @media print{:root{--paper:#fff;--ink:#000;--quiet:#444;--line:#bbb;--card:#fff;--accent:#000;--plate:#fff}
 @page{margin:15mm}body{font-size:10.5pt}nav,.on-screen{display:none}.on-paper{display:block}

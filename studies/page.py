@@ -1,4 +1,4 @@
-"""A study's ``report.html``: what was found, a table of the paper's numbers and ours, figures, and a 3-D playback."""
+"""A study's ``report.html``: what was found, a table of the paper's numbers and ours, a 3-D playback, and figures."""
 
 import base64
 import gzip
@@ -75,7 +75,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Section:
-    """A part of the page between the table and the playback: a heading, paragraphs of plain text, pictures."""
+    """A part of the page below table and playback: a heading, paragraphs of plain text, pictures."""
 
     heading: str
     paragraphs: Sequence[str] = ()
@@ -123,12 +123,12 @@ def write_page(
         How the playback's time goes with that of the plots, whose cursor and it move each other.
     """
     parts = [("numbers", "The paper's numbers and ours", _numbers(quantities))]
+    if playback is not None:
+        parts.append(("playback", "Playback in 3-D", _frame(playback, caption, clock)))
     for number, section in enumerate(sections, start=1):
         content = "".join(paragraph(text) for text in section.paragraphs)
         content += "".join(figure(p.svg, p.alternative, p.caption) for p in section.pictures)
         parts.append((f"part{number}", section.heading, content))
-    if playback is not None:
-        parts.append(("playback", "Playback in 3-D", _frame(playback, caption, clock)))
     header = f'<p class="quiet">{escape(title)}</p>\n{headline(found)}'
     document = page(title, header, parts, f"Written by snarelab: make study-{study}.")
     folder = FOLDER / study
