@@ -144,8 +144,8 @@ COMMANDS = ("check", "identify", "diagnose", "simulate", "export", "cosim", "tol
 
 
 def test_commands_whose_help_is_tried_are_all():
-    (subparsers,) = (action for action in _parser()._actions if isinstance(action.choices, dict))
-    assert set(COMMANDS) == set(subparsers.choices)
+    (choices,) = (action.choices for action in _parser()._actions if isinstance(action.choices, dict))
+    assert set(COMMANDS) == set(choices)
 
 
 @pytest.mark.parametrize("words", [["--help"], *([command, "--help"] for command in COMMANDS), ["completion", "bash"]])
