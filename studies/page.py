@@ -28,7 +28,7 @@ _BESIDE = (
 _PLAYBACK = """<style>@media screen and (min-width:90rem){body>*{max-width:120rem}
 main{display:grid;grid-template-columns:minmax(40rem,1fr) minmax(36rem,1fr);column-gap:2rem}
 main>section{grid-column:1}#playback{grid-column:2;grid-row:1/span 99;position:sticky;top:0;align-self:start}}</style>
-<p class="on-paper">The playback moves in the HTML file only: open it on a screen.</p>
+<div class="on-paper" id="playback-paper"><p class="quiet" id="playback-said">The playback moves in the HTML file only: open it on a screen.</p></div>
 <figure class="on-screen"><div class="plate"><iframe id="playback-frame" title="3-D playback"
 style="display:block;width:100%;height:min(38rem,85vh);border:0"></iframe></div>
 <figcaption>CAPTION</figcaption></figure>
@@ -41,7 +41,7 @@ new IntersectionObserver(async (entries, observer) => {
   const packed = Uint8Array.from(atob(document.getElementById("playback-data").textContent), c => c.charCodeAt(0));
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
   document.getElementById("playback-frame").srcdoc = await new Response(stream).text();
-}).observe(document.getElementById("playback-frame"));
+}, {rootMargin: "1500px"}).observe(document.getElementById("playback-frame"));
 (() => {
   const frame = document.getElementById("playback-frame"), clock = CLOCK;
   let ready = false, wanted = null;  // The playback speaks first; a time chosen before that waits.
@@ -51,8 +51,17 @@ new IntersectionObserver(async (entries, observer) => {
     wanted = time;
     if (ready) seek();
   });
+  const still = document.createElement("img"), said = document.getElementById("playback-said");
+  Object.assign(still, {id: "playback-still", style: "max-width:100%;max-height:90mm"});
   addEventListener("message", ({source, data}) => {
     if (source !== frame.contentWindow) return;
+    if (data.playbackStill) {
+      still.src = data.playbackStill;
+      document.getElementById("playback-paper").prepend(still);
+      const time = (clock.start + clock.rate * data.time).toFixed(2);
+      still.alt = said.textContent = `The playback at ${time} s; it moves in the HTML file.`;
+      return;
+    }
     const time = clock.start + clock.rate * data.playbackTime;
     if (ready || wanted === null)
       document.dispatchEvent(new CustomEvent("timeplayed", {detail: {recording: "", time}}));

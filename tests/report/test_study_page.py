@@ -1,5 +1,6 @@
 """A study's page and its playback, as a reader and a browser see them."""
 
+import io
 import json
 import re
 from pathlib import Path
@@ -7,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from browser import drawn, opened, pixels, playing
+from matplotlib.image import imread
 from playwright.sync_api import Browser
 from pydrake.geometry import Sphere
 from study_pages import QUANTITIES, moving, picture
@@ -123,6 +125,22 @@ def test_page_unpacks_its_playback_in_a_browser(
     # The view goes right by 20 pixels a key, and what is in it goes left.
     assert extent(shifted[700:], 0)[0] - extent(shown[700:], 0)[0] == pytest.approx(-0.1, abs=0.02)
     assert all(np.isfinite(extent(shown[700:], channel)[0]) for channel in range(3))
+
+
+def test_paper_has_a_still_of_the_playback(browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of the time and the view that were shown last."""
+    monkeypatch.chdir(tmp_path)
+    path = write_page("demo", "Test", "It moves.", QUANTITIES, [Section("One", (), [picture()])], moving().html(1.0))
+    with opened(browser, path, size=(680, 1000)) as page:
+        playing(page)
+        page.wait_for_function("document.getElementById('playback-still')?.naturalWidth > 100")
+        page.emulate_media(media="print")
+        still = page.locator("#playback-still")
+        assert still.is_visible()
+        assert "at 1.00 s" in page.locator("#playback-said").inner_text()
+        still.scroll_into_view_if_needed()
+        shown = imread(io.BytesIO(still.screenshot()))[..., :3]
+        assert all(np.isfinite(extent(shown, channel)[0]) for channel in range(3))  # red, green and blue are seen
 
 
 @pytest.mark.parametrize(("width", "beside"), [(1500, True), (1200, False)])
