@@ -28,7 +28,8 @@ _BESIDE = (
 _PLAYBACK = """<style>@media screen and (min-width:90rem){body>*{max-width:120rem}
 main{display:grid;grid-template-columns:minmax(40rem,1fr) minmax(36rem,1fr);column-gap:2rem}
 main>section{grid-column:1}#playback{grid-column:2;grid-row:1/span 99;position:sticky;top:0;align-self:start}}</style>
-<div class="on-paper" id="playback-paper"><p class="quiet" id="playback-said">The playback moves in the HTML file only: open it on a screen.</p></div>
+<div class="on-paper" id="playback-paper">
+<p class="quiet" id="playback-said">The playback moves in the HTML file only: open it on a screen.</p></div>
 <figure class="on-screen"><div class="plate"><iframe id="playback-frame" title="3-D playback"
 style="display:block;width:100%;height:min(38rem,85vh);border:0"></iframe></div>
 <figcaption>CAPTION</figcaption></figure>
