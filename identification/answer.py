@@ -17,7 +17,7 @@ from .fitting.fit import Fit, channel_rms
 from .fitting.floating_terms import momentum_floor
 from .reliability import of_name
 from .search.locate import locate
-from .wording import evidence_sentence, experiment_sentence, listed, noise_words, percent, verdict_sentence
+from .wording import evidence_sentence, experiment_sentence, foremost, listed, noise_words, percent, verdict_sentence
 
 Array = NDArray[np.float64]
 
@@ -97,11 +97,10 @@ def report_on(
         # What has no name stands in the residual itself, on the channels that have something to say.
         spoken = [c in loud for c in range(len(channels))]
         explained = [(e.measured - e.motion.to_band(final.assembly.torque(e, final.theta))) * spoken for e in train]
+    spoken_of = [f for c, f in enumerate(fits) if findings or not loud or c in loud]
     return Diagnosis(
         decided.verdict,
-        verdict_sentence(
-            findings, [f for c, f in enumerate(fits) if findings or not loud or c in loud], remainder, noise
-        ),
+        verdict_sentence(findings, spoken_of, remainder, noise),
         description,
         model.name,
         findings,
@@ -114,6 +113,7 @@ def report_on(
         _limits(decided, final),
         tuple(notes),
         train[0].motion.band,
+        foremost=foremost(findings, spoken_of, remainder).channel,
     )
 
 

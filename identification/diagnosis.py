@@ -209,6 +209,8 @@ class Diagnosis:
         What of the recordings and the model is not as it should be; a ``data_fault`` where they contradict each other.
     curves : tuple of FrictionCurve
         Friction of each joint over its speed, of the laws that depend on speed alone, with its deviation.
+    foremost : str
+        Channel whose error the sentence tells, and which pictures show first. Empty where nothing was fitted.
     """
 
     verdict: Literal["data_fault", "missing_physics", "adequate", "unknown_effect"]
@@ -227,6 +229,7 @@ class Diagnosis:
     band: float
     checks: tuple[Check, ...] = ()
     curves: tuple[FrictionCurve, ...] = ()
+    foremost: str = ""
 
     def to_json(self) -> dict[str, Any]:
         """The published form: plain dicts, lists, numbers and text. JSON has no infinity: what is unknown is null."""

@@ -32,7 +32,7 @@ def verdict(diagnosis: Diagnosis, day: date) -> str:
         ("Model", diagnosis.model),
         ("Training", ", ".join(recordings["train"])),
         ("Held-out", ", ".join(recordings["holdout"])),
-        ("Analysis band", f"0 to {diagnosis.band:g} Hz"),
+        ("Analysis band", f"0 to {diagnosis.band:.3g} Hz"),
         ("Date", day.isoformat()),
     ]
     rows = "".join(f"<dt>{escape(name)}</dt><dd>{escape(value)}</dd>" for name, value in facts if value)

@@ -108,6 +108,7 @@ def test_without_a_finding_the_sentence_tells_what_has_no_name_and_where(reporte
     assert made.sentence == (
         f"Something is missing on tau.joint3 that no effect of the vocabulary explains. O{one[1:]}; {two}."
     )
+    assert made.foremost == "tau.joint3"
     # What is located is the residual itself there, measured 1 less modelled 3, 5 and 7, and nothing elsewhere.
     (residual,) = cast(Any, made.location)
     assert residual.tolist() == [[0.0, -4.0, -6.0]] * 4
@@ -121,6 +122,7 @@ def test_with_a_finding_the_rest_is_told_by_its_channels(reported):
         "The model leaves out Coulomb friction at joint1. With that added, the error of tau.joint1 on the held-out "
         "recording falls from 90 % to 45 %. Part of what is left on tau.joint1 and tau.joint3 has no name."
     )
+    assert made.foremost == "tau.joint1"
     assert made.description == "; ".join(
         (
             words("joint3", "time", "64 %", "32 %"),
