@@ -196,7 +196,7 @@ def _table(where: str, entry: Mapping[str, Any], joints: Sequence[str]) -> Table
 
 
 def _numbers(where: str, key: str, given: Any, depth: int) -> list[Any]:
-    """A list of finite numbers, ``depth`` lists deep and each of one length but for the outermost; raises InputError."""
+    """A list of finite numbers, ``depth`` lists deep, each of one length but the outermost; raises InputError."""
 
     def good(x: Any, depth: int) -> bool:
         if depth == 0:

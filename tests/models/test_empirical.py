@@ -130,7 +130,7 @@ def test_a_model_file_keeps_its_tables(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        ('at = "joint2"\nover = ["load"]', 'at = "joint9"\nover = ["load"]', r"2: at = 'joint9'; this model has joint1, joint2"),
+        ('at = "joint2"\nover = ["load"]', 'at = "joint9"\nover = ["load"]', "2: at = 'joint9'; this model has joint1"),
         ('over = ["load"]', 'over = ["heat"]', "over = .'heat'.; allowed is a list of one or two of position, speed"),
         ('over = ["load"]', 'over = ["load", "load"]', "allowed is a list of one or two"),
         ("speed of joint1", "speed of joint7", "over names 'joint7'; this model has joint1, joint2"),
