@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 
 LENGTHS = (0.03, 0.06, 0.12, 0.25, 0.5)
 """Length scales that are tried [share of the coordinate's range]; two knots a length."""
-SIZES = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
+DEVIATIONS = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
 """Standard deviations of the values that are tried [RMS torque of the channel]."""
 _NUGGET = 1e-6  # of the kernel's variance: keeps it from being singular
 
@@ -115,7 +115,7 @@ def _tables(
             ]
             gram = sum(x.T @ k.solve(x) for x, k in zip(own, covariances, strict=False))
             before = gram.shape[0] - 1 - root.shape[0]
-            for s in SIZES:
+            for s in DEVIATIONS:
                 turn = block_diag(np.eye(before), size * s * root)
                 value = _evidence(turn.T @ gram[:-1, :-1] @ turn, turn.T @ gram[:-1, -1], free)
                 if best is None or value > best[0]:
