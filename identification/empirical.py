@@ -113,10 +113,10 @@ def _tables(
                 np.hstack([b, *(o.columns[i] for o in chosen), r, y[:, None]])
                 for i, (b, r, y) in enumerate(zip(always, raw, residuals, strict=True))
             ]
-            gram = sum(x.T @ k.solve(x) for x, k in zip(own, covariances, strict=False))
+            gram: Array = np.sum([x.T @ k.solve(x) for x, k in zip(own, covariances, strict=False)], axis=0)
             before = gram.shape[0] - 1 - root.shape[0]
             for s in DEVIATIONS:
-                turn = block_diag(np.eye(before), size * s * root)
+                turn = np.asarray(block_diag(np.eye(before), size * s * root), float)
                 value = _evidence(turn.T @ gram[:-1, :-1] @ turn, turn.T @ gram[:-1, -1], free)
                 if best is None or value > best[0]:
                     best = value, _Chosen(table, [x @ (size * s * root) for x in raw], size * s * root)
@@ -124,8 +124,8 @@ def _tables(
             chosen.append(best[1])
     own = [np.hstack([b, *(o.columns[i] for o in chosen)]) for i, b in enumerate(always)]
     solved = [k.solve(x) for x, k in zip(own, covariances, strict=False)]
-    matrix = sum(a.T @ b for a, b in zip(own, solved, strict=True))
-    score = sum(b.T @ r for b, r in zip(solved, residuals, strict=True))
+    matrix: Array = np.sum([a.T @ b for a, b in zip(own, solved, strict=True)], axis=0)
+    score: Array = np.sum([b.T @ r for b, r in zip(solved, residuals, strict=True)], axis=0)
     factorised = cho_factor(_with_prior(matrix, free))
     amplitudes, spread = cho_solve(factorised, score)[free:], cho_solve(factorised, np.eye(len(score)))[free:, free:]
     values: dict[str, float] = {}

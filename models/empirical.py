@@ -172,7 +172,8 @@ def read_empirical(
 
 
 def _table(where: str, entry: Mapping[str, Any], joints: Sequence[str]) -> Table:
-    over, times = entry.get("over"), entry.get("times", "")
+    over: Any = entry.get("over")
+    times = entry.get("times", "")
     good = isinstance(over, list) and 1 <= len(over) <= 2 and all(isinstance(c, str) and is_coordinate(c) for c in over)
     if not good or len(set(over)) < len(over):
         allowed = ", ".join([*OWN, *(f"{start}JOINT" for start in OTHERS)])
