@@ -144,7 +144,7 @@ def formulate(model: Model, at: str | None = None) -> list[Formulated]:
     if not found:
         where = f" at {at!r}" if at else ""
         raise InputError(
-            f"{model.path}: no [[{NAME}]] table{where}; 'snarelab diagnose --save-model' writes one for what is nameless"
+            f"{model.path}: no [[{NAME}]] table{where}; 'snarelab diagnose --save-model' writes what has no name"
         )
     return found
 
