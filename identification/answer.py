@@ -109,7 +109,7 @@ def report_on(
         fits,
         steps,
         candidates,
-        _moved(found.first, final),
+        moved(found.first, final),
         traces(found.first, final, train, held),
         _limits(decided, final),
         tuple(notes),
@@ -205,7 +205,8 @@ def _noise_floor(experiments: Sequence[Experiment], final: Fit) -> Array:
     return np.min(floors, axis=0)
 
 
-def _moved(first: Fit, final: Fit) -> tuple[Moved, ...]:
+def moved(first: Fit, final: Fit) -> tuple[Moved, ...]:
+    """Parameters of the baseline before and after."""
     after = {s.key: (v, d) for s, v, d in zip(final.assembly.slots, final.theta, final.std, strict=True)}
     return tuple(
         Moved(s.key, s.unit, float(v), float(after[s.key][0]), float(after[s.key][1]))

@@ -8,8 +8,8 @@ import numpy as np
 from ..models.effect import written_unit
 from ..models.empirical import NAME, table_values
 from ..models.model import Model
-from .answer import channel_fits, traces
-from .diagnosis import Diagnosis, EmpiricalTable, Finding, Step
+from .answer import channel_fits, moved, traces
+from .diagnosis import Diagnosis, EmpiricalTable, Estimate, Finding, Step
 from .empirical import EmpiricalLaw
 from .evidence.diagnose import Decided
 from .fitting.experiment import Experiment
@@ -67,9 +67,23 @@ def with_laws(
     return replace(
         diagnosis,
         sentence=" ".join([diagnosis.sentence, *sentences]),
-        effects=tuple(findings) if diagnosis.verdict == "unknown_effect" else diagnosis.effects,
+        effects=tuple(findings)
+        if diagnosis.verdict == "unknown_effect"
+        else tuple(_beside(f, final) for f in diagnosis.effects),
+        moved=moved(first, final),
         fit=channel_fits(model, first, final, train, held),
         traces=traces(first, final, train, held),
         steps=tuple(steps),
         empirical=tuple(tables),
     )
+
+
+def _beside(finding: Finding, final: Fit) -> Finding:
+    """A name with the values that its parameters have beside the tables, as the saved model has them."""
+    at = {s.key: i for i, s in enumerate(final.assembly.slots)}
+    own = {
+        name: Estimate(float(final.theta[i]), float(final.std[i]), e.unit, bool(final.at_bound[i]))
+        for name, e in finding.parameters.items()
+        if (i := at.get(f"{finding.name}.{finding.at}.{name}")) is not None
+    }
+    return replace(finding, parameters={**finding.parameters, **own})

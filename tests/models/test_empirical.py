@@ -1,12 +1,15 @@
 """Tables as effects: what they give between and beyond their knots, in model files, and what is refused."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from effect_signals import DT, signals
 from scipy.integrate import cumulative_trapezoid
 
-from bench.fmu_models import write_model
+from bench.fmu_models import Slave, write_model
 from snarelab.errors import InputError
+from snarelab.fmu.export import export
+from snarelab.identification.simulate import simulate
 from snarelab.models.empirical import NAME, empirical_effect, table_values, tables_of
 from snarelab.models.hidden_state import evaluate_law
 from snarelab.models.model_file import load_model
@@ -91,6 +94,28 @@ def test_derivatives_are_those_of_finite_differences():
     np.testing.assert_allclose(made.by_signal[:, :, 0], (ahead - behind) / 2e-6, rtol=1e-5, atol=1e-5)
 
 
+def motion(n, seconds, rate=200.0):
+    """Time (n_samples,) and positions (n_samples, n) of sums of sines."""
+    t = np.arange(round(seconds * rate)) / rate
+    waves = [(0.6 / (1 + 2 * k), 2 * np.pi * f, k) for k, f in enumerate((0.31, 0.83, 1.7))]
+    return t, np.stack([sum(a * np.sin(w * (1 + 0.17 * j) * t + p) for a, w, p in waves) for j in range(n)], 1)
+
+
+def follow(path, folder, dataset, joints):
+    """Torque (n_samples, J) that an FMU gives along a motion: set, read, step."""
+    time = dataset["time"].values
+    columns = {f"{x}.{j}": dataset[f"{x}.{j}"].values for x in ("q", "qd", "qdd") for j in joints}
+    s = Slave(path, folder, {name: values[0] for name, values in columns.items()}, start_time=time[0])
+    found = []
+    for k, later in enumerate([*time[1:], None]):
+        s.set({name: values[k] for name, values in columns.items()})
+        found.append(s.get([f"tau.{j}" for j in joints]))
+        if later is not None:
+            s.step(later - time[k])
+    s.close()
+    return np.array(found)
+
+
 ENTRY = """[[empirical]]
 at = "joint2"
 over = ["position", "speed of joint1"]
@@ -171,3 +196,41 @@ def test_a_capture_has_no_tables(tmp_path):
 )
 def test_curves_in_words_are_read_as_tables(words, read):
     assert read_words(words) == read
+
+
+@pytest.mark.filterwarnings("ignore:the empirical law")
+@pytest.mark.parametrize("version", [2, 3])
+def test_tables_over_two_joints_follow_in_an_fmu_as_in_simulate(tmp_path, version):
+    """Two tables at a joint, one over another joint's speed, one over the load, with a direction, and a third that
+    remembers the distance: the FMU is `simulate` to 1e-6 of the torque."""
+    entry = ENTRY + (
+        '[[empirical]]\nat = "joint1"\nover = ["distance travelled"]\ntimes = "speed"\n'
+        "knots = [[0.0, 1.0, 2.0, 3.0]]\nvalues = [0.0, 2.0, 1.0, 3.0]\n"
+    )
+    path = model_with(tmp_path, entry)
+    given = '"viscous_friction.joint1.coefficient" = 1.0\n"viscous_friction.joint2.coefficient" = 2.0\n'
+    given += '"speed_scale.joint1" = 4.0\n"speed_scale.joint2" = 5.0\n'
+    path.write_text(path.read_text().replace("[parameters]\n", f"[parameters]\n{given}"))
+    t, q = motion(2, 4.0)
+    columns = {"time": t, "q.joint1": q[:, 0], "q.joint2": q[:, 1], "tau.joint1": 1 + 0 * t, "tau.joint2": 1 + 0 * t}
+    pd.DataFrame(columns).to_csv(tmp_path / "motion.csv", index=False)
+    wanted = simulate(load_model(path), tmp_path / "motion.csv")
+    export(str(path), version, tmp_path / "x.fmu", inverse=True)
+    found = follow(tmp_path / "x.fmu", tmp_path / "x", wanted, ["joint1", "joint2"])
+    for k in (0, 1):
+        tau = wanted[f"tau.joint{k + 1}"].values
+        np.testing.assert_allclose(found[:, k], tau, rtol=0, atol=1e-6 * np.abs(tau).max())
+    # The arm itself: what its drives must give at its start to have no acceleration is what the tables and laws take.
+    export(str(path), version, tmp_path / "arm.fmu")
+    start = {"start.q.joint1": 0.3, "start.q.joint2": 0.5, "start.qd.joint1": -1.2, "start.qd.joint2": 0.8}
+    s = Slave(tmp_path / "arm.fmu", tmp_path / "arm", {**start, "tau.joint1": 3.0, "tau.joint2": -2.0})
+    qdd = s.get(["qdd.joint1", "qdd.joint2"])
+    back = Slave(
+        tmp_path / "x.fmu",
+        tmp_path / "x",
+        {k.removeprefix("start."): v for k, v in start.items()}
+        | dict(zip(["qdd.joint1", "qdd.joint2"], qdd, strict=True)),
+    )
+    np.testing.assert_allclose(back.get(["tau.joint1", "tau.joint2"]), [3.0, -2.0], atol=1e-6)
+    for slave in (s, back):
+        slave.close()
