@@ -87,7 +87,7 @@ def test_parameters_that_stay_in_the_model_are_told_before_and_after():
 
     first, final = fit([1, 2, 3], assembly=slots("a", "b", "c")), fit([30, 20, 10], assembly=slots("c", "x", "a"))
     final.std = np.array([0.3, 0.2, 0.1])
-    assert [tuple(vars(m).values()) for m in answer._moved(first, final)] == [
+    assert [tuple(vars(m).values()) for m in answer.moved(first, final)] == [
         ("a", "unit of a", 1.0, 10.0, 0.1),
         ("c", "unit of c", 3.0, 30.0, 0.3),
     ]
