@@ -114,7 +114,7 @@ def diagnose(
         told, inertia = physical(told, fitted(told.assembly, train))
         diagnosis = with_laws(diagnosis, model, decided, final, told, laws, train, locked)
         final = told
-        model = replace(model, values=model.values | {k: v for law in laws for k, v in law.values.items()})
+        model = replace(model, values={**model.values, **{k: v for law in laws for k, v in law.values.items()}})
     values = {**model.values, **final.assembly.values(final.theta), **inertial_values(model, inertia)}
     of_links = tuple(p for p in model.effects if p.at.startswith("q_link."))
     after = replace(model, effects=(*final.assembly.placed, *of_links), values=values)

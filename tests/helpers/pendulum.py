@@ -14,7 +14,18 @@ RATE = 200
 
 
 def record(
-    path, seed, seconds, *, rounding=0.0, stribeck=0.0, speed=0.08, drag=0.0, stops=False, knocks=(), wander=0.0, law=None
+    path,
+    seed,
+    seconds,
+    *,
+    rounding=0.0,
+    stribeck=0.0,
+    speed=0.08,
+    drag=0.0,
+    stops=False,
+    knocks=(),
+    wander=0.0,
+    law=None,
 ):
     """A pendulum under a PD servo; friction of 3 N·m, rounded over ``rounding`` [rad/s] or sharp.
 

@@ -17,7 +17,7 @@ from snarelab.models.table import Table
 
 def tabulated(over, formula, ends, n=31, noise=0.01, times=""):
     """A table of a formula with a given error."""
-    knots = tuple(tuple(np.linspace(*e, n).tolist()) for e in ends)
+    knots = tuple(tuple(np.linspace(low, high, n).tolist()) for low, high in ends)
     values = formula(*np.meshgrid(*map(np.array, knots), indexing="ij"))
     std = noise * np.sqrt(np.mean(values**2)) * np.ones_like(values)
     return Table(over, times, knots), values + std * np.random.default_rng(2).normal(size=values.shape), std
