@@ -19,7 +19,8 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 def _formulate(given: argparse.Namespace) -> None:
     from ..cli import _writable, _write_json
     from ..models.model_file import load_model
-    from .formulate import formulate, write_effect
+    from .formulate import formulate
+    from .formulate_file import write_effect
 
     _writable(given.json, [given.out], [given.model])
     found = formulate(load_model(given.model), given.at)

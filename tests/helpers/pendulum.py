@@ -30,8 +30,8 @@ def record(
     """A pendulum under a PD servo; friction of 3 N·m, rounded over ``rounding`` [rad/s] or sharp.
 
     It swings, or goes from point to point and ``stops`` there; something shakes it at the ``knocks`` [s]. Its
-    disturbance is in a band or, where ``wander`` is above zero, a random walk of that RMS [N·m] about its mean. A ``law`` of
-    position [rad] takes a torque [N·m] that no name stands for.
+    disturbance is in a band or, where ``wander`` is above zero, a random walk of that RMS [N·m] about its mean. A
+    ``law`` of position [rad] takes a torque [N·m] that no name stands for.
     """
     rng = np.random.default_rng(seed)
     steps, fine = int(1000 * seconds), 4

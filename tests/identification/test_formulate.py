@@ -10,7 +10,8 @@ from effect_signals import DT, signals
 
 from bench.fmu_models import write_model
 from snarelab.cli import main
-from snarelab.identification.formulate import formulate_table, write_effect
+from snarelab.identification.formulate import formulate_table
+from snarelab.identification.formulate_file import write_effect
 from snarelab.models.hidden_state import evaluate_law
 from snarelab.models.table import Table
 
