@@ -49,12 +49,12 @@ def reported(monkeypatch):
         left = np.broadcast_to(relative, 3)
         both = [(Misfit(9, 9, 9, x), Misfit(9, 9, x, x / 2)) for x in left]
         fits = [ChannelFit(f"tau.{n}", u, *own, 0) for n, u, own in zip(NAMES, ("N*m", "N", "N*m"), both, strict=True)]
-        monkeypatch.setattr(answer, "_fits", lambda *_: tuple(fits))
+        monkeypatch.setattr(answer, "channel_fits", lambda *_: tuple(fits))
         monkeypatch.setattr(
             answer, "_finding", lambda n, *_: Finding(n.placed.effect.name, n.placed.at, 1, 1, {}, "", ())
         )
         monkeypatch.setattr(answer, "locate", lambda _, explained: tuple(explained))
-        for part in ("_moved", "_traces", "_limits"):
+        for part in ("moved", "traces", "_limits"):
             monkeypatch.setattr(answer, part, lambda *_, part=part: part)
         monkeypatch.setattr(answer, "_excitation", lambda _: ["excited"])
         encoders = ([3.0, 1.0, 0.0], [np.sqrt(41), 1.0, 0.0])  # of two recordings: their RMS is 5, 1 and nothing
@@ -140,7 +140,7 @@ def test_an_adequate_model_is_told_by_the_worst_channel(reported):
     assert (made.verdict, made.description) == ("adequate", "")
     assert made.sentence.endswith(f" is 2 % of tau.joint1. It is noise: {HEARD}.")
     assert (made.model, made.steps, made.moved, made.traces, made.limits) == (
-        "arm", (Step("s", 1, 1),), "_moved", "_traces", "_limits",
+        "arm", (Step("s", 1, 1),), "moved", "traces", "_limits",
     )  # fmt: skip
     assert made.band == RATE / 2
     (nothing,) = cast(Any, made.location)

@@ -78,6 +78,11 @@ def test_a_cable_that_hardens_is_a_harness_and_more(tmp_path):
     (channel,) = answer.channels
     assert {e.name for e in found.effects} <= {"harness_stiffness"}
     assert f"on {channel}, a smooth curve over position" in found.description
+    # A table takes that part: it is in the model, and the names stay names.
+    assert {t.at for t in found.empirical} == {channel.removeprefix("tau.")}
+    last, before = found.steps[-1], found.steps[-2]
+    assert last.label.startswith("+ empirical")
+    assert last.holdout < before.holdout
 
 
 def test_bursts_are_an_effect_without_a_name(tmp_path):
@@ -100,7 +105,7 @@ def test_what_only_stands_in_for_an_effect_without_a_name_is_not_named(tmp_path)
     (channel,) = answer.channels
     assert f"missing on {channel}" in found.sentence
     assert "smooth curve over position" in found.description
-    assert not found.effects
+    assert {e.name for e in found.effects} <= {"empirical"}
 
 
 @pytest.mark.slow
