@@ -62,7 +62,7 @@ def test_a_table_of_a_formula_gives_the_formula(over, times, formula):
         else np.array([s[along[c]].min(), s[along[c]].max()])
         for c in over
     ]  # fmt: skip
-    table = Table(over, times, tuple(even(*span, 81 if len(over) == 1 else 16) for span in spans))
+    table = Table(over, times, tuple(even(low, high, 81 if len(over) == 1 else 16) for low, high in spans))
     scale = {"load": 1 / 9, "position of b": 0.5, "speed of b": 0.1}
     grid = np.meshgrid(
         *(scale.get(c, 1.0) * np.array(k) for c, k in zip(over, table.knots, strict=True)), indexing="ij"
