@@ -92,8 +92,8 @@ class Evidence:
         self.alike: list[Alike] = []
         for (_, whole), numbers in by.items():
             rows = [self.items[x] for x in numbers]
-            parts = [np.stack([getattr(x, name) for x in rows]) for name in ("index", "spread", "positive")]
-            self.alike.append(Alike(np.array(numbers), *parts, whole))
+            index, spread, positive = (np.stack(x) for x in zip(*((r.index, r.spread, r.positive) for r in rows)))
+            self.alike.append(Alike(np.array(numbers), index, spread, positive, whole))
         self._own: dict[tuple[int, int], list[tuple[Index, Array]]] = {}
         self._rows: dict[tuple[int, int, int], Array] = {}
 
@@ -105,10 +105,14 @@ class Evidence:
 
     def _products(self, i: int, c: int) -> Products:
         own, pool = self.channels[i][c], self._pools[i][c]
-        p = len(own.index)
-        white = own.covariance.white(np.column_stack([own.residual, own.columns, *([pool] if pool.size else [])]))
-        always, columns = white[:, : p + 1], white[:, p + 1 :]
-        gram, beside = always.T @ always, always.T @ columns
+        always, columns = np.column_stack([own.residual, own.columns]), np.zeros((len(own.residual), 0))
+        if pool.size:
+            white = own.covariance.white(np.column_stack([always, pool]))
+            always, columns = np.split(white, [always.shape[1]], axis=1)
+            gram = always.T @ always
+        else:  # few columns are divided sooner than made white
+            gram = always.T @ own.covariance.solve(always)
+        beside = always.T @ columns
         return Products(
             gram[1:, 1:], gram[1:, 0], own.covariance.log_det, float(gram[0, 0]), beside[1:], beside[0], columns
         )
