@@ -92,7 +92,9 @@ class Evidence:
         self.alike: list[Alike] = []
         for (_, whole), numbers in by.items():
             rows = [self.items[x] for x in numbers]
-            index, spread, positive = (np.stack(x) for x in zip(*((r.index, r.spread, r.positive) for r in rows)))
+            index, spread, positive = (
+                np.stack(x) for x in zip(*((r.index, r.spread, r.positive) for r in rows), strict=True)
+            )
             self.alike.append(Alike(np.array(numbers), index, spread, positive, whole))
         self._own: dict[tuple[int, int], list[tuple[Index, Array]]] = {}
         self._rows: dict[tuple[int, int, int], Array] = {}
