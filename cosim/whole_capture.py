@@ -4,7 +4,7 @@ Three participants. The snare follows carriage and pin; arm, carriage, docking, 
 equation, which gets the cables' impulses; the control program reads sensors and commands, 100 times a second.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -14,7 +14,7 @@ import numpy as np
 from ..models.docking.arm import drive_with_carriage
 from ..models.docking.parameters import DockingParameters
 from ..models.floating.dynamics import momentum
-from ..models.floating.space_arm import CAPTURE_POSE, space_arm_drive
+from ..models.floating.space_arm import space_arm_drive
 from ..models.inertia import Array
 from ..models.snare.model import Accuracy
 from ..models.snare.parameters import SnareParameters
@@ -69,8 +69,8 @@ def whole_system(
 ) -> System:  # fmt: skip
     """Snare, arm with docking, and program, connected."""
     arm = start.arm
-    total = momentum(arm, np.array([CAPTURE_POSE]), start.drift[None], start.rates[None])[0]  # base at the origin
-    drive = drive_with_carriage(space_arm_drive(arm))
+    total = momentum(arm, np.array([start.pose]), start.drift[None], start.rates[None])[0]  # base at the origin
+    drive = drive_with_carriage(space_arm_drive(arm, pose=start.pose))
     values = {
         f"makkar_friction.{joint.name}.{key}": value
         for joint in arm.tree.joints
@@ -82,7 +82,7 @@ def whole_system(
         "snare": CommandedSnareParticipant(
             snare, moved, Accuracy(own_step, 10, 5e-4, snare.cable_radius), start.effector
         ),
-        "effector": EndEffectorParticipant(arm, t, drive, CAPTURE_POSE, start.rates, total, docking, snare, values),
+        "effector": EndEffectorParticipant(arm, t, drive, start.pose, start.rates, total, docking, snare, values),
         "program": ControlProgram(table),
     }
     return System(participants, connections(), name=start.case)
@@ -119,8 +119,11 @@ def co_simulate_whole(
     own_step: float = 2e-3,
     frames: list[tuple[float, Array]] | None = None,
     disturb: Callable[[float, "Master"], None] | None = None,
+    until: Collection[str] = (),
 ) -> WholeRun:
     """Run until `AFTER` past the program's last transition into a state that nothing leaves, ``longest`` [s] at most.
+
+    It ends, too, where the program comes to a state of ``until``.
 
     Macro steps are `SIZES` times ``scale``; ``own_step`` [s] is that inside the snare while cables touch. ``frames`` is
     filled as by `co_simulate`; ``disturb`` is called each period of the program with the time and the master.
@@ -147,6 +150,8 @@ def co_simulate_whole(
                 fault = str(error)
                 break
             here = program.table.states[program.state]
+            if program.state in until:
+                break
             if ended is None and not here.leave and not here.timeout:
                 ended = master.time
         return WholeRun(master.result(), program.table.names, program.state, fault)

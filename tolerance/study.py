@@ -29,6 +29,9 @@ _KEYS = (
     "box",
     "envelope",
 )
+_PARTS = (1, 2, 4, 8, 16, 32, 64)
+"""Into how many parts a way may be divided."""
+_ENVELOPE = ("axes", "steps", "exact")
 _SUCCESS = ("radial_error", "strength", "latched")
 
 
@@ -69,6 +72,25 @@ class Success:
 
 
 @dataclass(frozen=True)
+class Ways:
+    """Which captures along single axes are run; see `rays`.
+
+    Parameters
+    ----------
+    axes : tuple of str, optional
+        Along which; None: every varied one.
+    steps : int
+        Equal steps in which a way is gone outwards, until one fails.
+    exact : int
+        Into how many parts of the way the last one is halved.
+    """
+
+    axes: tuple[str, ...] | None = None
+    steps: int = 8
+    exact: int = 64
+
+
+@dataclass(frozen=True)
 class Study:
     """A study file, read and checked.
 
@@ -97,8 +119,8 @@ class Study:
         Cases that are run for it.
     box_ends : bool
         Each axis of the box stands at one of its two ends, by chance; else they are drawn evenly between.
-    envelope : bool
-        Captures along single axes are run, too; see `rays`.
+    envelope : Ways or None
+        Captures along single axes that are run, too.
     """
 
     path: Path
@@ -115,7 +137,7 @@ class Study:
     box: Mapping[str, tuple[float, float]]
     box_cases: int
     box_ends: bool = False
-    envelope: bool = True
+    envelope: Ways | None = Ways()
 
     def scaled(self, unit: np.ndarray) -> np.ndarray:
         """Points of the unit cube, shape (n, n_ranges), as values of the varied axes."""
@@ -195,8 +217,30 @@ def load_study(path: str | Path) -> Study:
         box,
         box_cases,
         box_ends,
-        _flag(path, raw.get("envelope", True), "envelope"),
+        _envelope(path, raw, ranges),
     )
+
+
+def _envelope(path: Path, raw: Mapping[str, Any], ranges: Mapping[str, Any]) -> Ways | None:
+    given = raw.get("envelope", True)
+    if not isinstance(given, dict):
+        return Ways() if _flag(path, given, "envelope", " or a table [envelope]") else None
+    _known(path, "envelope", given, _ENVELOPE)
+    axes = given.get("axes")
+    if axes is not None:
+        if not (isinstance(axes, list) and axes):
+            raise InputError(f"{path}: [envelope] axes = {axes!r}; allowed is a list of names of [ranges]")
+        for axis in axes:
+            if axis not in ranges:
+                raise InputError(f"{path}: [envelope] axes has {axis!r}; allowed are {', '.join(ranges)}")
+        axes = tuple(axes)
+    steps, exact = given.get("steps", Ways.steps), given.get("exact", Ways.exact)
+    for key, value in (("steps", steps), ("exact", exact)):
+        if isinstance(value, bool) or value not in _PARTS:
+            raise InputError(f"{path}: [envelope] {key} = {value!r}; allowed are {', '.join(map(str, _PARTS))}")
+    if exact < steps:
+        raise InputError(f"{path}: [envelope] exact = {exact} is below steps = {steps}; give as much or more")
+    return Ways(axes, steps, exact)
 
 
 def _success(path: Path, raw: Mapping[str, Any]) -> Success:
@@ -269,9 +313,9 @@ def _count(path: Path, value: Any, what: str, least: int) -> int:
     return value
 
 
-def _flag(path: Path, value: Any, what: str) -> bool:
+def _flag(path: Path, value: Any, what: str, other: str = "") -> bool:
     if not isinstance(value, bool):
-        raise InputError(f"{path}: {what} = {value!r}; allowed is true or false")
+        raise InputError(f"{path}: {what} = {value!r}; allowed is true or false{other}")
     return value
 
 

@@ -85,7 +85,7 @@ def test_a_good_study(write):
             "cases = 2000\ncapture =",
             "cases = 2000; adaptive sampling takes at most 1000; give that",
         ),
-        ("capture =", "envelope = 1\ncapture =", "envelope = 1; allowed is true or false"),
+        ("capture =", "envelope = 1\ncapture =", "envelope = 1; allowed is true or false or a table"),
         ("cases = 10", "ends = 1", r"\[box\] ends = 1; allowed is true or false"),
         ("radial_y = [-0.02, 0.02]", "radial_y = 0.2", r"\[box\] radial_y = \[0.2, 0.2\] is not within \[ranges\]"),
         ("radial_y = [-0.1, 0.1]", "radial_y = 0.1", r"\[ranges\] radial_y = 0.1; allowed is \[low, high\] in m"),
