@@ -4,6 +4,9 @@ BIN := .venv/bin
 SOURCES := $(shell git ls-files --cached --others --exclude-standard '*.py' '*.toml' '*.urdf' '*.csv' '*.json' '*.c' '*.h' 'fmu/c/*.txt' 2>/dev/null | grep -v -e '^tests/' -e '^bench/' -e '^proof/')
 STUDIES := emps kuka bam tx40 cart free-floating ground-capture zero-g-rig orbit-inspection orbit-hover orbit-abort tolerance
 
+# Where processes share the cores, threads of a linear algebra library wait for each other, and burn the time they wait.
+ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+
 BENCHES := torque friction_fit diagnosis joints fast floating cosim fmu snare ecos_inspection tolerance
 
 .PHONY: help demo test test-slow check studies bench accuracy fuzz kills hostile mutants proof ledger fmus docs clean $(STUDIES:%=study-%)
@@ -22,17 +25,17 @@ $(filter-out study-emps,$(STUDIES:%=study-%)): study-%: .venv/installed ## run o
 studies: $(filter-out study-tolerance,$(STUDIES:%=study-%)) ## every study but the tolerances, one after the other: a quarter of an hour; CI runs them
 
 test: .venv/installed ## set up, then the tests
-	$(BIN)/python -m pytest -n 2 --dist worksteal
+	$(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist worksteal
 
-test-slow: .venv/installed ## the tests of whole studies and captures, which `make test` leaves out: four minutes; CI runs them
-	$(BIN)/python -m pytest -n 2 --dist loadfile -m slow
+test-slow: .venv/installed ## the tests of whole studies and captures, which `make test` leaves out: ten minutes; CI runs them
+	$(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist loadfile -m slow
 
 check: .venv/installed ## formatting, lint and types
 	$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/pyright --pythonpath $(BIN)/python
 
 bench: .venv/installed ## ratios against named rivals, measured in one run
 	@set -e; for name in $(BENCHES); do \
-	    echo; echo "bench/$$name.py"; OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/$$name.py; done
+	    echo; echo "bench/$$name.py"; $(ONE_THREAD) $(BIN)/python bench/$$name.py; done
 
 accuracy: .venv/installed ## the snare on 30 random captures, and against rods in another engine on 10: half an hour
 	$(BIN)/python bench/snare_accuracy.py --result build/bench/snare_accuracy.json

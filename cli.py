@@ -1,4 +1,4 @@
-"""The command line: ``snarelab check | identify | diagnose | simulate | export | cosim | tolerance | completion``.
+"""The command line: ``snarelab check | identify | diagnose | simulate | formulate | export | cosim | tolerance | ...``.
 
 Exit status 0: it ran, whatever the verdict. 2: unusable input, one line on standard error, nothing written.
 130: interrupted (Ctrl-C, or SIGTERM). 1: a fault of the program.
@@ -23,6 +23,7 @@ from .errors import InputError, nearest, one_line
 from .exit_status import status_of
 from .files import written_whole
 from .fmu.command import add_parser as add_export
+from .identification.formulate_command import add_parser as add_formulate
 from .progress import Progress, start_logging
 from .tolerance.command import add_parser as add_tolerance
 
@@ -132,6 +133,7 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("--out", required=True, metavar="RECORDING", help="where to write it (.csv or .parquet)")
     p.set_defaults(run=_simulate)
 
+    add_formulate(commands)
     add_export(commands)
     add_cosim(commands)
     add_tolerance(commands)

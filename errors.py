@@ -10,7 +10,7 @@ def one_line(text: object) -> str:
     """A text from anywhere as one line: control characters written out, cut after 4000 characters."""
     text = str(text)
     line = "".join(c if c.isprintable() else " " if c in "\r\n\t" else ascii(c)[1:-1] for c in text[:_LONGEST])
-    return line if len(text) <= _LONGEST else f"{line} ..."
+    return line if max(len(text), len(line)) <= _LONGEST else f"{line[:_LONGEST]} ..."
 
 
 class InputError(ValueError):

@@ -8,7 +8,6 @@ from typing import Any
 
 from ..errors import InputError
 from ..progress import Progress, terminated_is_interrupted
-from .participant import StepError
 
 
 def add_parser(commands: Any) -> None:
@@ -36,6 +35,7 @@ def run(given: argparse.Namespace) -> None:
 
     from ..recordings.write import demand_suffix
     from .journal import Journal
+    from .participant import StepError
     from .setup import Hosting, load_setup
 
     out = Path(given.out)
@@ -87,6 +87,8 @@ def run(given: argparse.Namespace) -> None:
 
 def _started(path: str, setup: Any) -> Any:
     """The master; whatever is wrong is said with the file's name."""
+    from .participant import StepError
+
     try:
         return setup.master()
     except (InputError, StepError) as error:

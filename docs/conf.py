@@ -6,10 +6,11 @@ project = "snarelab"
 version = release = snarelab.__version__
 copyright = "the authors of snarelab, Apache License 2.0"
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
-source_suffix = {".md": "markdown"}
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+source_suffix = {".md": "myst-nb", ".ipynb": "myst-nb"}
+nb_execution_mode = "off"  # what run_notebooks.py stored is shown; a test runs them
 root_doc = "index"
-exclude_patterns = ["make_*.py"]
+exclude_patterns = ["make_*.py", "run_notebooks.py"]
 
 myst_heading_anchors = 4
 myst_enable_extensions = ["colon_fence"]

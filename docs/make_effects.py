@@ -13,7 +13,7 @@ HEAD = """\
 An effect is a piece of physics with a name, a place and a law. The same name is used in model files, in the code, in
 results and in reports. This page is written from the code by `python docs/make_pages.py`.
 
-- **Where** is the kind of place that an effect acts at. A *joint* or a *link* is named as in the URDF. A *sensor* is a
+- *Where* is the kind of place that an effect acts at. A *joint* or a *link* is named as in the URDF. A *sensor* is a
   channel, such as `tau.joint1`.
 - A joint effect gives the torque that the drive must supply on top of the rigid body's. A link effect changes the
   link's ten inertial parameters `phi`. A sensor effect turns the true value into what the channel reads.
@@ -65,7 +65,7 @@ def page() -> str:
     for family in FAMILIES:
         members = [e for e in effects().values() if e.family == family]
         parts.append(f"## {family[:1].upper()}{family[1:]}\n")
-        heads = "| effect | where | law | parameters | source |\n| --- | --- | --- | --- | --- |"
+        heads = "| effect, where, source | law, parameters |\n| --- | --- |"
         parts.append("\n".join([heads, *map(_row, members)]) + "\n")
     parts.append(CONFUSIONS + "\n".join(_confusions()) + "\n")
     parts.append(EXPERIMENTS + "\n".join(map(_experiment, effects().values())) + "\n")
@@ -84,7 +84,8 @@ def _row(effect: Effect) -> str:
     contains = f"<br>Contains {', '.join(f'`{name}`' for name in effect.contains)}." if effect.contains else ""
     law = f"`{effect.equation}`{contains}"
     parameters = "<br>".join(map(_parameter, effect.parameters))
-    return _cells(f"`{effect.name}`<br>{effect.sentence}", effect.at, law, parameters, effect.source)
+    what = f"`{effect.name}`<br>{effect.sentence}<br>Where: {effect.at}<br>Source: {effect.source}"
+    return _cells(what, f"{law}<br>{parameters}")
 
 
 def _parameter(p: Parameter) -> str:

@@ -1,18 +1,20 @@
 """Write what is generated: ``python docs/make_pages.py``.
 
-``effects.md`` from the effects, ``commands.md`` from the program's parser, the README's table of what can be named, and
-the numbers that decide in ``method.md``. A test compares each with the code, so that none goes stale; ``make docs``
-writes them before it builds the pages.
+``effects.md`` from the effects, ``commands.md`` from the program's parser, the README's table of what can be named,
+the numbers that decide in ``method.md``, and picture and table of ``architecture.md`` from the imports. A test compares
+each with the code, so that none goes stale; ``make docs`` writes them before it builds the pages.
 """
 
 from pathlib import Path
 
+import make_architecture
 import make_commands
 import make_deciding
 import make_effects
 
 DOCS = Path(__file__).resolve().parent
 README, METHOD = DOCS.parent / "README.md", DOCS / "method.md"
+ARCHITECTURE = DOCS / "architecture.md"
 
 
 def pages() -> dict[Path, str]:
@@ -20,6 +22,8 @@ def pages() -> dict[Path, str]:
     return {
         DOCS / "effects.md": make_effects.page(),
         DOCS / "commands.md": make_commands.page(),
+        DOCS / "architecture.svg": make_architecture.picture(),
+        ARCHITECTURE: _between(ARCHITECTURE, "parts", make_architecture.table()),
         README: _between(README, "effects", make_effects.families()),
         METHOD: _between(METHOD, "numbers", make_deciding.table()),
     }

@@ -22,6 +22,7 @@ from typing import Any
 import casadi as ca
 
 from ..errors import InputError
+from ..models.empirical import TableLaw
 from ..models.floating.arm import FloatingArm
 from ..models.floating.tree import FloatingTree, floating_tree, n_carriers
 from ..models.model import Model, Placed
@@ -141,6 +142,10 @@ class _Writer:
             ledger.output(f"qdd.{joint}", f"{unit}/s^2", qdd[k], f"rate of qd.{joint}")
             if k in springy:
                 ledger.output(f"q_link.{joint}", unit, q_link[k], f"position of the link behind {joint}")
+        for p in laws.at("joint"):
+            if isinstance(p.effect.law, TableLaw):
+                states = dict((q.key, s) for q, s in hidden).get(p.key, {})
+                laws.tell_held(p.at, p.effect.law.held(self._signals(p, motion, qdd, load, now) | states))
         body_outputs(ledger, arm, base, now.tip, qd_link)
         columns = {"q": q, "qd": qd, "qdd": qdd, "load": load, "tau": self.tau, "q_link": q_link}
         signals = [{name: x[j] for name, x in columns.items()} for j in range(n)]
@@ -229,6 +234,7 @@ class _Writer:
         across = ca.vertcat(*(summed(here.back, matrix[j, :].T) for j in range(self.n)))
         signals = {name: summed(here.along, x) for name, x in along.items()}
         signals |= {"load": summed(here.back, load), "inertia": summed(here.back, across)}
+        signals |= self.laws.of_others(p, *motion)
         return self.laws.signals(p) | signals
 
     def _friction(self, motion: tuple[ca.SX, ca.SX], now: Rigid, hidden: list) -> ca.Function:

@@ -15,6 +15,7 @@ import casadi as ca
 import numpy as np
 
 from ..models.axes import Place
+from ..models.empirical import TableLaw
 from ..models.floating.tree import n_carriers
 from ..models.hidden_state import ros2
 from ..models.model import Model, Placed
@@ -58,6 +59,7 @@ class _Follower:
         self.base = BaseMotion(self.ledger) if self.first else None
         self.laws = PlacedLaws(model, self.ledger)
         self.encoders: dict[str, ca.SX] = {}
+        self.held: dict[str, ca.SX] = {}
         self.phi = ca.vertcat(*self.laws.link_parameters())
         size = self.first + self.n
         q, qd, qdd = (ca.SX.sym(name, size) for name in ("position", "speed", "acceleration"))
@@ -105,6 +107,8 @@ class _Follower:
         for channel, reading in self.encoders.items():
             unit = self.units[self.joints.index(channel.removeprefix("q."))][0]
             ledger.output(f"sensor.{channel}", unit, reading, f"what the sensor of {channel} reads")
+        for at, outside in self.held.items():
+            self.laws.tell_held(at, outside)
         words = ", ".join(dict.fromkeys(p.effect.name for p in self.model.effects)) or "no effects"
         description = f"Torques of an arm of {self.n} joints along a given motion; with {words}."
         return ledger.following(f"{identifier(self.model.name)}_inverse", description, self._advance(states))
@@ -171,6 +175,8 @@ class _Follower:
                 elif isinstance(rig, Rig) and p.effect.at in PLACES:
                     change = rig_reach(rig, p, motions[k][0]) @ law
                 elif p.effect.acts_on == "torque":
+                    if isinstance(p.effect.law, TableLaw):
+                        self.held[p.at] = p.effect.law.held(given | _named(p, x))
                     here = laws.place_of(p)
                     for c in here.channels:
                         change[self.first + int(c)] = law if here.alone is not None else float(here.along[c]) * law
@@ -188,6 +194,7 @@ class _Follower:
         if p.effect.at == "base" and self.base is not None:
             return own | self.base.signals(u, memory)
         along = self._direction(p).along
+        own |= self.laws.of_others(p, u[:n], u[n : 2 * n])
         return own | {name: summed(along, u[k * n : (k + 1) * n]) for k, name in enumerate(("q", "qd", "qdd"))}
 
     def _direction(self, p: Placed) -> Place:

@@ -101,6 +101,16 @@ class PlacedLaws:
             found["temperature"] = self._temperatures[self.joint_of(p)]
         return found
 
+    def of_others(self, p: Placed, q: ca.SX, qd: ca.SX) -> dict[str, ca.SX]:
+        """What an effect reads of other joints, of the arm's positions and rates (J,)."""
+        at = [[joint.name for joint in self._joints].index(name) for name in p.effect.others]
+        return {f"{name}_of_{k}": x[j] for k, j in enumerate(at, 1) for name, x in (("q", q), ("qd", qd))}
+
+    def tell_held(self, at: str, outside: ca.SX) -> None:
+        """Enter the output that says where an empirical law is read outside its data."""
+        words = f"1 while a coordinate of the empirical law at {at} lies outside its data: its end value is held"
+        self._ledger.output(f"held.{at}", "1", outside, words)
+
     def law(self, p: Placed, signals: Mapping[str, ca.SX]) -> ca.SX:
         """What the effect gives for signals (and states by name)."""
         return ca.vertcat(p.effect.law(signals, self._parameters[p.key]))

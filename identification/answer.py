@@ -17,7 +17,7 @@ from .fitting.fit import Fit, channel_rms
 from .fitting.floating_terms import momentum_floor
 from .reliability import of_name
 from .search.locate import locate
-from .wording import evidence_sentence, experiment_sentence, listed, noise_words, percent, verdict_sentence
+from .wording import evidence_sentence, experiment_sentence, foremost, listed, noise_words, percent, verdict_sentence
 
 Array = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ def report_on(
     found, best = decided.best.found, decided.best
     channels = [channel(model.tree, c) for c in range(model.tree.n_joints)]
     findings = tuple(_finding(n, decided, final, channels) for n in best.names)
-    fits = _fits(model, found.first, final, train, held)
+    fits = channel_fits(model, found.first, final, train, held)
     left = decided.left
     again = {c: b for c, b in left.bursts.items() if b.again}
     loud = sorted({r.channel for r in left.curves} | set(again))
@@ -97,11 +97,10 @@ def report_on(
         # What has no name stands in the residual itself, on the channels that have something to say.
         spoken = [c in loud for c in range(len(channels))]
         explained = [(e.measured - e.motion.to_band(final.assembly.torque(e, final.theta))) * spoken for e in train]
+    spoken_of = [f for c, f in enumerate(fits) if findings or not loud or c in loud]
     return Diagnosis(
         decided.verdict,
-        verdict_sentence(
-            findings, [f for c, f in enumerate(fits) if findings or not loud or c in loud], remainder, noise
-        ),
+        verdict_sentence(findings, spoken_of, remainder, noise),
         description,
         model.name,
         findings,
@@ -109,11 +108,12 @@ def report_on(
         fits,
         steps,
         candidates,
-        _moved(found.first, final),
-        _traces(found.first, final, train, held),
+        moved(found.first, final),
+        traces(found.first, final, train, held),
         _limits(decided, final),
         tuple(notes),
         train[0].motion.band,
+        foremost=foremost(findings, spoken_of, remainder).channel,
     )
 
 
@@ -160,9 +160,10 @@ def _limits(decided: Decided, final: Fit) -> tuple[Limit, ...]:
     )
 
 
-def _fits(
+def channel_fits(
     model: Model, first: Fit, final: Fit, train: Sequence[Experiment], locked: Sequence[Experiment]
 ) -> tuple[ChannelFit, ...]:
+    """Misfit of every channel before and after, and its noise floor."""
     pairs = []
     for experiments in (train, locked):
         before, measured = channel_rms(first.assembly, experiments, first.theta)
@@ -204,7 +205,8 @@ def _noise_floor(experiments: Sequence[Experiment], final: Fit) -> Array:
     return np.min(floors, axis=0)
 
 
-def _moved(first: Fit, final: Fit) -> tuple[Moved, ...]:
+def moved(first: Fit, final: Fit) -> tuple[Moved, ...]:
+    """Parameters of the baseline before and after."""
     after = {s.key: (v, d) for s, v, d in zip(final.assembly.slots, final.theta, final.std, strict=True)}
     return tuple(
         Moved(s.key, s.unit, float(v), float(after[s.key][0]), float(after[s.key][1]))
@@ -213,7 +215,8 @@ def _moved(first: Fit, final: Fit) -> tuple[Moved, ...]:
     )
 
 
-def _traces(first: Fit, final: Fit, train: Sequence[Experiment], locked: Sequence[Experiment]) -> tuple[Trace, ...]:
+def traces(first: Fit, final: Fit, train: Sequence[Experiment], locked: Sequence[Experiment]) -> tuple[Trace, ...]:
+    """Every channel of every recording, measured and modelled before and after."""
     found = []
     sets: tuple[tuple[Literal["train", "holdout"], Sequence[Experiment]], ...] = (("train", train), ("holdout", locked))
     for role, experiments in sets:

@@ -16,6 +16,8 @@ from ..models.snare.setup import SnareTree
 from .answer import report_on
 from .data_fault import contradict, data_fault
 from .diagnosis import Diagnosis, Step
+from .empirical import empirical_laws
+from .empirical_answer import with_laws
 from .evidence.diagnose import Decided, decide
 from .fitting.base_parameters import base_parameters
 from .fitting.constants import notes_on, settled, with_constants
@@ -106,6 +108,13 @@ def diagnose(
     final, inertia = physical(final, fitted(final.assembly, train))
     steps = _steps(decided, final, train, locked)
     diagnosis = report_on(model, decided, final, steps, train, locked)
+    told, laws = empirical_laws(decided, final, train, locked)
+    if laws:
+        progress("modelling what has no name")
+        told, inertia = physical(told, fitted(told.assembly, train))
+        diagnosis = with_laws(diagnosis, model, decided, final, told, laws, train, locked)
+        final = told
+        model = replace(model, values={**model.values, **{k: v for law in laws for k, v in law.values.items()}})
     values = {**model.values, **final.assembly.values(final.theta), **inertial_values(model, inertia)}
     of_links = tuple(p for p in model.effects if p.at.startswith("q_link."))
     after = replace(model, effects=(*final.assembly.placed, *of_links), values=values)

@@ -52,6 +52,7 @@ class Finding:
     evidence: str
     rivals: tuple[Rival, ...]
     gain: float | None = None
+    coordinates: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -176,6 +177,39 @@ class FrictionCurve:
         return {"at": self.at, "kind": self.kind, "effects": list(self.effects), **numbers, "unit": self.unit}
 
 
+@dataclass(frozen=True, eq=False)
+class EmpiricalTable:
+    """A table at a joint for physics without a name.
+
+    Parameters
+    ----------
+    at : str
+        The joint.
+    over : tuple of str
+        One or two coordinates.
+    times : str
+        What its value is multiplied by; empty: nothing.
+    knots : tuple of array
+        Along each coordinate [SI].
+    value, std : array
+        Of the knots' shape [unit]; the band is two deviations either side.
+    unit : str
+    """
+
+    at: str
+    over: tuple[str, ...]
+    times: str
+    knots: tuple[Array, ...]
+    value: Array
+    std: Array
+    unit: str
+
+    def to_json(self) -> dict[str, Any]:
+        """The published form."""
+        numbers = {"knots": [k.tolist() for k in self.knots], "value": self.value.tolist(), "std": self.std.tolist()}
+        return {"at": self.at, "coordinates": list(self.over), "times": self.times, **numbers, "unit": self.unit}
+
+
 @dataclass(frozen=True)
 class Diagnosis:
     """The whole answer.
@@ -209,6 +243,10 @@ class Diagnosis:
         What of the recordings and the model is not as it should be; a ``data_fault`` where they contradict each other.
     curves : tuple of FrictionCurve
         Friction of each joint over its speed, of the laws that depend on speed alone, with its deviation.
+    foremost : str
+        Channel whose error the sentence tells, and which pictures show first. Empty where nothing was fitted.
+    empirical : tuple of EmpiricalTable
+        What stands for physics without a name; in the model beside all that has one.
     """
 
     verdict: Literal["data_fault", "missing_physics", "adequate", "unknown_effect"]
@@ -227,10 +265,14 @@ class Diagnosis:
     band: float
     checks: tuple[Check, ...] = ()
     curves: tuple[FrictionCurve, ...] = ()
+    foremost: str = ""
+    empirical: tuple[EmpiricalTable, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """The published form: plain dicts, lists, numbers and text. JSON has no infinity: what is unknown is null."""
         curves = {"curves": [c.to_json() for c in self.curves]} if self.curves else {}
+        if self.empirical:
+            curves["empirical"] = [t.to_json() for t in self.empirical]
         return _finite(
             {
                 "verdict": self.verdict,
@@ -278,6 +320,7 @@ def _finding(finding: Finding) -> dict[str, Any]:
         "parameters": {name: vars(p) for name, p in finding.parameters.items()},
         "evidence": finding.evidence,
         "rivals": [vars(r) for r in finding.rivals],
+        **({"coordinates": list(finding.coordinates)} if finding.coordinates else {}),
     }
 
 

@@ -2,7 +2,7 @@
 
 import base64
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -42,7 +42,7 @@ _STYLE = """<style>
 class Drawing:
     """A picture that a notebook shows: ``svg`` holds its bytes."""
 
-    svg: bytes
+    svg: bytes = field(repr=False)
 
     def _repr_svg_(self) -> str:
         return self.svg.decode("utf-8")

@@ -1,5 +1,6 @@
 """``snarelab simulate``: what every torque channel would read along a recorded motion, as a recording."""
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from ..models.floating.tree import FloatingTree
 from ..models.model import Model
 from ..models.rigid_body import RigidBody
 from ..models.snare.setup import SnareTree
+from .empirical import beyond
 from .fitting.assembly import Assembly
 from .fitting.base_parameters import INERTIAL
 from .fitting.experiment import load_experiments, scales
@@ -61,6 +63,8 @@ def simulate(model: Model, motion: str | Path | None) -> xr.Dataset:
     recorded = experiment.motion
     # As they are: bounds refer to the recordings that the values came from, not to this motion.
     tau = assembly.torque(experiment, np.array([model.values[s.key] for s in assembly.slots]))
+    for line in beyond(assembly, experiment, np.array([model.values[s.key] for s in assembly.slots])):
+        warnings.warn(line, stacklevel=2)
     variables = {}
     for name, x in (("q", recorded.q), ("qd", recorded.qd), ("qdd", recorded.qdd), ("tau", tau)):
         for c, joint in enumerate(model.joints):

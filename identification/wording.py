@@ -65,26 +65,37 @@ def noise_words(unit: str, noise: Noise, encoders: Sequence[NDArray[np.float64]]
     return listed(parts)
 
 
+def foremost(findings: Sequence[Finding], fit: Sequence[ChannelFit], remainder: str = "") -> ChannelFit:
+    """The channel that the first sentence speaks of, and that the report draws first.
+
+    With names, the one whose relative error on all held-out recordings together falls most; where something is left
+    that has no name, the one with the largest; of an adequate model, the one that stands highest above its noise.
+    """
+    if findings:
+        return max(fit, key=lambda f: f.holdout.relative_before - f.holdout.relative_after)
+    if remainder:
+        return max(fit, key=lambda f: f.holdout.relative_before)
+    return max(fit, key=lambda f: f.holdout.rms_before / f.noise_floor if f.noise_floor > 0 else 0.0)
+
+
 def verdict_sentence(
     findings: Sequence[Finding], fit: Sequence[ChannelFit], remainder: str, noise: Mapping[str, str] | None = None
 ) -> str:
     """The first sentence of the report; ``noise`` tells what explains the rest of each channel."""
+    worst = foremost(findings, fit, remainder)
     if findings:
-        worst = max(fit, key=lambda f: f.holdout.relative_before - f.holdout.relative_after)
         fall = from_to(worst.holdout.relative_before, worst.holdout.relative_after)
         return (
             f"The model leaves out {named(findings)}. With that added, the error of {worst.channel} on the held-out "
             f"recording falls {fall}.{remainder}"
         )
     if remainder:
-        worst = max(fit, key=lambda f: f.holdout.relative_before)
         return f"Something is missing on {worst.channel} that no effect of the vocabulary explains.{remainder}"
-    return f"The model is adequate: nothing larger than the limits listed is left out. {_rest(fit, noise or {})}"
+    return f"The model is adequate: nothing larger than the limits listed is left out. {_rest(worst, noise or {})}"
 
 
-def _rest(fit: Sequence[ChannelFit], noise: Mapping[str, str]) -> str:
+def _rest(worst: ChannelFit, noise: Mapping[str, str]) -> str:
     """What an adequate model leaves over on the channel where that stands highest above the noise."""
-    worst = max(fit, key=lambda f: f.holdout.rms_before / f.noise_floor if f.noise_floor > 0 else 0.0)
     left = (
         f"What it leaves over on the held-out recording is {percent(worst.holdout.relative_before)} of {worst.channel}"
     )

@@ -134,6 +134,9 @@ class Effect:
     neighbours : "", "too" or "only"
         Joint effects only: whether the effect is tried, unasked, along the sum and the difference of two joints of
         which one carries the other, beside every joint or instead of it.
+    others : tuple of str
+        Joint effects only: other joints that the law reads; position and rate of the first are ``s["q_of_1"]`` and
+        ``s["qd_of_1"]``.
     dissipates : bool
         True where the law's power ``qd * torque`` can never be negative; the contract test holds it to that.
     contains : tuple of str
@@ -170,6 +173,7 @@ class Effect:
     from_zero: bool = False
     acts_on: Literal["torque", "position"] = "torque"
     neighbours: Literal["", "too", "only"] = ""
+    others: tuple[str, ...] = ()
     dissipates: bool = False
     contains: tuple[str, ...] = ()
     at_rest: bool = False

@@ -53,6 +53,13 @@ SIGNALS = {
     "latches": {"drawn": 3, "stiffness": 1, "preload": 1, "since": 1},
 }
 
+
+def signals_of(effect: Effect) -> dict[str, int]:
+    """Signals that an effect's law may read, and how many numbers each has."""
+    numbers = range(1, len(effect.others) + 1)
+    return SIGNALS[effect.at] | {f"{name}_of_{k}": 1 for k in numbers for name in ("q", "qd")}
+
+
 #: The signal, by place, that itself depends on the model's parameters; none on a rig's slings, slides and booms.
 THROUGH = {"joint": "load", "link": "phi", "sensor": "value"}
 
@@ -224,7 +231,7 @@ class _Symbols(NamedTuple):
 def _symbols(effect: Effect) -> _Symbols:
     p = ca.SX.sym("p", len(effect.parameters))
     x = ca.SX.sym("x", len(effect.states))
-    signals = {name: ca.SX.sym(name, size) for name, size in SIGNALS[effect.at].items()}
+    signals = {name: ca.SX.sym(name, size) for name, size in signals_of(effect).items()}
     states, named = _named(effect, x, p)
     s = signals | states
     law = ca.vertcat(effect.law(s, named))
@@ -247,7 +254,8 @@ def _build(effect: Effect, bare: bool) -> _Built:
     outputs = [law] if bare else [law, ca.jacobian(law, p) + ca.jacobian(law, x) @ sensitivity]
     if through is not None and any(ca.which_depends(law, through, 1, False)):
         by_signal = ca.jacobian(law, through)
-        if effect.at == "joint" and effect.acts_on == "torque" and x.numel():
+        follow = x.numel() and any(ca.which_depends(rate, through, 1, False))
+        if effect.at == "joint" and effect.acts_on == "torque" and follow:
             by_signal -= ca.jacobian(law, x) @ ca.solve(ca.jacobian(rate, x), ca.jacobian(rate, through))
         outputs.append(by_signal)
     law_function = _compiled(effect, "law", [*u, _stacked(x, sensitivity), p], outputs, [*names, "states", "p"])

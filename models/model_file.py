@@ -18,6 +18,7 @@ from ..recordings.signals import FORMS, FREE, Signal, is_signal, joint_of
 from .axes import neighbours, read_axes
 from .docking.bench_setup import read_bench
 from .effects import get_effect
+from .empirical import read_empirical
 from .floating.tree import UNNAMED, n_carriers, read_floating
 from .holding import Holding, read_holding
 from .model import Model, Placed, places
@@ -61,6 +62,7 @@ _KEYS = (
     "axes",
     "bandwidth",
     "parameters",
+    "empirical",
 )
 
 
@@ -125,6 +127,7 @@ def load_model(path: str | Path, fix: Fix = "") -> Model:
     tree = replace(tree, axes=(*axes, *motors))
     servo = read_servo(path, raw, [joint.name for joint in tree.joints])
     signals = _signals(path, raw.get("signals", {}), tree, holding, transmission)
+    tables, table_values = read_empirical(path, raw, tree, system)
     model = Model(
         path,
         _text(path, raw, "name", path.stem),
@@ -132,10 +135,10 @@ def load_model(path: str | Path, fix: Fix = "") -> Model:
         urdf,
         tree,
         inertia,
-        _placed(path, raw.get("effects", []), tree),
+        (*_placed(path, raw.get("effects", []), tree), *tables),
         signals,
         None if bandwidth is None else float(bandwidth),
-        _values(path, raw.get("parameters", {})),
+        _values(path, raw.get("parameters", {})) | table_values,
         holding,
         read_cuts(path, raw, [f"tau.{joint.name}" for joint in tree.joints]),
         servo,

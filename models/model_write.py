@@ -9,6 +9,7 @@ from ..files import written_whole
 from ..recordings.mixes import signal_fields
 from .docking.bench_setup import DockingTree
 from .effects import get_effect
+from .empirical import NAME, empirical_tables, tables_of
 from .floating.tree import FloatingTree
 from .holding import Holding
 from .model import Model, Placed, places
@@ -28,7 +29,8 @@ def save_model(model: Model, path: str | Path, note: str) -> None:
     """
     path = Path(path)
     by_name: dict[str, list[Placed]] = {}
-    for placed in model.effects:
+    tables = empirical_tables(model.effects, model.values)
+    for placed in [p for p in model.effects if not tables_of(p.effect)]:
         by_name.setdefault(placed.effect.name, []).append(placed)
     listed = []
     for name, members in by_name.items():
@@ -82,8 +84,11 @@ def save_model(model: Model, path: str | Path, note: str) -> None:
     axes = [axis for axis in model.tree.axes if axis.name not in motors]
     if axes:
         lines += ["", "[axes]", *(f"{toml_text(a.name)} = {toml_text(dict(a.along))}" for a in axes)]
-    if model.values:
-        lines += ["", "[parameters]", *(f"{toml_text(k)} = {float(v)!r}" for k, v in model.values.items())]
+    values = {k: v for k, v in model.values.items() if not k.startswith((f"{NAME}.", f"std.{NAME}."))}
+    if values:
+        lines += ["", "[parameters]", *(f"{toml_text(k)} = {float(v)!r}" for k, v in values.items())]
+    for table in tables:
+        lines += ["", f"[[{NAME}]]", *(f"{k} = {toml_text(v)}" for k, v in table.items())]
     with written_whole(path, "choose a folder that exists") as part:
         part.write_text(with_comments(model.path, "\n".join(lines) + "\n"), encoding="utf-8")
 

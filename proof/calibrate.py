@@ -24,7 +24,7 @@ os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM
 
 from .cases import ROUND
 from .counting import RIDGE, Row, counted, of_effects, of_lines
-from .judge import rightly_placed
+from .judge import names_in, rightly_placed
 from .run import diagnose, fill, prepare
 from .score import score
 from .seal import ROOT, tool, write_json
@@ -80,7 +80,7 @@ def own(cases: int, seed: int, workers: int, tell: Callable[[str], None]) -> lis
         tell(f"{figure.name:24} {figure.value}")
     rows = []
     for answer, one in zip(answers, found, strict=True):
-        rows += of_effects(one["effects"], rightly_placed(answer, one), OWN)
+        rows += of_effects(names_in(one), rightly_placed(answer, one), OWN)
     return rows
 
 

@@ -65,18 +65,18 @@ class Scored:
 
 def judge(answer: Answer, found: Diagnosed, oracle: Mapping[str, float] | None = None) -> Scored:
     """Score one case; ``oracle``: holdout error over its floor of every channel, in the band of what was found."""
-    classes = [_class(e) for e in found["effects"]]
+    classes = [_class(e) for e in names_in(found)]
     right = [_fits(c, answer.truths) for c in classes]
     placed = rightly_placed(answer, found)
     probability = [
         min(e["probability"] + sum(r["probability"] for r in e["rivals"] if not r["separable"]), 1.0)
-        for e in found["effects"]
+        for e in names_in(found)
     ]
     whole = bool(answer.truths) and all(_found(t, classes) for t in answer.truths)
     return Scored(
         answer,
         found["verdict"],
-        tuple((e["name"], e["at"]) for e in found["effects"]),
+        tuple((e["name"], e["at"]) for e in names_in(found)),
         first=bool(right) and right[0],
         name=whole and all(right),
         place=bool(answer.truths) and all(_found(t, classes, at=True) for t in answer.truths) and all(placed),
@@ -90,7 +90,12 @@ def judge(answer: Answer, found: Diagnosed, oracle: Mapping[str, float] | None =
 
 def rightly_placed(answer: Answer, found: Diagnosed) -> list[bool]:
     """Of every effect named, whether its class holds one that is concealed, at its place."""
-    return [_fits(_class(e), answer.truths, at=True) for e in found["effects"]]
+    return [_fits(_class(e), answer.truths, at=True) for e in names_in(found)]
+
+
+def names_in(found: Diagnosed) -> list[Mapping[str, Any]]:
+    """Effects that name something; a table that stands for what has no name says nothing of what it is."""
+    return [e for e in found["effects"] if e["name"] != "empirical"]
 
 
 def _class(effect: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from .cases import Answer
-from .judge import Scored, joint
+from .judge import Scored, joint, names_in
 
 Diagnosed = Mapping[str, Any]
 
@@ -53,7 +53,7 @@ def explained(c: Scored, found: Diagnosed) -> str:
             parts += [_screened(truth.name, truth.at, found), _limit(truth.name, truth.at, value, found)]
     wrong = [
         f"{e['name'].replace('_', ' ')} at {e['at']} (probability {e['probability']:.2f})"
-        for e, (_, right) in zip(found["effects"], c.claims, strict=True)
+        for e, (_, right) in zip(names_in(found), c.claims, strict=True)
         if not right
     ]
     if wrong and c.answer.truths:
@@ -96,9 +96,9 @@ def _limit(name: str, at: str, value: float, found: Diagnosed) -> str:
 
 
 def _strength(found: Diagnosed) -> str:
-    if not found["effects"]:
+    if not names_in(found):
         return f"{found.get('description', '')}".capitalize()
-    first = found["effects"][0]
+    first = names_in(found)[0]
     return (
         f"{first['name'].replace('_', ' ').capitalize()} at {first['at']} has the probability "
         f"{first['probability']:.2f}, with {len(first['rivals'])} rivals."

@@ -73,7 +73,7 @@ footer{margin:3rem auto 2rem;color:var(--quiet);font-size:.85rem}
 .names tr{border-bottom:1px solid var(--line);padding:.4rem 0}
 .names .n{display:inline-block;margin-right:1.2rem}.names td:nth-child(3)::before{content:"probability "}
 .names td:nth-child(4)::before{content:"share "}}
-@media (max-width:40rem){.bar{display:none}th,td{padding-right:.7rem}
+@media (max-width:40rem){.bar{display:none}th,td{padding-right:.7rem}.wide td:not(.n),tbody th{min-width:0}
 .facts{grid-template-columns:1fr}.facts dd{margin-bottom:.4rem}}
 @media print{:root{--paper:#fff;--ink:#000;--quiet:#444;--line:#bbb;--card:#fff;--accent:#000;--plate:#fff}
 @page{margin:15mm}body{font-size:10.5pt}nav,.on-screen{display:none}.on-paper{display:block}
@@ -90,8 +90,14 @@ grid-template-columns:max-content 1fr max-content 1fr}
 #answer .plot img{max-height:62mm;width:auto;max-width:100%}#answer .provenance{font-size:7pt;line-height:1.2;row-gap:0}
 #answer .plate{padding:0}.provenance code{font-size:1em}
 .status{-webkit-print-color-adjust:exact;print-color-adjust:exact}.bar,.bar i{print-color-adjust:exact}
-details::details-content{content-visibility:visible;block-size:auto}}
+details:not([open]){display:none}
+section:not(#answer){font-size:9pt;line-height:1.35}section:not(#answer)>h2{font-size:12pt;margin:.9rem 0 .3rem;
+padding-top:.3rem}h3{font-size:10pt}.card{margin:.5rem 0}.card h4{font-size:9pt;margin:.4rem 0 .1rem}
+section:not(#answer) :is(th,td){padding-top:.1rem;padding-bottom:.1rem}figure,.scroll,p{margin:.35rem 0}
+figcaption,.quiet{font-size:8pt}.plot img{max-height:52mm;width:auto;max-width:100%}footer{margin:.6rem auto}}
 """
+
+_FOLDED = '<p class="on-paper">Parts that are folded on the screen are not printed: open them, and print again.</p>'
 
 # What scrolls sideways on a narrow window can be reached by key; not every browser sees to that by itself.
 _SCROLLING = """
@@ -118,6 +124,7 @@ def page(title: str, header: str, sections: Sequence[tuple[str, str, str]], foot
         for key, heading, content in sections
     )
     style, script = STYLE, _SCROLLING
+    folded_away = _FOLDED if "<details>" in body else ""
     if ' data-time-axes="' in body:
         style, script = style + time_cursor.STYLE, script + time_cursor.SCRIPT
     packed = ""
@@ -129,7 +136,7 @@ def page(title: str, header: str, sections: Sequence[tuple[str, str, str]], foot
         '<link rel="icon" href="data:,">\n'
         f"<title>{escape(title)}</title>\n<style>{style}</style></head>\n<body>\n<header>{header}</header>\n"
         f'<nav aria-label="Sections">{links}</nav>\n<main>\n{body}\n</main>\n'
-        f"<footer>{escape(footer)}</footer>\n{packed}<script>{script}</script>\n</body>\n</html>\n"
+        f"<footer>{escape(footer)}{folded_away}</footer>\n{packed}<script>{script}</script>\n</body>\n</html>\n"
     )
 
 

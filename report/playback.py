@@ -47,14 +47,28 @@ font:14px/1 system-ui,sans-serif;box-sizing:border-box}
     slider.value = time;
     label.value = Number(slider.value).toFixed(2) + " s";
     animator.seek(Number(slider.value));
+    rest();
   };
-  // A page that frames this one is told the time, and may set it.
+  // A page that frames this one is told the time, and may set it; what stands still it gets as a picture, for paper.
   const framed = parent !== window;
+  let resting;
+  const still = () => {
+    viewer.render();
+    parent.postMessage({playbackStill: viewer.renderer.domElement.toDataURL("image/jpeg", 0.9),
+      time: Number(slider.value)}, "*");
+  };
+  const rest = () => {
+    clearTimeout(resting);
+    if (framed && !playing) resting = setTimeout(still, 400);
+  };
   const go = time => {
     seek(time);
     if (framed) parent.postMessage({playbackTime: Number(slider.value)}, "*");
   };
-  const run = on => { playing = on; last = performance.now(); button.textContent = on ? "Pause" : "Play"; };
+  const run = on => {
+    playing = on; last = performance.now(); button.textContent = on ? "Pause" : "Play";
+    if (animator) rest();
+  };
   const tick = now => {
     if (playing) {
       const time = Number(slider.value) + (now - last) / 1000;
@@ -76,6 +90,7 @@ font:14px/1 system-ui,sans-serif;box-sizing:border-box}
     view.ariaLabel = "3-D view: arrow keys shift it, with Shift they turn it";
     Object.assign(viewer.controls, {keyRotateSpeed: 8, keyPanSpeed: 20});
     viewer.controls.listenToKeyEvents(view);
+    viewer.controls.addEventListener("change", rest);
     slider.disabled = button.disabled = false;
     go(START);
     requestAnimationFrame(tick);

@@ -127,6 +127,7 @@ SCRIPT = """
     Bokeh.logger.set_level("off");
   });
   const ranges = [], roots = [], dark = matchMedia("(prefers-color-scheme: dark)");
+  const narrow = matchMedia("screen and (max-width: 40rem)");  // there the legend would be cut
   const colour = root => {
     const style = getComputedStyle(document.documentElement);
     const [paper, ink, quiet, line] = ["paper", "ink", "quiet", "line"]
@@ -139,7 +140,9 @@ SCRIPT = """
       if (model.type?.endsWith("Axis")) model.setv({axis_label_text_color: ink, major_label_text_color: quiet,
         axis_line_color: quiet, major_tick_line_color: quiet, minor_tick_line_color: null});
       if (model.type === "Legend") model.setv({
-        background_fill_color: paper, background_fill_alpha: 0.7, border_line_color: null, label_text_color: ink});
+        background_fill_color: paper, background_fill_alpha: 0.7, border_line_color: null, label_text_color: ink,
+        ...narrow.matches && {label_text_font_size: "10px", glyph_width: 10, label_standoff: 3, spacing: 5, margin: 2,
+          padding: 3}});
       if (model.type === "Span") model.line_color = quiet;
       if (model.tags?.[0] === "ink") (model.glyph ?? model).line_color = ink;
     }
@@ -193,7 +196,7 @@ SCRIPT = """
     button.addEventListener("click", show);
     plate.prepend(button);
     label();
-    if (matchMedia("screen and (max-width: 40rem)").matches)  // small print on a phone: there the plot is drawn at once
+    if (narrow.matches)  // small print on a phone: there the plot is drawn at once
       new IntersectionObserver((entries, observer) => {
         if (!place && entries.some(entry => entry.isIntersecting)) { observer.disconnect(); show(); }
       }).observe(plate);

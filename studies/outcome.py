@@ -21,7 +21,8 @@ class Quantity:
     ours : float or str
         A number, or names, one after the other with commas between.
     kind : "calibrated", "predicted" or "reference"
-        Calibrated: a free parameter was set to meet the paper's number. Reference: there is nothing to compare with.
+        Calibrated: a free parameter was set to meet the paper's number. Reference: no agreement is claimed, since the
+        paper has no number, or one that measures something else.
     paper : float or None
     low, high : float or None
         Interval of ours, where one is known.

@@ -1,4 +1,4 @@
-"""A study's ``report.html``: what was found, a table of the paper's numbers and ours, figures, and a 3-D playback."""
+"""A study's ``report.html``: what was found, a table of the paper's numbers and ours, a 3-D playback, and figures."""
 
 import base64
 import gzip
@@ -16,14 +16,20 @@ from .outcome import FOLDER, Quantity
 _KINDS = {
     "predicted": "Comes out of the model; nothing was set to meet the paper's number.",
     "calibrated": "A free parameter of the model was set to meet the paper's number: agreement here proves nothing.",
-    "reference": "Ours alone; there is no number to compare with.",
+    "reference": "Ours, to know; no agreement is claimed, and the paper has no number for it.",
 }
+_BESIDE = (
+    "Ours, to know; no agreement is claimed. Where the paper has a number, it is shown for its size: it measures "
+    "something else."
+)
+"""Of ``reference``, where the paper's number stands beside one."""
 
 # Where there is room, the playback stays in sight beside the plots that it moves.
 _PLAYBACK = """<style>@media screen and (min-width:90rem){body>*{max-width:120rem}
 main{display:grid;grid-template-columns:minmax(40rem,1fr) minmax(36rem,1fr);column-gap:2rem}
 main>section{grid-column:1}#playback{grid-column:2;grid-row:1/span 99;position:sticky;top:0;align-self:start}}</style>
-<p class="on-paper">The playback moves in the HTML file only: open it on a screen.</p>
+<div class="on-paper" id="playback-paper">
+<p class="quiet" id="playback-said">The playback moves in the HTML file only: open it on a screen.</p></div>
 <figure class="on-screen"><div class="plate"><iframe id="playback-frame" title="3-D playback"
 style="display:block;width:100%;height:min(38rem,85vh);border:0"></iframe></div>
 <figcaption>CAPTION</figcaption></figure>
@@ -36,7 +42,7 @@ new IntersectionObserver(async (entries, observer) => {
   const packed = Uint8Array.from(atob(document.getElementById("playback-data").textContent), c => c.charCodeAt(0));
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
   document.getElementById("playback-frame").srcdoc = await new Response(stream).text();
-}).observe(document.getElementById("playback-frame"));
+}, {rootMargin: "1500px"}).observe(document.getElementById("playback-frame"));
 (() => {
   const frame = document.getElementById("playback-frame"), clock = CLOCK;
   let ready = false, wanted = null;  // The playback speaks first; a time chosen before that waits.
@@ -46,8 +52,17 @@ new IntersectionObserver(async (entries, observer) => {
     wanted = time;
     if (ready) seek();
   });
+  const still = document.createElement("img"), said = document.getElementById("playback-said");
+  Object.assign(still, {id: "playback-still", style: "max-width:100%;max-height:90mm"});
   addEventListener("message", ({source, data}) => {
     if (source !== frame.contentWindow) return;
+    if (data.playbackStill) {
+      still.src = data.playbackStill;
+      document.getElementById("playback-paper").prepend(still);
+      const time = (clock.start + clock.rate * data.time).toFixed(2);
+      still.alt = said.textContent = `The playback at ${time} s; it moves in the HTML file.`;
+      return;
+    }
     const time = clock.start + clock.rate * data.playbackTime;
     if (ready || wanted === null)
       document.dispatchEvent(new CustomEvent("timeplayed", {detail: {recording: "", time}}));
@@ -70,7 +85,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Section:
-    """A part of the page between the table and the playback: a heading, paragraphs of plain text, pictures."""
+    """A part of the page below table and playback: a heading, paragraphs of plain text, pictures."""
 
     heading: str
     paragraphs: Sequence[str] = ()
@@ -118,12 +133,12 @@ def write_page(
         How the playback's time goes with that of the plots, whose cursor and it move each other.
     """
     parts = [("numbers", "The paper's numbers and ours", _numbers(quantities))]
+    if playback is not None:
+        parts.append(("playback", "Playback in 3-D", _frame(playback, caption, clock)))
     for number, section in enumerate(sections, start=1):
         content = "".join(paragraph(text) for text in section.paragraphs)
         content += "".join(figure(p.svg, p.alternative, p.caption) for p in section.pictures)
         parts.append((f"part{number}", section.heading, content))
-    if playback is not None:
-        parts.append(("playback", "Playback in 3-D", _frame(playback, caption, clock)))
     header = f'<p class="quiet">{escape(title)}</p>\n{headline(found)}'
     document = page(title, header, parts, f"Written by snarelab: make study-{study}.")
     folder = FOLDER / study
@@ -147,7 +162,9 @@ def _numbers(quantities: Sequence[Quantity]) -> str:
         for q in quantities
     ]
     used = {q.kind for q in quantities}
-    kinds = "".join(f"<dt>{kind}</dt><dd>{text}</dd>" for kind, text in _KINDS.items() if kind in used)
+    beside = any(q.kind == "reference" and q.paper is not None for q in quantities)
+    said = {**_KINDS, "reference": _BESIDE} if beside else _KINDS
+    kinds = "".join(f"<dt>{kind}</dt><dd>{text}</dd>" for kind, text in said.items() if kind in used)
     heads = ["quantity", "unit", "paper", "ours", "interval", "kind"]
     return table("", heads, rows, numeric=(2, 3, 4)) + f'<dl class="facts">{kinds}</dl>\n'
 

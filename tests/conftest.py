@@ -87,6 +87,16 @@ def own_cache(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
+def each_diagnosis_once(tmp_path_factory):
+    """What `once.remembered` says, over all workers of a run."""
+    from once import remembered  # found by the paths above
+
+    base = tmp_path_factory.getbasetemp()
+    with remembered(base.parent if "PYTEST_XDIST_WORKER" in os.environ else base):
+        yield
+
+
+@pytest.fixture(scope="module")
 def halves(tmp_path_factory) -> Path:
     """A folder with the two halves of an oscillator as FMUs of FMI 2.0, in plain C."""
     from bench.oscillator_fmu import build

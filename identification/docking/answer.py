@@ -24,7 +24,7 @@ from ..diagnosis import (
     Step,
     Trace,
 )
-from ..wording import experiment_sentence, named
+from ..wording import experiment_sentence, foremost, named
 from .confirm import Confirmed
 from .fit import Linear, normal, priors, residuals, simulate, start
 from .recording import EVERY, Record, unit_of
@@ -70,7 +70,7 @@ def report_on(
         )
         findings.append(Finding(p.effect.name, p.at, n.share, n.share, values[p.key], evidence, rivals))
     fits = _fits(own, locked, found.first, confirmed.train, before_held, confirmed.held, found)
-    worst = max(fits, key=lambda f: f.holdout.relative_before - f.holdout.relative_after)
+    worst = foremost(findings, fits)
     verdict = "missing_physics" if findings else "adequate"
     if findings:
         sentence = (
@@ -104,6 +104,7 @@ def report_on(
         verdict, sentence, "", model.name, tuple(findings), _locations(own[0], found.first, confirmed.train, found),
         fits, _steps(own, locked, found.first, before_held, confirmed), shown, _moved(model, values, confirmed),
         _traces(own, locked, found.first, confirmed.train, before_held, confirmed.held), limits, tuple(notes), BAND,
+        foremost=worst.channel,
     )  # fmt: skip
 
 

@@ -277,7 +277,7 @@ def _size(along: Along, parts: Mapping[int, Sequence[Array]]) -> Array:
 
 def coordinate(effect: Effect) -> str | None:
     """What a joint's law runs over, in words of the family of curves; told from the law itself."""
-    if effect.at != "joint" or effect.acts_on != "torque":
+    if effect.at != "joint" or effect.acts_on != "torque" or effect.others:
         return None
     if effect.remembers:
         return "distance since it turned by direction"

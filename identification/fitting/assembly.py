@@ -253,6 +253,8 @@ class Assembly:
                 blocks += self._through_load(p, by_load, rigid)
             for channel, values, columns in terms:
                 tau[:, channel] += values
+                if not self._free[k].any():
+                    continue  # all of it is held
                 blocks.append(Block(channel, self._index[k], columns[:, self._free[k]]))
         return Evaluation(load, tau, blocks, passed)
 

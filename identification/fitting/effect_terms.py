@@ -90,6 +90,10 @@ def contributions(
         "temperature": motion.temperature[:, joint],
         "speed_scale": np.full(len(load), speed_scale),
     }
+    names = [j.name for j in tree.joints]
+    for k, other in enumerate(effect.others, 1):
+        i = names.index(other)
+        signals |= {f"q_of_{k}": motion.q[:, i], f"qd_of_{k}": motion.qd[:, i]}
     if effect.at == "sensor":
         # Against the motion that a late position encoder reads, all that the joint's motion causes is early: time runs
         # backwards.

@@ -56,8 +56,9 @@ def with_links(
     offsets = tuple(f for f in findings if f.name == "sensor_bias")
     moving = tuple(f for f in findings if f.name != "sensor_bias")
     verdict, description = diagnosis.verdict, diagnosis.description
-    sentences = [diagnosis.sentence]
+    sentences, spoken_of = [diagnosis.sentence], diagnosis.foremost
     if findings:
+        spoken_of = _foremost(fits).channel if first else spoken_of
         said = _sentence(moving or offsets, fits)
         if verdict == "adequate":
             sentences = ["The torques ask for nothing that these recordings can show."]
@@ -81,6 +82,7 @@ def with_links(
         traces=(*torques.traces, *(t for link in links for t in traces_of(link))),
         limits=(*torques.limits, *(x for link in links for x in limits_of(link))),
         notes=(*torques.notes, *(n for link in links for n in notes_of(link))),
+        foremost=spoken_of,
     )
     return answer, _model(model, links)
 
@@ -106,6 +108,12 @@ def _fit(link: LinkDiagnosis) -> ChannelFit:
     )
 
 
+def _foremost(fits: Sequence[ChannelFit]) -> ChannelFit:
+    """Of the encoders that differ less with what was named, the one that differed most before."""
+    changed = [f for f in fits if f.holdout.rms_after < f.holdout.rms_before]
+    return max(changed or fits, key=lambda f: f.holdout.rms_before)
+
+
 def _sentence(findings: Sequence[Finding], fits: Sequence[ChannelFit]) -> str:
     """What the encoders say, first the kind that is named at most joints."""
     if not findings:
@@ -121,8 +129,7 @@ def _sentence(findings: Sequence[Finding], fits: Sequence[ChannelFit]) -> str:
     said = f"Link and motor encoders differ by {'; '.join(words)}."
     if all(f.name == "sensor_bias" for f in findings):
         return said
-    changed = [f for f in fits if f.holdout.rms_after < f.holdout.rms_before]
-    worst = max(changed or fits, key=lambda f: f.holdout.rms_before)
+    worst = _foremost(fits)
     before, after = (length(x, worst.unit) for x in (worst.holdout.rms_before, worst.holdout.rms_after))
     return (
         f"{said} With that added, the difference left on {worst.channel}, on the held-out recording, "

@@ -10,6 +10,7 @@ from ...report.zoom import Curve, Strip, zoomable
 from ..diagnosis import Diagnosis, Finding, FrictionCurve, Limit, Location, Rival, Trace
 from .curves import friction_over_speed, friction_words
 from .figures import residual_over_time
+from .tables import tables
 from .words import chance, number, percent, spans, unit_words, with_std, words
 
 STATUS = {
@@ -32,7 +33,7 @@ def verdict(diagnosis: Diagnosis, day: date) -> str:
         ("Model", diagnosis.model),
         ("Training", ", ".join(recordings["train"])),
         ("Held-out", ", ".join(recordings["holdout"])),
-        ("Analysis band", f"0 to {diagnosis.band:g} Hz"),
+        ("Analysis band", f"0 to {diagnosis.band:.3g} Hz"),
         ("Date", day.isoformat()),
     ]
     rows = "".join(f"<dt>{escape(name)}</dt><dd>{escape(value)}</dd>" for name, value in facts if value)
@@ -48,11 +49,15 @@ def missing(diagnosis: Diagnosis) -> tuple[str, str, str]:
         return "missing", "What would have been seen", detection_limits(diagnosis)
     text = paragraph(diagnosis.description)
     if diagnosis.verdict == "unknown_effect":
-        return "missing", "What is known about it", f'<article class="card">{text}</article>\n'
+        return (
+            "missing",
+            "What is known about it",
+            f'<article class="card">{text}{tables(diagnosis.empirical)}</article>\n',
+        )
     curves = {curve.at: curve for curve in diagnosis.curves if curve.kind == "joint"}
     cards = "".join(_card(place, group, curves.get(place)) for place, group in _by_place(diagnosis.effects).items())
     if diagnosis.description:
-        cards += f'<article class="card"><h3>Without a name</h3>\n{text}</article>\n'
+        cards += f'<article class="card"><h3>Without a name</h3>\n{text}{tables(diagnosis.empirical)}</article>\n'
     return "missing", "What is missing", cards
 
 

@@ -20,7 +20,10 @@ _MOVED = 2.0
 
 
 def most_changed(diagnosis: Diagnosis) -> list[Trace]:
-    """One trace a channel, held-out where there is one; the channel that changed most first."""
+    """One trace a channel, held-out where there is one; the headline's channel first, then what changed most.
+
+    Of several recordings, the one on which the channel changed most.
+    """
     return [max(_shown(diagnosis, channel), key=_change) for channel in _channels(diagnosis)]
 
 
@@ -144,11 +147,12 @@ def parameters(diagnosis: Diagnosis) -> tuple[str, str, str]:
 
 
 def notes(diagnosis: Diagnosis) -> tuple[str, str, str]:
-    """Conditioning and excitation in words, and the limits of detection unless they were shown already."""
+    """Conditioning and excitation in words; the limits of detection, folded, unless they were shown already."""
     items = "".join(f"<li>{escape(note)}</li>\n" for note in diagnosis.notes)
     content = f"<ul>{items}</ul>\n" if items else ""
     if diagnosis.verdict != "adequate":
-        content += detection_limits(diagnosis)
+        limits = detection_limits(diagnosis)
+        content += folded("The smallest effects that would have been seen", limits) if diagnosis.limits else limits
     return "notes", "Notes", content or paragraph("Nothing to remark on the conditioning or excitation.")
 
 
@@ -173,9 +177,13 @@ def _shown(diagnosis: Diagnosis, channel: str) -> list[Trace]:
 
 
 def _channels(diagnosis: Diagnosis) -> list[str]:
-    """Channels with traces, those whose residual changed most first."""
+    """Channels with traces: the one that the headline speaks of, then those whose residual changed most."""
     names = dict.fromkeys(trace.channel for trace in diagnosis.traces)
-    return sorted(names, key=lambda name: max(map(_change, _shown(diagnosis, name))), reverse=True)
+
+    def rank(name: str) -> tuple[bool, tuple[float, float]]:
+        return name == diagnosis.foremost, max(map(_change, _shown(diagnosis, name)))
+
+    return sorted(names, key=rank, reverse=True)
 
 
 def _change(trace: Trace) -> tuple[float, float]:

@@ -39,5 +39,5 @@ def _document(diagnosis: Diagnosis, day: date, origin: Provenance) -> str:
         f"{diagnosis.model}: {STATUS[diagnosis.verdict]}",
         verdict(diagnosis, day),
         [part(diagnosis) for part in parts],
-        f"Written by snarelab. All residuals are measurement minus model, in the band 0 to {diagnosis.band:g} Hz.",
+        f"Written by snarelab. All residuals are measurement minus model, in the band 0 to {diagnosis.band:.3g} Hz.",
     )

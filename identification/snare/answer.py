@@ -23,7 +23,7 @@ from ..diagnosis import (
     Trace,
 )
 from ..reliability import probability as reliability
-from ..wording import experiment_sentence, named, percent
+from ..wording import experiment_sentence, foremost, named, percent
 from .channels import channel_errors, channels, modelled
 from .comparison import QUARTER, SLOW, variances
 from .fit import Fit, spread
@@ -97,6 +97,7 @@ def report_on(
         _limits(model, found, train),
         tuple(notes),
         BAND,
+        foremost=_foremost(findings, fits).channel,
     )
 
 
@@ -175,8 +176,15 @@ def _unexplained(fits: Sequence[ChannelFit]) -> str:
     return f"{' and '.join(found)} are left that no effect of a capture explains: check the set-up's sizes and masses"
 
 
+def _foremost(findings: Sequence[Finding], fits: Sequence[ChannelFit]) -> ChannelFit:
+    """What the sentence speaks of: the channel that names made best, or the motion that is told worst."""
+    if findings:
+        return foremost(findings, fits)
+    return max((f for f in fits if f.unit == "m"), key=lambda f: f.holdout.rms_before)
+
+
 def _sentence(findings: Sequence[Finding], fits: Sequence[ChannelFit], description: str) -> str:
-    worst = max(fits, key=lambda f: f.holdout.relative_before - f.holdout.relative_after)
+    worst = _foremost(findings, fits)
     if findings:
         return (
             f"The model leaves out {named(findings)}. With that added, the error of {worst.channel} on the held-out "
@@ -185,7 +193,6 @@ def _sentence(findings: Sequence[Finding], fits: Sequence[ChannelFit], descripti
         )
     if description:
         return f"Something is missing that no effect of the vocabulary explains: {description}."
-    worst = max((f for f in fits if f.unit == "m"), key=lambda f: f.holdout.rms_before)
     return (
         "The model is adequate: nothing is left out that these captures can show. On the held-out capture, "
         f"the error of {worst.channel} is {_size(worst.holdout.rms_before, worst.unit)}."

@@ -157,6 +157,8 @@ def _check(arm: FloatingArm, placed: Placed, names: Sequence[str]) -> None:
         raise InputError(f"{name}: {effect.name} is no torque at a joint; a simulated drive takes those only")
     if placed.at not in names:
         raise InputError(f"{name}: {effect.name} at '{placed.at}'; this arm has {', '.join(names)}")
+    if effect.others:
+        raise InputError(f"{name}: {placed.key} reads other joints ({', '.join(effect.others)}); a drive reads its own")
     signals = {signal: ca.SX.sym(signal, size) for signal, size in SIGNALS["joint"].items()}
     states = {state: ca.SX.sym(state) for state in effect.states}
     p = {a.name: ca.SX.sym(a.name) for a in effect.parameters}

@@ -72,7 +72,7 @@ def asked(folder: Path, limit: float, run: Diagnose) -> dict[str, Any]:
         found = {"verdict": "failed", "effects": [], "notes": [str(error)]}
     seconds = time.perf_counter() - start
     kept = ("name", "at", "probability", "margin", "gain", "parameters", "rivals")
-    effects = [{key: e[key] for key in kept if key in e} for e in found["effects"]]
+    effects = [{key: e[key] for key in kept if key in e} for e in found["effects"] if e["name"] != "empirical"]
     for effect in effects:
         effect["rivals"] = [
             {key: r[key] for key in ("name", "at", "probability", "separable")} for r in effect["rivals"]

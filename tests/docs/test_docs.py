@@ -101,7 +101,7 @@ def test_every_model_shown_loads(block, tmp_path):
     model.write_text(block if "urdf" in given else f'urdf = "arm3.urdf"\n{block}', encoding="utf-8")
     loaded = load_model(model)
     assert len(loaded.signals) == len(given.get("signals", {}))
-    assert all(key.split(".")[0] in {*effects(), "inertia", "speed_scale"} for key in loaded.values)
+    assert all(key.split(".")[0] in {*effects(), "inertia", "speed_scale", "empirical", "std"} for key in loaded.values)
 
 
 def keys(value):

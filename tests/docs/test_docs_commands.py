@@ -117,8 +117,8 @@ def bench(tmp_path, monkeypatch):
 
 
 @pytest.fixture(scope="module", autouse=True)
-def each_diagnosis_once():
-    """A diagnosis that two pages ask for, of the same model and recordings, is made once."""
+def each_of_a_page_once(each_diagnosis_once):
+    """A diagnosis that two pages ask for, of the same effects and recordings, is made once."""
     made, diagnose = {}, diagnosing.diagnose
 
     def remembered(model, recordings, holdout, **options):

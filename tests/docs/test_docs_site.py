@@ -48,7 +48,7 @@ def site(tmp_path_factory):
 
 def test_every_page_is_built_and_in_the_menu(site):
     pages, _ = site
-    for source in DOCS.glob("*.md"):
+    for source in [*DOCS.glob("*.md"), *DOCS.glob("*.ipynb")]:
         assert f"{source.stem}.html" in pages
         assert source.stem == "index" or f"{source.stem}.html" in pages["index.html"].links
 
@@ -67,6 +67,32 @@ def test_every_link_inside_the_site_leads_somewhere(site):
             assert not anchor or inside is None or unquote(anchor) in inside.anchors, f"{name}: {link}"
             followed += 1
     assert followed > 500
+
+
+@pytest.mark.parametrize("width", [1400, 390])
+def test_pages_are_no_wider_than_the_screen(site, browser, width):
+    """What is too wide scrolls in a box of its own, and on a large screen nothing does."""
+    pages, folder = site
+    window = browser.new_page(viewport={"width": width, "height": 900})
+    boxes = """[...document.querySelectorAll("article *")]
+        .filter(x => ["auto", "scroll"].includes(getComputedStyle(x).overflowX) && x.scrollWidth > x.clientWidth + 2)
+        .map(x => x.outerHTML.slice(0, 80))"""
+    for name in pages:
+        window.goto((folder / name).as_uri())
+        assert window.evaluate("document.documentElement.scrollWidth") <= width, name
+        assert width < 1000 or window.evaluate(boxes) == [], name
+    window.close()
+
+
+def test_no_table_of_effects_has_narrow_columns(site, browser):
+    _, folder = site
+    window = browser.new_page(viewport={"width": 1400, "height": 900})
+    window.goto((folder / "effects.html").as_uri())
+    widths = window.evaluate("""[...document.querySelectorAll("article td")]
+        .filter(x => x.innerText.length > 60).map(x => x.clientWidth)""")
+    assert len(widths) > 100
+    assert min(widths) >= 200
+    window.close()
 
 
 def test_nothing_is_fetched_from_elsewhere(site):

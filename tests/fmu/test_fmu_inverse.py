@@ -79,13 +79,12 @@ def test_follows_as_simulate_does_hidden_states_and_sensors_included(tmp_path, v
         np.testing.assert_allclose(found[:, k], tau, rtol=0, atol=1e-9 * np.abs(tau).max())
 
 
+@pytest.mark.usefixtures("each_diagnosis_once")
 def test_diagnose_export_and_simulate_reproduce_the_improved_fit(tmp_path):
     """The bundled arm: what its model leaves out is found, and its FMU has the residual that diagnose tells."""
     bundled = Path(str(files("snarelab.studies"))) / "bundled"
-    hold, old, new = bundled / "holdout.csv", tmp_path / "old.toml", tmp_path / "new.toml"
-    known = '"viscous_friction", "coulomb_friction", "presliding_hysteresis"'
-    old.write_text(f'name = "arm3"\nurdf = {json.dumps(str(bundled / "arm3.urdf"))}\neffects = [{known}]\n')
-    given = ["diagnose", old, bundled / "train.csv", "--holdout", hold, "--json", tmp_path / "d.json"]
+    hold, new = bundled / "holdout.csv", tmp_path / "new.toml"
+    given = ["diagnose", bundled / "arm3.toml", bundled / "train.csv", "--holdout", hold, "--json", tmp_path / "d.json"]
     assert main([str(x) for x in [*given, "--save-model", new]]) == 0
     told = json.loads((tmp_path / "d.json").read_text())
     assert told["verdict"] == "missing_physics"

@@ -14,12 +14,24 @@ RATE = 200
 
 
 def record(
-    path, seed, seconds, *, rounding=0.0, stribeck=0.0, speed=0.08, drag=0.0, stops=False, knocks=(), wander=0.0
+    path,
+    seed,
+    seconds,
+    *,
+    rounding=0.0,
+    stribeck=0.0,
+    speed=0.08,
+    drag=0.0,
+    stops=False,
+    knocks=(),
+    wander=0.0,
+    law=None,
 ):
     """A pendulum under a PD servo; friction of 3 N·m, rounded over ``rounding`` [rad/s] or sharp.
 
     It swings, or goes from point to point and ``stops`` there; something shakes it at the ``knocks`` [s]. Its
-    disturbance is in a band or, where ``wander`` is above zero, a random walk of that RMS [N·m] about its mean.
+    disturbance is in a band or, where ``wander`` is above zero, a random walk of that RMS [N·m] about its mean. A
+    ``law`` of position [rad] takes a torque [N·m] that no name stands for.
     """
     rng = np.random.default_rng(seed)
     steps, fine = int(1000 * seconds), 4
@@ -49,8 +61,10 @@ def record(
         command = float(ahead[k] + kp * (target[k] - q) + kd * (wanted[k] - qd))
         positions[k], torques[k] = q, 0.5 * (held + command)
         held = command
+        nameless = law(q) if law else 0.0
         for _ in range(fine):
-            free = qd + h / INERTIA * (held + push[k] - MASS * GRAVITY * LENGTH * math.cos(q) - drag * qd * abs(qd))
+            pull = MASS * GRAVITY * LENGTH * math.cos(q) + nameless
+            free = qd + h / INERTIA * (held + push[k] - pull - drag * qd * abs(qd))
             level = 3.0 + stribeck * math.exp(-((qd / speed) ** 2))
             if rounding:
                 stiff = level / rounding / math.cosh(min(abs(qd) / rounding, 300)) ** 2

@@ -19,8 +19,16 @@ SPOILT = {
 }  # fmt: skip
 
 
+LONG = ("every third torque missing", "milliseconds as seconds")
+
+
 @pytest.mark.parametrize(
-    ("fault", "which"), [*((fault, ("train", "hold")) for fault in SPOILT), ("seconds as milliseconds", ("hold",))]
+    ("fault", "which"),
+    [
+        *((fault, ("train", "hold")) for fault in SPOILT if fault not in LONG),
+        *(pytest.param(fault, ("train", "hold"), marks=pytest.mark.slow) for fault in LONG),
+        ("seconds as milliseconds", ("hold",)),
+    ],
 )
 def test_a_spoilt_recording_ends_in_a_verdict_or_in_one_line(tmp_path, monkeypatch, capfd, fault, which):
     monkeypatch.chdir(tmp_path)

@@ -49,12 +49,12 @@ def reported(monkeypatch):
         left = np.broadcast_to(relative, 3)
         both = [(Misfit(9, 9, 9, x), Misfit(9, 9, x, x / 2)) for x in left]
         fits = [ChannelFit(f"tau.{n}", u, *own, 0) for n, u, own in zip(NAMES, ("N*m", "N", "N*m"), both, strict=True)]
-        monkeypatch.setattr(answer, "_fits", lambda *_: tuple(fits))
+        monkeypatch.setattr(answer, "channel_fits", lambda *_: tuple(fits))
         monkeypatch.setattr(
             answer, "_finding", lambda n, *_: Finding(n.placed.effect.name, n.placed.at, 1, 1, {}, "", ())
         )
         monkeypatch.setattr(answer, "locate", lambda _, explained: tuple(explained))
-        for part in ("_moved", "_traces", "_limits"):
+        for part in ("moved", "traces", "_limits"):
             monkeypatch.setattr(answer, part, lambda *_, part=part: part)
         monkeypatch.setattr(answer, "_excitation", lambda _: ["excited"])
         encoders = ([3.0, 1.0, 0.0], [np.sqrt(41), 1.0, 0.0])  # of two recordings: their RMS is 5, 1 and nothing
@@ -108,6 +108,7 @@ def test_without_a_finding_the_sentence_tells_what_has_no_name_and_where(reporte
     assert made.sentence == (
         f"Something is missing on tau.joint3 that no effect of the vocabulary explains. O{one[1:]}; {two}."
     )
+    assert made.foremost == "tau.joint3"
     # What is located is the residual itself there, measured 1 less modelled 3, 5 and 7, and nothing elsewhere.
     (residual,) = cast(Any, made.location)
     assert residual.tolist() == [[0.0, -4.0, -6.0]] * 4
@@ -121,6 +122,7 @@ def test_with_a_finding_the_rest_is_told_by_its_channels(reported):
         "The model leaves out Coulomb friction at joint1. With that added, the error of tau.joint1 on the held-out "
         "recording falls from 90 % to 45 %. Part of what is left on tau.joint1 and tau.joint3 has no name."
     )
+    assert made.foremost == "tau.joint1"
     assert made.description == "; ".join(
         (
             words("joint3", "time", "64 %", "32 %"),
@@ -138,7 +140,7 @@ def test_an_adequate_model_is_told_by_the_worst_channel(reported):
     assert (made.verdict, made.description) == ("adequate", "")
     assert made.sentence.endswith(f" is 2 % of tau.joint1. It is noise: {HEARD}.")
     assert (made.model, made.steps, made.moved, made.traces, made.limits) == (
-        "arm", (Step("s", 1, 1),), "_moved", "_traces", "_limits",
+        "arm", (Step("s", 1, 1),), "moved", "traces", "_limits",
     )  # fmt: skip
     assert made.band == RATE / 2
     (nothing,) = cast(Any, made.location)

@@ -16,7 +16,9 @@ def test_misfits_are_root_mean_squares_over_all_recordings_of_a_set(monkeypatch)
     """Fitted: a torque of 4 modelled as 2, then 3; held out 10, as 2 and 3. Channels 2 and 3 with other numbers."""
     monkeypatch.setattr(answer, "_noise_floor", lambda *_: np.array([0.1, 0.2, 0.3]))
     train = [experiment(np.tile([4.0, 8.0, 5.0], (n, 1))) for n in (4, 8)]
-    fits = answer._fits(MODEL, fit([2, 0, 5]), fit([3, 4, 6]), train, [experiment(np.tile([10.0, 2.0, 5.0], (4, 1)))])
+    fits = answer.channel_fits(
+        MODEL, fit([2, 0, 5]), fit([3, 4, 6]), train, [experiment(np.tile([10.0, 2.0, 5.0], (4, 1)))]
+    )
     assert [(f.channel, f.unit, f.noise_floor) for f in fits] == [
         ("tau.joint1", "N*m", 0.1),
         ("tau.joint2", "N", 0.2),
@@ -85,7 +87,7 @@ def test_parameters_that_stay_in_the_model_are_told_before_and_after():
 
     first, final = fit([1, 2, 3], assembly=slots("a", "b", "c")), fit([30, 20, 10], assembly=slots("c", "x", "a"))
     final.std = np.array([0.3, 0.2, 0.1])
-    assert [tuple(vars(m).values()) for m in answer._moved(first, final)] == [
+    assert [tuple(vars(m).values()) for m in answer.moved(first, final)] == [
         ("a", "unit of a", 1.0, 10.0, 0.1),
         ("c", "unit of c", 3.0, 30.0, 0.3),
     ]
@@ -96,7 +98,7 @@ def test_every_channel_of_every_recording_has_a_trace():
     k = np.array([1.0, 2.0, 3.0])
     es = [experiment(np.tile(100 * k, (2, 1)), f"/d/{n}.csv", q=np.tile(k, (2, 1)), qd=np.tile(10 * k, (2, 1)))
           for n in "abh"]  # fmt: skip
-    made = answer._traces(fit([1, 2, 3]), fit([4, 5, 6]), es[:2], es[2:])
+    made = answer.traces(fit([1, 2, 3]), fit([4, 5, 6]), es[:2], es[2:])
     assert [(t.recording, t.role, t.channel, t.unit) for t in made] == [
         (f"{n}.csv", "holdout" if n == "h" else "train", f"tau.{j}", u)
         for n in "abh"

@@ -45,6 +45,7 @@ def test_names_are_the_vocabularys():
     assert not set(NAMELESS) & set(effects())
 
 
+@pytest.mark.slow
 def test_a_case_follows_from_its_seed(tmp_path):
     plan = Plan(SINGLE, WHITE, (("payload_mass", 2.0),))
     first, again, other = draw(plan, SEED, 3), draw(plan, SEED, 3), draw(plan, SEED, 4)

@@ -105,15 +105,23 @@ def test_tab_reaches_every_control(browser: Browser, pages: dict[str, Path], kin
 
 
 @pytest.mark.parametrize("kind", [*VERDICTS, "study"])
-def test_paper_hides_and_cuts_nothing(browser: Browser, pages: dict[str, Path], kind: str) -> None:
+@pytest.mark.parametrize("unfold", [False, True])
+def test_paper_hides_only_what_is_folded_and_cuts_nothing(
+    browser: Browser, pages: dict[str, Path], kind: str, unfold: bool
+) -> None:
     with opened(browser, pages[kind], "dark", (680, 1010)) as page:  # A4 less its margins, at 96 dots an inch
         page.locator(".times").first.focus()
         page.keyboard.press("End")
+        if unfold:
+            page.evaluate("document.querySelectorAll('details').forEach(x => x.open = true)")
         page.emulate_media(media="print")
+        folded = page.locator("details").count()
+        assert page.locator("details:visible").count() == (folded if unfold else 0)
         assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
         assert not page.locator(".cursor:visible,.times:visible,nav:visible,iframe:visible").count()
         hidden = page.evaluate("""() => [...document.querySelectorAll("body *")]
             .filter(x => !x.closest("nav,script,style,noscript,.on-screen,.zoom-button,.cursor,.times,.bar"))
+            .filter(x => !x.closest("details:not([open])"))
             .filter(x => !x.getBoundingClientRect().height || !x.checkVisibility({contentVisibilityAuto: true}))
             .map(x => x.outerHTML.slice(0, 80))""")
         assert [element for element in hidden if not element.startswith(("<col", "<br"))] == []
@@ -121,7 +129,7 @@ def test_paper_hides_and_cuts_nothing(browser: Browser, pages: dict[str, Path], 
             .filter(x => x.checkVisibility() && x.scrollWidth > x.clientWidth + 1)
             .map(x => x.outerHTML.slice(0, 80))""")
         assert cut == []
-        assert page.locator(".on-paper:visible").count() == (kind == "study")
+        assert page.locator(".on-paper:visible").count() == (kind == "study") + (folded > 0)
 
 
 def crowded(kind: str) -> Diagnosis:

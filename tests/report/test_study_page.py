@@ -1,5 +1,6 @@
 """A study's page and its playback, as a reader and a browser see them."""
 
+import io
 import json
 import re
 from pathlib import Path
@@ -7,13 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from browser import drawn, opened, pixels, playing
+from matplotlib.image import imread
 from playwright.sync_api import Browser
 from pydrake.geometry import Sphere
 from study_pages import QUANTITIES, moving, picture
 
 from snarelab.errors import InputError
 from snarelab.report.playback import Playback
-from snarelab.studies.outcome import write_result
+from snarelab.studies.outcome import Quantity, write_result
 from snarelab.studies.page import Section, write_page
 
 
@@ -39,6 +41,18 @@ def test_page_says_the_finding_first_and_explains_the_kinds(tmp_path: Path, monk
     result = write_result("demo", QUANTITIES, 1.0)
     first, *_, named = json.loads(result.read_text())["quantities"]
     assert (first["paper"], named["ours"]) == (2.6, "joint_elasticity at joint2, <odd>")
+
+
+@pytest.mark.parametrize(
+    ("paper", "words"), [(None, "the paper has no number for it."), (0.0027, "it measures something else.")]
+)
+def test_reference_is_explained_by_what_stands_beside_it(tmp_path, monkeypatch, paper, words):
+    monkeypatch.chdir(tmp_path)
+    spread = Quantity("mean_spread_y", "m", 0.0031, "reference", paper)
+    text = write_page("demo", "Suspended test", "It swings.", [spread]).read_text(encoding="utf-8")
+    (said,) = re.findall(r"<dt>reference</dt><dd>(.*?)</dd>", text)
+    assert said.endswith(words)
+    assert ("no number" in said) is (paper is None)
 
 
 @pytest.mark.parametrize(
@@ -111,6 +125,22 @@ def test_page_unpacks_its_playback_in_a_browser(
     # The view goes right by 20 pixels a key, and what is in it goes left.
     assert extent(shifted[700:], 0)[0] - extent(shown[700:], 0)[0] == pytest.approx(-0.1, abs=0.02)
     assert all(np.isfinite(extent(shown[700:], channel)[0]) for channel in range(3))
+
+
+def test_paper_has_a_still_of_the_playback(browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of the time and the view that were shown last."""
+    monkeypatch.chdir(tmp_path)
+    path = write_page("demo", "Test", "It moves.", QUANTITIES, [Section("One", (), [picture()])], moving().html(1.0))
+    with opened(browser, path, size=(680, 1000)) as page:
+        playing(page)
+        page.wait_for_function("document.getElementById('playback-still')?.naturalWidth > 100")
+        page.emulate_media(media="print")
+        still = page.locator("#playback-still")
+        assert still.is_visible()
+        assert "at 1.00 s" in page.locator("#playback-said").inner_text()
+        still.scroll_into_view_if_needed()
+        shown = imread(io.BytesIO(still.screenshot()))[..., :3]
+        assert all(np.isfinite(extent(shown, channel)[0]) for channel in range(3))  # red, green and blue are seen
 
 
 @pytest.mark.parametrize(("width", "beside"), [(1500, True), (1200, False)])

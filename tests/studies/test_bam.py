@@ -159,6 +159,7 @@ def test_of_scores_as_good_as_equal_the_fewest_parameters_are_named():
     assert best([worse, tried("ripple", 9, -1.0, 0.5, 0.5, 0.3)]) is None
 
 
+@pytest.mark.slow
 def test_load_dependence_takes_a_third_of_the_held_out_error(recorded):
     train, held = recorded
     base = fit(train, START, 0)

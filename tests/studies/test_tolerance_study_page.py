@@ -64,6 +64,7 @@ def here(tmp_path, monkeypatch):
     return tmp_path / FOLDER / "tolerance"
 
 
+@pytest.mark.slow
 def test_both_studies_leave_the_documented_numbers_and_go_on(here, capsys):
     assert tolerance.main() == 0
     first = json.loads((here / "result.json").read_text())

@@ -86,6 +86,7 @@ TORQUES = replace(
     spelt("x"),
     sentence="Torques say.",
     description="",
+    foremost="tau.joint1",
     effects=(finding("coulomb_friction", "joint1"),),
     fit=(channel("tau.joint1", 2, 1), channel("tau.joint2", 1, 1)),
 )
@@ -133,6 +134,7 @@ def test_the_kind_of_channel_that_is_told_more_of_goes_first(monkeypatch, told, 
         ["A", "B", "tau.joint1", "tau.joint2"] if first else ["tau.joint1", "tau.joint2", "A", "B"]
     )
     assert (made.steps[0].label == "encoders") is first
+    assert made.foremost == ("A" if first else TORQUES.foremost)
     assert made.location == ("places",)
     assert "sensor bias" not in made.sentence
 

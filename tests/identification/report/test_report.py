@@ -158,3 +158,25 @@ def test_the_answer_is_the_first_printed_sheet(browser: Browser, reports: dict[s
     with opened(browser, reports["missing_physics"], size=(680, 1010)) as page:
         page.emulate_media(media="print")
         assert page.evaluate("document.querySelector('#answer').getBoundingClientRect().bottom + scrollY") < 1010
+
+
+def test_a_report_is_few_sheets(browser: Browser, reports: dict[str, Path]) -> None:
+    """Six joints: twice as many before what is folded was left out, and pictures were cut to size."""
+    with opened(browser, reports["missing_physics"]) as page:
+        sheets = page.pdf(format="A4", prefer_css_page_size=True).count(b"/Type /Page\n")
+        assert 2 <= sheets <= 8
+
+
+def test_on_a_phone_the_legend_is_whole(browser: Browser, reports: dict[str, Path]) -> None:
+    with opened(browser, reports["missing_physics"], size=(390, 844)) as page:
+        page.locator(".plate").first.scroll_into_view_if_needed()
+        page.locator("[data-ready]").first.wait_for()
+        page.wait_for_timeout(300)
+        fits = page.evaluate("""() => {
+          const views = [];
+          const walk = view => { views.push(view); for (const child of view.children?.() ?? []) walk(child); };
+          for (const root of Object.values(Bokeh.index).concat(...(Bokeh.index.roots ?? []))) walk(root);
+          return views.filter(x => x.model?.type === "Legend").map(x => [x.bbox.right, x.parent.bbox.right]);
+        }""")
+        assert fits
+        assert all(own <= plot for own, plot in fits)

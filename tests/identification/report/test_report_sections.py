@@ -23,7 +23,9 @@ from snarelab.identification.diagnosis import (
     Step,
     Trace,
 )
-from snarelab.identification.report import findings, fit
+from snarelab.identification.report import answer, findings, fit
+from snarelab.identification.wording import foremost, verdict_sentence
+from snarelab.report.provenance import Provenance
 
 T = np.arange(200) / 100
 WAVE = np.where(np.arange(200) % 2, 1.0, -1.0)
@@ -114,6 +116,26 @@ def test_the_channels_that_changed_most_stand_first_and_each_in_the_recording_wh
     # The two that changed are open, the others folded.
     assert content.index("2 more channels</summary>") > content.index("a in b.csv (")
     assert content.index("2 more channels</summary>") < content.index("d in b.csv (")
+
+
+def test_headline_and_first_picture_speak_of_the_same_channel(asked):
+    """Two held-out recordings: a's error falls most over both together, b's most on one of them alone."""
+    kept = (
+        *(trace("a", 2, 1, recording=name) for name in ("b.csv", "c.csv")),
+        trace("b", 3, 1, recording="b.csv"),
+        trace("b", 0.4, 0.4, recording="c.csv", measured=40.0),
+    )
+    falls = {"a": (0.5, 0.25), "b": (0.0752, 0.0268)}  # of RMS over both recordings together
+    fits = tuple(ChannelFit(c, "N*m", Misfit(1, 1, *x), Misfit(1, 1, *x), 0.1) for c, x in falls.items())
+    named = spelt("x").effects
+    sentence = verdict_sentence(named, fits, "")
+    told = diagnosis(traces=kept, fit=fits, effects=named, sentence=sentence, foremost=foremost(named, fits).channel)
+    assert "the error of a on the held-out recording falls from 50 % to 25 %" in sentence
+    assert [t.channel for t in fit.most_changed(told)] == ["a", "b"]
+    assert [t.channel for t in fit.most_changed(replace(told, foremost=""))] == ["b", "a"]  # else it chose by itself
+    answer.answer(told, Provenance("", (), ()))
+    fit.unseen(told, skip=1)
+    assert [t.channel for t, _ in asked] == ["a", "b"]
 
 
 def test_without_an_addition_nothing_is_said_of_before_and_after(asked):
@@ -259,7 +281,12 @@ LIMIT = Limit("coulomb_friction", "joint1", "level", 0.5, "N*m")
 def test_notes_close_with_the_limits_of_detection_unless_these_were_shown():
     said = diagnosis(notes=("a < b", "c"), limits=(LIMIT,))
     items = "<ul><li>a &lt; b</li>\n<li>c</li>\n</ul>\n"
-    assert fit.notes(said) == ("notes", "Notes", items + findings.detection_limits(said))
+    key, heading, content = fit.notes(said)
+    assert (key, heading) == ("notes", "Notes")
+    assert content.startswith(items + "<details><summary>")
+    assert content.endswith(findings.detection_limits(said) + "</details>\n")
+    none = replace(said, limits=())
+    assert fit.notes(none)[2] == items + findings.detection_limits(none)
     assert fit.notes(replace(said, verdict="adequate"))[2] == items
     quiet = fit.notes(diagnosis(verdict="adequate"))[2]
     assert quiet == "<p>Nothing to remark on the conditioning or excitation.</p>\n"

@@ -295,6 +295,7 @@ def test_a_whole_answer_with_a_name_and_a_number_that_was_corrected(monkeypatch)
     assert said.verdict == "missing_physics"
     assert [f.name for f in said.effects] == ["contact_friction"]
     assert said.sentence.endswith("better taken as mass = 100 kg.")
+    assert f"the error of {said.foremost} on" in said.sentence
     (moved,) = said.moved
     assert (moved.name, moved.unit) == ("capture.mass", "kg")
     assert (moved.before, moved.after) == pytest.approx((10.0, 100.0))

@@ -228,8 +228,8 @@ def test_simulate_writes_a_recording_that_is_read_back(tmp_path, capsys):
 
 def test_an_umbilical_on_a_pendulum_is_named_and_told_by_its_stiffness(tmp_path):
     model = load_model(written(tmp_path, PLAIN + '[capture]\ntarget = "pendulum"\nline_length = 2.0\n'))
-    train = swinging(tmp_path, "train.csv", umbilical=80.0)
-    held = swinging(tmp_path, "held.csv", umbilical=80.0, direction=1.2, seed=2)
+    train = swinging(tmp_path, "train.csv", umbilical=80.0, seconds=2.0)
+    held = swinging(tmp_path, "held.csv", umbilical=80.0, direction=1.2, seed=2, seconds=2.0)
     said = []
     diagnosis, after = diagnose_captures(model, [train], held, progress=said.append, jobs=1)
     answer = json.loads(json.dumps(diagnosis.to_json(), allow_nan=False))
@@ -249,9 +249,13 @@ def test_an_umbilical_on_a_pendulum_is_named_and_told_by_its_stiffness(tmp_path)
     assert np.sqrt(np.mean((along["pos.target.z"].values - known) ** 2)) < 1e-3
 
 
+@pytest.mark.slow
 def test_a_pendulum_alone_is_told_well_and_what_would_have_shown(tmp_path):
     model = written(tmp_path, PLAIN + '[capture]\ntarget = "pendulum"\nline_length = 2.0\n')
-    train, held = swinging(tmp_path, "train.csv", seed=3), swinging(tmp_path, "held.csv", direction=1.2, seed=4)
+    train, held = (
+        swinging(tmp_path, "train.csv", seed=3, seconds=2.0),
+        swinging(tmp_path, "held.csv", direction=1.2, seed=4, seconds=2.0),
+    )
     out, page = tmp_path / "out.json", tmp_path / "out.html"
     asked = ["diagnose", str(model), str(train), "--holdout", str(held), "--json", str(out), "--report", str(page)]
     assert main([*asked, "--jobs", "1"]) == 0

@@ -28,6 +28,7 @@ def identified(folder, name, **inside):
     return {p["name"]: p for p in found["parameters"]}
 
 
+@pytest.mark.slow
 def test_propellant_slosh_is_named(tmp_path):
     got, fits = named(tmp_path, "propellant_slosh", tank=Tank(40.0, PLACE, 0.25, 0.05))
     # The bar is 15 %; what is seen is below 1 %, since the law leaves nothing out.
@@ -38,6 +39,7 @@ def test_propellant_slosh_is_named(tmp_path):
     assert all(f.holdout.relative_after < 0.02 for f in fits if "base" in f.channel)
 
 
+@pytest.mark.slow
 def test_mass_that_slides_along_one_axis(tmp_path):
     got = identified(tmp_path, "propellant_slosh", tank=Tank(40.0, PLACE, 0.3, 0.05, axes="y"))
     np.testing.assert_allclose([got[f"mass_{a}"]["value"] for a in "xyz"], [0, 40, 0], atol=0.4)
@@ -50,6 +52,7 @@ def test_pendulum_sloshes_across_its_length(tmp_path):
     assert got["frequency"]["value"] == pytest.approx(0.3, rel=0.02)
 
 
+@pytest.mark.slow
 def test_far_below_its_frequency_only_mass_over_frequency_squared_shows(tmp_path):
     """Motion of 0.1 to 0.2 Hz, slosh at 3 Hz: what shows is mass / w² times a fourth derivative, and no more."""
     got = identified(tmp_path, "propellant_slosh", tank=Tank(40.0, PLACE, 3.0, 0.3))

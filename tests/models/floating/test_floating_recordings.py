@@ -14,7 +14,7 @@ from snarelab.models.model_file import load_model
 from snarelab.models.model_write import save_model
 from snarelab.recordings import write_recording
 
-PERIOD, STEP, DURATION = 0.02, 0.002, 60.0
+PERIOD, STEP = 0.02, 0.002
 MJCF = """<mujoco><option timestep="{step}" gravity="0 0 0" integrator="RK4"/><worldbody>
 <body name="hub"><freejoint/>{hub}
 <body pos="0.6 0.2 0.1"><joint name="shoulder" axis="0 0 1"/><inertial pos="0.6 0 0" mass="20"
@@ -29,7 +29,7 @@ JOINTS = ("shoulder", "elbow")
 NOISE = {"q": 1e-6, "tau": 0.02, "vel": 2e-6, "omega": 2e-6}
 
 
-def recorded(path, seed, torque=(0.0, 0.0, 0.0), friction=0.0, hub=RIGID, planar=False, name="hub"):
+def recorded(path, seed, torque=(0.0, 0.0, 0.0), friction=0.0, hub=RIGID, planar=False, name="hub", seconds=30.0):
     """Servo both joints along sines, with a torque on the base in its own axes and Coulomb friction in the shoulder.
 
     ``planar`` keeps all motion in a plane, exactly.
@@ -41,7 +41,7 @@ def recorded(path, seed, torque=(0.0, 0.0, 0.0), friction=0.0, hub=RIGID, planar
     periods, phases = rng.uniform(5, 9, (2, 2)), rng.uniform(0, 2 * np.pi, (2, 2))
     drive = np.zeros(2)
     every, rows = round(PERIOD / STEP), []
-    for k in range(round(DURATION / STEP)):
+    for k in range(round(seconds / STEP)):
         turn = 2 * np.pi * data.time / periods + phases
         ramp = min(data.time / 3, 1.0)
         target = ramp * np.sum([[0.5, 0.3], [0.5, 0.3]] * np.sin(turn), axis=1)
@@ -84,6 +84,7 @@ def in_a_plane(text):
     return text
 
 
+@pytest.mark.slow
 def test_external_torque_is_named(tmp_path):
     torque = (0.1, -0.05, 0.2)
     train, held = (recorded(tmp_path / f"{k}.csv", k, torque) for k in (1, 2))
@@ -106,6 +107,7 @@ def test_rigid_body_is_adequate_and_reads_back(tmp_path):
     np.testing.assert_array_equal(again.tree.phi, believed.tree.phi)
 
 
+@pytest.mark.slow
 def test_friction_shows_at_its_joint_only(tmp_path):
     train, held = (recorded(tmp_path / f"{k}.csv", k, friction=1.0) for k in (1, 2))
     found = diagnose(model(tmp_path), [train], held).diagnosis
@@ -113,10 +115,11 @@ def test_friction_shows_at_its_joint_only(tmp_path):
     assert {place.channel for place in found.location} == {"tau.shoulder"}
 
 
+@pytest.mark.slow
 def test_bending_panels_are_named(tmp_path):
     w = 2 * np.pi * 0.35
     hub = PANELS.format(k=12 * w**2, c=12 * 2 * 0.02 * w)
-    train, held = (recorded(tmp_path / f"{k}.csv", k, hub=hub) for k in (1, 2))
+    train, held = (recorded(tmp_path / f"{k}.csv", k, hub=hub, seconds=60.0) for k in (1, 2))
     found = diagnose(model(tmp_path), [train], held).diagnosis
     assert [(e.name, e.at) for e in found.effects] == [("flexible_appendage", "base")]
     got = found.effects[0].parameters
@@ -139,7 +142,7 @@ def test_what_carries_the_base_has_no_encoder(tmp_path):
                 model(tmp_path, f'effects = [{{ name = "sensor_delay", at = "{kind}.{carrier.name}" }}]')
 
 
-@pytest.mark.parametrize("torque", [0.0, 0.2])
+@pytest.mark.parametrize("torque", [pytest.param(0.0, marks=pytest.mark.slow), 0.2])
 def test_a_base_in_a_plane_is_silent_out_of_it(tmp_path, torque):
     """Its velocity and spin out of the plane are zero to the last digit, and so are the channels made of them."""
     train, held = (recorded(tmp_path / f"{k}.csv", k, (0.0, 0.0, torque), planar=True, name="bus") for k in (1, 2))

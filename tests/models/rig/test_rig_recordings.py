@@ -154,6 +154,7 @@ def carriage(tension, lag, length=10.0, damping=0.8):
     return pull
 
 
+@pytest.mark.slow
 def test_what_a_law_of_sway_has_wrong_is_given_no_name(tmp_path):
     for k in range(2):
         recorded(tmp_path / f"run{k}.csv", k, {}, {"sling9": carriage(500.0, 1.0)})

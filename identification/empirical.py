@@ -1,0 +1,231 @@
+"""What has no name, modelled all the same: tables for the nameless curves that a diagnosis is left with.
+
+A table's values v have a Gaussian prior with a squared-exponential kernel over its coordinates (Rasmussen and Williams
+2006, chapter 2). Length and size are those of the greatest evidence; every parameter of the model is free beside the
+values, so that a table holds only what no law of the model can. Then the laws are fitted again beside the table, and
+the held-out recordings confirm it, by the density that they have with it and without.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag, cho_factor, cho_solve, cholesky
+
+from ..models.effects._direction import TRANSITION
+from ..models.empirical import NAME, placed_tables, tables_of
+from ..models.floating.tree import n_carriers
+from ..models.model import Placed
+from ..models.table import MOST, OTHERS, Table, read_words
+from .deciding import GATE
+from .evidence.confirm import blocks, scatter
+from .evidence.diagnose import Decided
+from .fitting.assembly import Assembly
+from .fitting.experiment import Experiment
+from .fitting.fit import Fit, fit
+from .fitting.problem import gather
+from .search.refit import carry
+from .search.rest import fitted
+
+Array = NDArray[np.float64]
+
+LENGTHS = (0.03, 0.06, 0.12, 0.25, 0.5)
+"""Length scales that are tried [share of the coordinate's range]; two knots a length."""
+DEVIATIONS = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
+"""Standard deviations of the values that are tried [RMS torque of the channel]."""
+_NUGGET = 1e-6  # of the kernel's variance: keeps it from being singular
+
+
+@dataclass(frozen=True)
+class EmpiricalLaw:
+    """Tables found at one joint with their values and deviations, and what the held-out recordings gain by them
+    [log density, and its standard errors]."""
+
+    at: str
+    tables: tuple[Table, ...]
+    values: Mapping[str, float]
+    gain: float
+    sure: float
+
+
+@dataclass(frozen=True)
+class _Chosen:
+    table: Table
+    columns: list[Array]  # by recording (n_band, k), of whitened values z: v = root z
+    root: Array
+
+
+def empirical_laws(
+    decided: Decided, final: Fit, train: Sequence[Experiment], held: Sequence[Experiment]
+) -> tuple[Fit, tuple[EmpiricalLaw, ...]]:
+    """The fit with a table for each nameless curve that can be one and that the held-out recordings confirm."""
+    carriers, joints = n_carriers(final.assembly.tree), final.assembly.tree.joints
+    found: list[EmpiricalLaw] = []
+    for c in sorted({r.channel for r in decided.left.curves if r.channel >= carriers}):
+        curves = [r for r in decided.left.curves if r.channel == c]
+        wanted = list(dict.fromkeys(x for x in (read_words(r.over) for r in curves) if x))
+        at = joints[c].name
+        have = [p for p in final.assembly.placed if p.effect.name == NAME and p.at == at]
+        if not wanted or have:
+            continue
+        tables, values = _tables(decided, final, train, c, wanted)
+        other = _refitted(final, placed_tables(at, tables), values, train)
+        gain, sure = _confirmed(decided, final, other, train, held, c)
+        if sure > GATE:
+            final = other
+            found.append(EmpiricalLaw(at, tables, values, gain, sure))
+    return final, tuple(found)
+
+
+def _tables(
+    decided: Decided, final: Fit, train: Sequence[Experiment], c: int, wanted: Sequence[tuple[tuple[str, ...], str]]
+) -> tuple[tuple[Table, ...], dict[str, float]]:
+    """Tables over the coordinates wanted, with their values and deviations by key."""
+    assembly, at = final.assembly, final.assembly.tree.joints[c].name
+    covariances = [row[c].covariance for row in decided.best.found.weighed.evidence.channels]
+    size = float(decided.best.found.weighed.scale[c])
+    residuals, always = [], []
+    for e in train:
+        residual, own = assembly.residual(e, final.theta)
+        residuals.append(residual[:, c])
+        always.append(gather(own, c)[1].reshape(len(residual), -1))
+    free = always[0].shape[1]
+    chosen: list[_Chosen] = []
+    loads = [assembly.evaluate(e, final.theta).load for e in train]
+    for over, times in wanted:
+        signals = [coordinates(assembly, e, load, c, over) for e, load in zip(train, loads, strict=True)]
+        factors = [factor(assembly, e, load, c, times) for e, load in zip(train, loads, strict=True)]
+        best: tuple[float, _Chosen] | None = None
+        for length in LENGTHS:
+            steps = int(np.ceil(2 / length)) + 1
+            if steps ** len(over) > MOST:
+                continue
+            ends = [
+                (min(float(x[k].min()) for x in signals), max(float(x[k].max()) for x in signals))
+                for k in range(len(over))
+            ]
+            table = Table(over, times, tuple(tuple(np.linspace(low, high, steps).tolist()) for low, high in ends))
+            raw = [e.to_band(table.weights(x) * f[:, None], c) for e, x, f in zip(train, signals, factors, strict=True)]
+            root = cholesky(_kernel(table.shape, length), lower=True)
+            own = [
+                np.hstack([b, *(o.columns[i] for o in chosen), r, y[:, None]])
+                for i, (b, r, y) in enumerate(zip(always, raw, residuals, strict=True))
+            ]
+            gram: Array = np.sum([x.T @ k.solve(x) for x, k in zip(own, covariances, strict=False)], axis=0)
+            before = gram.shape[0] - 1 - root.shape[0]
+            for s in DEVIATIONS:
+                turn = np.asarray(block_diag(np.eye(before), size * s * root), float)
+                value = _evidence(turn.T @ gram[:-1, :-1] @ turn, turn.T @ gram[:-1, -1], free)
+                if best is None or value > best[0]:
+                    best = value, _Chosen(table, [x @ (size * s * root) for x in raw], size * s * root)
+        if best is not None and best[1].table.words not in [o.table.words for o in chosen]:
+            chosen.append(best[1])
+    own = [np.hstack([b, *(o.columns[i] for o in chosen)]) for i, b in enumerate(always)]
+    solved = [k.solve(x) for x, k in zip(own, covariances, strict=False)]
+    matrix: Array = np.sum([a.T @ b for a, b in zip(own, solved, strict=True)], axis=0)
+    score: Array = np.sum([b.T @ r for b, r in zip(solved, residuals, strict=True)], axis=0)
+    factorised = cho_factor(_with_prior(matrix, free))
+    amplitudes, spread = cho_solve(factorised, score)[free:], cho_solve(factorised, np.eye(len(score)))[free:, free:]
+    values: dict[str, float] = {}
+    at_column = 0
+    for o in chosen:
+        part = slice(at_column, at_column + len(o.root))
+        at_column = part.stop
+        value = o.root @ amplitudes[part]
+        std = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", o.root, spread[part, part], o.root), 0.0))
+        for name, v, d in zip(o.table.names, value, std, strict=True):
+            values |= {f"{NAME}.{at}.{name}": float(v), f"std.{NAME}.{at}.{name}": float(d)}
+    return tuple(o.table for o in chosen), values
+
+
+def _kernel(shape: Sequence[int], length: float) -> Array:
+    """Squared-exponential covariance of unit variance at evenly spaced knots over [0, 1] along each coordinate."""
+    at = np.array(list(product(*(np.linspace(0, 1, n) for n in shape))))
+    apart = np.sum((at[:, None] - at[None, :]) ** 2, axis=2)
+    return np.exp(-0.5 * apart / length**2) + _NUGGET * np.eye(len(at))
+
+
+def _with_prior(matrix: Array, free: int) -> Array:
+    """Unit prior of what is no parameter of the model; those are held by their own size alone, to be solvable."""
+    loaded = matrix + np.eye(len(matrix))
+    own = np.arange(free)
+    loaded[own, own] += 1e-9 * np.abs(matrix[own, own]) - 1
+    loaded[own, own] += np.where(np.abs(matrix[own, own]) > 0, 0.0, 1.0)
+    return loaded
+
+
+def _evidence(matrix: Array, score: Array, free: int) -> float:
+    """Log evidence but for what all have in common."""
+    low = cholesky(_with_prior(matrix, free), lower=True)
+    return 0.5 * float(score @ cho_solve((low, True), score)) - float(np.sum(np.log(np.diag(low))))
+
+
+def coordinates(assembly: Assembly, e: Experiment, load: Array, c: int, over: Sequence[str]) -> list[Array]:
+    """Coordinates of a table at a joint along a recording, each (n,)."""
+    m, names = e.motion, [j.name for j in assembly.tree.joints]
+    found = []
+    for name in over:
+        other = next((start for start in OTHERS if name.startswith(start)), None)
+        if other is not None:
+            found.append((m.q if other == OTHERS[0] else m.qd)[:, names.index(name.removeprefix(other))])
+        elif name == "distance travelled":
+            steps = np.abs(m.qd[:, c]) * m.period
+            found.append(np.concatenate([np.cumsum(steps[s]) - 0.5 * (steps[s][0] + steps[s]) for s in m.segments]))
+        else:
+            own = {"position": m.q[:, c], "speed": np.abs(m.qd[:, c]), "load": load[:, c], "time": e.elapsed}
+            found.append(own[name])
+    return found
+
+
+def factor(assembly: Assembly, e: Experiment, load: Array, c: int, times: str) -> Array:
+    """What a table's value is multiplied by along a recording (n,)."""
+    at, speed = assembly.tree.joints[c].name, e.motion.qd[:, c]
+    peak = assembly.values(assembly.start)[f"speed_scale.{at}"]
+    if not times:
+        return np.ones(len(speed))
+    if times == "speed":
+        return speed / peak
+    drives = load[:, c] * speed > 0
+    part = {"direction": np.ones(len(speed)), "driving": drives, "braking": ~drives}[times]
+    return np.tanh(speed / (TRANSITION * peak)) * part
+
+
+def _refitted(final: Fit, placed: Placed, values: Mapping[str, float], train: Sequence[Experiment]) -> Fit:
+    """All laws fitted again beside a table that is held."""
+    before = final.assembly
+    known = before.values(final.theta) | {k: v for k, v in values.items() if not k.startswith("std.")}
+    made = Assembly(before.tree, (*before.placed, placed), before.base, before.scales, known)
+    made.phi = before.phi
+    return fit(made, fitted(made, train), start=carry(final, made), multi_start=False)
+
+
+def _confirmed(
+    decided: Decided, before: Fit, after: Fit, train: Sequence[Experiment], held: Sequence[Experiment], c: int
+) -> tuple[float, float]:
+    """Log density that the held-out recordings gain on a channel, and that in its standard errors over blocks."""
+    rows, parts = decided.best.found.weighed.evidence.channels[len(train) :], []
+    for e, row in zip(held, rows, strict=True):
+        without, with_it = (f.assembly.residual(e, f.theta)[0][:, c] for f in (before, after))
+        solve = row[c].covariance.solve
+        parts.append(blocks(0.5 * (without * solve(without) - with_it * solve(with_it)), e))
+    every = np.concatenate(parts)
+    return float(every.sum()), float(every.sum()) / max(scatter(every), 1e-12)
+
+
+def beyond(assembly: Assembly, e: Experiment, theta: Array) -> list[str]:
+    """For each table that a motion leaves the data of: one line that says so, and that it is held there."""
+    said = []
+    for p in assembly.placed:
+        for t in tables_of(p.effect):
+            c = assembly.joint_of(p)
+            load = assembly.evaluate(e, theta).load
+            for name, x, knots in zip(t.over, coordinates(assembly, e, load, c, t.over), t.knots, strict=True):
+                out = float(np.mean((x < knots[0]) | (x > knots[-1])))
+                if out > 0:
+                    said.append(
+                        f"the empirical law at {p.at} has data for {name} from {knots[0]:.4g} to {knots[-1]:.4g}; the "
+                        f"motion goes from {x.min():.4g} to {x.max():.4g}: outside, its end value is held"
+                    )
+    return said
