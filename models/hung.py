@@ -2,12 +2,12 @@
 a cradle that holds its attitude.
 
 With p the hang point, t the line's top, k and l₀ its stiffness and free length, c the centre of mass, θ the rotation
-vector since the start and κ the cradle's stiffness:
+vector since the start, ω the target's angular velocity, κ and d the cradle's stiffness and damping:
 
-    F = −k (|p − t| − l₀) (p − t)/|p − t| + m g,    M = −κ θ,    V = k (|p − t| − l₀)²/2 − m g·c + κ |θ|²/2.
+    F = −k (|p − t| − l₀) (p − t)/|p − t| + m g,    M = −κ θ − d ω,    V = k (|p − t| − l₀)²/2 − m g·c + κ |θ|²/2.
 
-The line is stretched by the weight at the start, so that the target rests there (see `Target`). M is the slope of its
-energy: the rate of |θ|²/2 is θ·ω.
+The line is stretched by the weight at the start, so that the target rests there (see `Target`). −κ θ is the slope
+of its energy: the rate of |θ|²/2 is θ·ω.
 """
 
 import casadi as ca
@@ -21,17 +21,19 @@ from .snare.target import Target
 CRADLE = 600.0
 """About every axis [N·m/rad], chosen: the soft capture's 10 N at the pin turn it by half a degree, a docking's hundreds
 turn it into its seat."""
+CRADLE_DAMPING = 40.0
+"""Of the same [N·m·s/rad], chosen: critical for the paper's 25 kg as a cube of 0.4 m."""
 
 
-def hung(target: Target, foot: ca.SX, turn: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Wrench (6,) of line and weight on the target about its foot, in the world [N, N·m], and their energy [J].
+def hung(target: Target, foot: ca.SX, turn: ca.SX, spin: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Wrench (6,) of line and weight on the target about its foot, in the world [N, N·m], their energy [J], and the power that the cradle takes [W].
 
     Parameters
     ----------
     target : Target
         Of support ``spring``, with an inertia.
-    foot, turn : SX (3,), (3, 3)
-        Where its foot is [m], and its axes.
+    foot, turn, spin : SX (3,), (3, 3), (3,)
+        Where its foot is [m], its axes, and its angular velocity in the world [rad/s].
 
     Raises
     ------
@@ -57,8 +59,9 @@ def hung(target: Target, foot: ca.SX, turn: ca.SX) -> tuple[ca.SX, ca.SX]:
     on = -target.stiffness * (length - free) / length * line
     energy = 0.5 * target.stiffness * (length - free) ** 2 - ca.dot(ca.DM(weight), foot + centre)
     turned = rotation_vector(turn @ ca.DM(start.T))
-    about = ca.cross(arm, on) + ca.cross(centre, ca.DM(weight)) - CRADLE * turned
-    return ca.vertcat(on + ca.DM(weight), about), energy + 0.5 * CRADLE * ca.dot(turned, turned)
+    about = ca.cross(arm, on) + ca.cross(centre, ca.DM(weight)) - CRADLE * turned - CRADLE_DAMPING * spin
+    energy += 0.5 * CRADLE * ca.dot(turned, turned)
+    return ca.vertcat(on + ca.DM(weight), about), energy, CRADLE_DAMPING * ca.dot(spin, spin)
 
 
 def rotation_vector(turn: ca.SX) -> ca.SX:

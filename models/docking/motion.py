@@ -159,7 +159,7 @@ class DockingMotion:
     def _equations(self, time: ca.SX, x: ca.SX, u: ca.SX) -> tuple[ca.SX, dict[str, ca.SX]]:
         arm, n = self.arm, self.n_joints
         part = {name: x[where] for name, where in self.where.items()}
-        suspended = ca.SX(0)
+        suspended, cradled = ca.SX(0), ca.SX(0)
         q, qd = part["q"], part["qd"]
         on_carriage, on_pin = u[:6], u[6:12]
         command = dict(zip(COMMANDS, ca.vertsplit(u[12 : 12 + len(COMMANDS)]), strict=True))
@@ -223,7 +223,7 @@ class DockingMotion:
         on_foot -= ca.vertcat(bumps[:3], bumps[3:] + ca.cross(carriage_place - foot, bumps[:3]))
         cables, on_carriage = on_carriage, on_carriage + bumps
         if self.target.hangs:
-            held, suspended = hung(self.target, foot, turn)
+            held, suspended, cradled = hung(self.target, foot, turn, spin)
             on_foot += held
 
         drawn = carriage(
@@ -262,7 +262,7 @@ class DockingMotion:
             ]
         work = ca.dot(cables, carriage_twist) + ca.dot(on_pin, ca.vertcat(speed, spin))
         energies = [
-            drawn.put_in, drawn.lost, drawn.held, found.damped + found.rubbed + bump_damped, found.latched,
+            drawn.put_in, drawn.lost, drawn.held, found.damped + found.rubbed + bump_damped + cradled, found.latched,
             -ca.dot(taken.torque, qd), work,
         ]  # fmt: skip
         rates += [
