@@ -25,8 +25,8 @@ from .inspection import SOURCES as ARRIVAL_SOURCES
 
 END = 10.0
 """Of the soft capture, by the paper [s]."""
-SCALE = 2.0
-"""Of the orbit studies' macro steps: half the processor time, and of their own captures the margin moves by 1e-4."""
+SCALE = 1.5
+"""Of the orbit studies' macro steps, which are for their energies: two thirds of the processor time."""
 WAY_OUT = ("OPEN", "UNLOAD")
 """States with which the program gives up."""
 SEAT = Axis("docking_friction", "1", "Coulomb's, between ball and groove", 0.15, 0.0, 0.4)

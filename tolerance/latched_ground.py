@@ -12,8 +12,9 @@ from .capture import Capture, Outcome, source_version
 from .ground import AXES as HUNG
 from .latched import SEAT, SOURCES, outcome, turned
 
-SCALE = 0.25
-"""Of the orbit studies' macro steps: cables that hug the pin of a target of 25 kg are stable up to some 2 ms."""
+SCALE, SIZES = 0.25, {"CLOSE": 2.5e-3} | dict.fromkeys(("SETTLE", "SNUG", "SLIDE"), 5e-3)
+"""Of the macro steps, and those [s] that differ from the orbits': the cables that hug its pin are coupled to a target of
+25 kg in steps, and from 2 ms on that rings."""
 AXES = (*(a for a in HUNG if a.name != "wait"), SEAT)
 
 
@@ -22,7 +23,7 @@ def run(values: Mapping[str, float]) -> Outcome:
     position = (PAPER_POSITION[0] + values["axial"], values["radial_y"], values["radial_z"])
     w, x, y, z = np.roll(turned(values).as_quat(canonical=True), 1)
     start = ground(position, (w, x, y, z), values["speed"], values["target_mass"])
-    return outcome(start, SnareParameters(), values, table=read_table(PROGRAM), scale=SCALE)
+    return outcome(start, SnareParameters(), values, table=read_table(PROGRAM), scale=SCALE, sizes=SIZES)
 
 
 _OWN = ("tolerance/latched_ground.py", "tolerance/ground.py", "cosim/ground_capture.py", "cosim/programs/ground.toml")
