@@ -35,8 +35,8 @@ _FRAME = [
     for axis in axes
 ]
 SIZES = dict.fromkeys(("PULL", "SEAT", "BACK_OFF", "UNLOAD"), 2.5e-3) | dict.fromkeys(("SETTLE", "SNUG", "SLIDE"), 1e-2)
-"""Macro steps by the program's state [s]: short where bodies meet or part, long where slack cables slide; `USUAL` in all
-others."""
+"""Macro steps by the program's state [s]: short where bodies meet or part, long where slack cables slide; `USUAL`
+in all others."""
 USUAL = 5e-3
 AFTER = 1.0
 """How long a run goes on in its last state [s]."""
@@ -127,8 +127,9 @@ def co_simulate_whole(
 
     It ends, too, where the program comes to a state of ``until``.
 
-    Macro steps are `SIZES`, or ``sizes`` where that has the state, times ``scale``; ``own_step`` [s] is that inside the snare while cables touch. ``frames`` is
-    filled as by `co_simulate`; ``disturb`` is called each period of the program with the time and the master.
+    Macro steps are `SIZES`, or ``sizes`` where that has the state, times ``scale``; ``own_step`` [s] is that inside the
+    snare while cables touch. ``frames`` is filled as by `co_simulate`; ``disturb`` is called each period of the program
+    with the time and the master.
     """
     coupled = whole_system(start, passive or Passive(), snare or SNARE, docking or DockingParameters(), table, own_step)
     program: Any = coupled.participants["program"]

@@ -17,7 +17,6 @@ from ..errors import InputError
 from .rotation import quaternion_of, rotation_of
 from .snare.target import Target
 
-
 CRADLE = 600.0
 """About every axis [N·m/rad], chosen: the soft capture's 10 N at the pin turn it by half a degree, a docking's hundreds
 turn it into its seat."""
@@ -26,7 +25,8 @@ CRADLE_DAMPING = 40.0
 
 
 def hung(target: Target, foot: ca.SX, turn: ca.SX, spin: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """Wrench (6,) of line and weight on the target about its foot, in the world [N, N·m], their energy [J], and the power that the cradle takes [W].
+    """Wrench (6,) of line, weight and cradle on the target about its foot, in the world [N, N·m], their energy [J], and
+    the power that the cradle takes [W].
 
     Parameters
     ----------

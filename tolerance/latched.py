@@ -35,7 +35,9 @@ AXES = (*(a for a in ARRIVAL if a.name not in ("joint_stiffness", "wait")), SEAT
 
 def in_orbit(values: Mapping[str, float], case: CaseName) -> Outcome:
     """One case in orbit, to its end; raises InputError for a pin that starts inside a cable."""
-    start = arrival(case, [AHEAD + values["axial"], values["radial_y"], values["radial_z"]], turned(values), values["speed"])
+    start = arrival(
+        case, [AHEAD + values["axial"], values["radial_y"], values["radial_z"]], turned(values), values["speed"]
+    )
     return outcome(start, SNARE, values, passive=resistance(values["joint_friction"]))
 
 

@@ -13,8 +13,8 @@ from .ground import AXES as HUNG
 from .latched import SEAT, SOURCES, outcome, turned
 
 SCALE, SIZES = 0.25, {"CLOSE": 2.5e-3} | dict.fromkeys(("SETTLE", "SNUG", "SLIDE"), 5e-3)
-"""Of the macro steps, and those [s] that differ from the orbits': the cables that hug its pin are coupled to a target of
-25 kg in steps, and from 2 ms on that rings."""
+"""Of the macro steps, and those [s] that differ from the orbits': the cables that hug its pin are coupled in steps to a
+target of 25 kg, and from 2 ms on that rings."""
 AXES = (*(a for a in HUNG if a.name != "wait"), SEAT)
 
 

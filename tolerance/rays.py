@@ -12,8 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from .study import Study, Ways
+from .study import Study
 from .summary import Interval, nominal_point
+from .ways import Ways
 
 RADIAL = ("radial_y", "radial_z")
 ANGLES = ("roll", "pitch", "yaw")
@@ -42,7 +43,7 @@ class Ray:
 
 
 def rays(study: Study) -> list[Ray]:
-    """Both ways along each varied axis that the study asks for, and along the diagonals of the two offsets where both vary.
+    """Both ways along each axis that the study asks for, and along the diagonals of the two offsets where both do.
 
     Ways without length, of an axis whose nominal value is a limit of its range, are left out.
     """

@@ -230,7 +230,8 @@ class EndEffectorParticipant(Participant):
                 *(o[body] for body in _BODIES), q[:-1], qd[:-1], o["momentum"], o["target_momentum"],
                 [q[-1], qd[-1], o["motor_force"][0], -off[:, 0].min(), seated.sum(), closed,
                  self._enclosed(o), touching],
-                o["normal"], o["off"], o["docking"], o["wrist"], *(o[name] for name in _STATIC), state[m.where["energies"]],
+                o["normal"], o["off"], o["docking"], o["wrist"], *(o[name] for name in _STATIC),
+                state[m.where["energies"]],
             ]
         )  # fmt: skip
 

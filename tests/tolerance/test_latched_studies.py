@@ -146,7 +146,9 @@ def test_a_hung_target_rests_where_it_starts_and_is_drawn_back_by_its_spring():
     on, _, _ = wrench(target, (0.2, 0.01, 0.0), (0, 0, 0))
     assert on[1] == pytest.approx(-25 * 9.81 * 0.01 / 2.0, rel=1e-3)  # a pendulum of 2 m
     # Turned about its middle: the cradle alone, and its damping.
-    on, turned, power = wrench(target, (0.2 + 0.2 * (1 - np.cos(0.03)), 0.0, 0.2 * np.sin(0.03)), (0, 0.03, 0), (0, 0.5, 0))
+    on, turned, power = wrench(
+        target, (0.2 + 0.2 * (1 - np.cos(0.03)), 0.0, 0.2 * np.sin(0.03)), (0, 0.03, 0), (0, 0.5, 0)
+    )
     np.testing.assert_allclose(on, [0, 0, 0, 0, -CRADLE * 0.03 - CRADLE_DAMPING * 0.5, 0], atol=1e-6)
     assert turned - energy == pytest.approx(0.5 * CRADLE * 0.03**2, rel=1e-6)
     assert power == pytest.approx(CRADLE_DAMPING * 0.25)
