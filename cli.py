@@ -6,14 +6,12 @@ Exit status 0: it ran, whatever the verdict. 2: unusable input, one line on stan
 
 import argparse
 import errno
-import json
 import os
 import shlex
 import sys
 import warnings
 from collections.abc import Sequence
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from . import __version__
@@ -21,10 +19,10 @@ from .arguments import positive
 from .cosim.command import add_parser as add_cosim
 from .errors import InputError, nearest, one_line
 from .exit_status import status_of
-from .files import written_whole
 from .fmu.command import add_parser as add_export
 from .identification.formulate_command import add_parser as add_formulate
 from .progress import Progress, start_logging
+from .report.outputs import demand_writable, write_json
 from .tolerance.command import add_parser as add_tolerance
 
 if TYPE_CHECKING:
@@ -160,11 +158,11 @@ def _check(given: argparse.Namespace) -> None:
     from .checks.run import check_file
     from .identification.results import CheckResult
 
-    _writable(given.json, [], given.recordings)
+    demand_writable(given.json, [], given.recordings)
     with Progress() as progress:
         result = CheckResult(*check_file(given.model, given.recordings, progress=progress))
     if given.json:
-        _write_json(result.to_json(), given.json)
+        write_json(result.to_json(), given.json)
     if given.json != "-" and not given.quiet:
         print(result)
 
@@ -176,7 +174,7 @@ def _identify(given: argparse.Namespace) -> None:
     from .models.model_write import save_model
 
     held = given.holdout or []
-    _writable(given.json, [given.save_model], [*given.recordings, *held])
+    demand_writable(given.json, [given.save_model], [*given.recordings, *held])
     model = load_model(given.model)
     with Progress() as progress:
         found = identify(model, given.recordings, held, progress=progress, jobs=given.jobs)
@@ -184,7 +182,7 @@ def _identify(given: argparse.Namespace) -> None:
     if given.save_model:
         save_model(found.model, given.save_model, f"{model.name}: values from snarelab identify {__version__}")
     if given.json:
-        _write_json(result, given.json)
+        write_json(result, given.json)
     if given.json != "-" and not given.quiet:
         print(parameter_table(result))
 
@@ -198,7 +196,7 @@ def _diagnose(given: argparse.Namespace) -> None:
     from .recordings import demand_suffix, write_recording
 
     outputs = [given.report, given.save_model, given.next_experiment]
-    _writable(given.json, outputs, [*given.recordings, *given.holdout])
+    demand_writable(given.json, outputs, [*given.recordings, *given.holdout])
     model, planned = load_model(given.model), None
     if given.next_experiment:
         demand_suffix(given.next_experiment)
@@ -223,7 +221,7 @@ def _diagnose(given: argparse.Namespace) -> None:
     if given.save_model:
         save_model(answer.model, given.save_model, f"{found.sentence}\nsnarelab diagnose {__version__}")
     if given.json:
-        _write_json(found.to_json(), given.json)
+        write_json(found.to_json(), given.json)
     if given.json != "-" and not given.quiet:
         print(printed(found))
         if given.next_experiment:
@@ -246,41 +244,9 @@ def _simulate(given: argparse.Namespace) -> None:
     from .models.model_file import load_model
     from .recordings import demand_suffix, write_recording
 
-    _writable(None, [given.out], [given.motion])
+    demand_writable(None, [given.out], [given.motion])
     demand_suffix(given.out)
     write_recording(simulate(load_model(given.model), given.motion), given.out)
-
-
-def _writable(numbers: str | None, outputs: Sequence[str | None], recordings: Sequence[str | None]) -> None:
-    """Refuse a place that cannot be written, or holds what is read, before any long work starts.
-
-    ``numbers`` is where the JSON goes; only that may be ``-``, standard output.
-    """
-    from .recordings.part import part_of
-
-    taken = {part_of(r).file.resolve(): "a recording that is read" for r in recordings if r}
-    for path in (numbers if numbers != "-" else None, *outputs):
-        if not path:
-            continue
-        if path == "-":
-            raise InputError("-: only --json goes to standard output; name a file")
-        place = Path(path).resolve()
-        if not (place.parent.is_dir() and os.access(place.parent, os.W_OK)):
-            raise InputError(f"{path}: its folder does not exist or cannot be written; make it first")
-        if place.exists() and not place.is_file():
-            raise InputError(f"{path}: is there and no plain file; name a file")
-        if place in taken:
-            raise InputError(f"{path}: is also {taken[place]}; write somewhere else")
-        taken[place] = "another output"
-
-
-def _write_json(result: dict[str, Any], path: str) -> None:
-    text = json.dumps(result, indent=1, allow_nan=False) + "\n"
-    if path == "-":
-        sys.stdout.write(text)
-        return
-    with written_whole(Path(path)) as part:
-        part.write_text(text, encoding="utf-8")
 
 
 def _notice(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:

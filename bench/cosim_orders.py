@@ -1,6 +1,6 @@
 """Orders of the holds on a two-mass oscillator made of FMUs, and step control's error over its tolerance.
 
-``python bench/cosim_orders.py docs [RESULT.json]`` draws ``cosimulation-fmu-orders.svg`` there. The oscillator is that
+``python bench/cosim_orders.py [docs] [RESULT.json]`` draws ``cosimulation-fmu-orders.svg`` there. The oscillator is that
 of `bench/two_masses.py`, its halves in C (`bench/oscillator_fmu.c`), both masses moving at the start: one that is let
 go at rest has no slopes there, and would hide what the start costs. Ten seconds. FMI 2.0 takes first derivatives of
 inputs; FMI 3.0 has no such call, and under the quadratic hold is given another value for the second half of a step.
@@ -82,7 +82,7 @@ def main() -> None:
             shown = "  ".join(f"{e:8.1e}" for e in errors), "  ".join(f"{o:4.2f}" for o in orders[title][hold])
             print(f"{title:22} {hold:10} errors [m] {shown[0]}   orders {shown[1]}")
     picture = error_figure([(title, *along(title), curves) for title, curves in found.items()], "slope")
-    (Path(sys.argv[1]) / "cosimulation-fmu-orders.svg").write_bytes(picture)
+    (Path(sys.argv[1] if len(sys.argv) > 1 else "docs") / "cosimulation-fmu-orders.svg").write_bytes(picture)
     result = {"bench": "cosim_orders", "steps": STEPS, "tolerances": TOLERANCES, "errors": found, "orders": orders}
     write_result(Path(sys.argv[2] if len(sys.argv) > 2 else "build/bench/cosim_orders.json"), result)
 

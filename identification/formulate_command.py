@@ -17,12 +17,12 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 
 
 def _formulate(given: argparse.Namespace) -> None:
-    from ..cli import _writable, _write_json
     from ..models.model_file import load_model
+    from ..report.outputs import demand_writable, write_json
     from .formulate import formulate
     from .formulate_file import write_effect
 
-    _writable(given.json, [given.out], [given.model])
+    demand_writable(given.json, [given.out], [given.model])
     found = formulate(load_model(given.model), given.at)
     if given.out:
         if len(found) > 1:
@@ -30,6 +30,6 @@ def _formulate(given: argparse.Namespace) -> None:
             raise InputError(f"{given.model}: {len(found)} tables ({told}); a file holds one: choose with --at")
         write_effect(found[0], Path(given.out))
     if given.json:
-        _write_json({"formulas": [f.to_json() for f in found]}, given.json)
+        write_json({"formulas": [f.to_json() for f in found]}, given.json)
     if given.json != "-" and not given.quiet:
         print("\n".join(map(str, found)))

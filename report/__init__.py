@@ -1,1 +1,1 @@
-"""What reports are drawn with: offline HTML, line drawings, and 3-D playback."""
+"""What reports are drawn with: offline HTML, line drawings, 3-D playback; and where a command's outputs go."""

@@ -12,13 +12,13 @@ from typing import Any, cast
 import numpy as np
 
 from ...errors import InputError
+from ..exudyn_build import exudyn, items
 from ..floating.arm import FloatingArm
 from ..inertia import Array, to_central
 from ..snare.assembly import Assembly
 from ..snare.contact import CONTACT_SIZE, MOST_CONTACTS
 from ..snare.drive import Pose, ring_ends, ring_motion
 from ..snare.ends import REACTION
-from ..snare.engine import exudyn, items
 from ..snare.forces import MOST_CROSSINGS, system_forces, system_jacobian
 from ..snare.line import LINE_SIZE
 from ..snare.parameters import SnareParameters

@@ -13,10 +13,10 @@ from typing import Any, cast
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from ..exudyn_build import exudyn, items
 from .contact import CONTACT_SIZE, MOST_CONTACTS
 from .drive import PATH_SIZE, Pose, frame_at, ring_ends, ring_motion
 from .ends import RING_SPIN
-from .engine import exudyn, items
 from .forces import MOST_CROSSINGS, system_forces, system_jacobian
 from .geometry import N_CABLES
 from .law import law_constants

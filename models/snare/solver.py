@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from .engine import exudyn
+from ..exudyn_build import exudyn
 
 _CURRENT = exudyn.ConfigurationType.Current
 _INITIAL = exudyn.ConfigurationType.Initial

@@ -13,14 +13,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ...extras import needed_for
+from ...models.exudyn_build import exudyn as exu
+from ...models.exudyn_build import items
 from .arm import GRAVITY, Arm, Boom, Link, shift
 from .slide import Slide
 from .suspension import Slings, Suspension
-
-with needed_for("the rig's plant"):
-    import exudyn as exu
-    from exudyn.itemInterface import NodeGenericODE2, ObjectKinematicTree, SensorKinematicTree
 
 Array = NDArray[np.float64]
 Motion = Callable[[Array], tuple[Array, Array]]
@@ -216,7 +213,7 @@ class _Run:
         self._mbs = self._container.AddSystem()
         zeros = [0.0] * n
         node = self._mbs.AddNode(
-            NodeGenericODE2(
+            items.NodeGenericODE2(
                 referenceCoordinates=zeros,
                 initialCoordinates=zeros,
                 initialCoordinates_t=zeros,
@@ -230,7 +227,7 @@ class _Run:
             spring[k], damper[k] = stiffness, damping * stiffness
         nothing = exu.Vector3DList([[0.0, 0.0, 0.0]] * n)
         self._object = self._mbs.AddObject(
-            ObjectKinematicTree(
+            items.ObjectKinematicTree(
                 nodeNumber=node,
                 gravity=[0.0, 0.0, -plant.gravity],
                 jointTypes=tree.kinds,
@@ -252,7 +249,7 @@ class _Run:
         self._sensors = [
             [
                 self._mbs.AddSensor(
-                    SensorKinematicTree(
+                    items.SensorKinematicTree(
                         objectNumber=self._object,
                         linkNumber=b,
                         localPosition=[0.0, 0.0, 0.0],

@@ -141,7 +141,7 @@ def test_public_names_are_typed_documented_and_listed():
         snarelab.diagnosis  # noqa: B018  the look-up alone must raise
 
 
-COMMANDS = ("check", "identify", "diagnose", "simulate", "export", "cosim", "tolerance", "completion")
+COMMANDS = ("check", "identify", "diagnose", "simulate", "formulate", "export", "cosim", "tolerance", "completion")
 
 
 def test_commands_whose_help_is_tried_are_all():

@@ -1,5 +1,6 @@
 """Imports go one way: none to a part above, no circle of parts but two, and no module leads back to itself."""
 
+import re
 import runpy
 
 import pytest
@@ -31,3 +32,11 @@ def test_no_circle_but_the_two_that_are_known(imports):
     assert imports["circles"](imports["arrows"]()) == known
     assert imports["circles"]({(a, b) for a, those in imports["modules"]().items() for b in those}) == set()
     assert imports["circles"]({("a", "b"), ("b", "c"), ("c", "a"), ("a", "d")}) == {frozenset("abc")}
+
+
+def test_exudyn_is_imported_in_one_place():
+    """Its two builds differ in the last bits, and a process keeps the one that it imports first."""
+    parts = ("bench", "cosim", "fmu", "identification", "models", "proof", "studies", "tolerance")
+    files = [path for part in parts for path in (DOCS.parent / part).rglob("*.py")]
+    named = [p.name for p in files if re.search(r"^\s*(import|from) exudyn\b", p.read_text(), re.MULTILINE)]
+    assert named == ["exudyn_build.py"]

@@ -36,8 +36,9 @@ def opened(
     scheme: Literal["light", "dark"] = "light",
     size: tuple[int, int] = (1200, 900),
     scripts: bool = True,
+    first: str = "",
 ) -> Iterator[Page]:
-    """A file in a window of its own. At the end nothing may have been said or asked for."""
+    """A file in a window of its own, `first` run before its scripts. At the end nothing may have been said or asked."""
     context = browser.new_context(
         color_scheme=scheme, viewport={"width": size[0], "height": size[1]}, java_script_enabled=scripts, offline=True
     )
@@ -45,6 +46,7 @@ def opened(
     page.on("console", lambda message: said.append(message.text))
     page.on("pageerror", lambda error: said.append(str(error)))
     page.on("request", lambda request: asked.append(request.url))
+    page.add_init_script(first)
     page.goto(path.resolve().as_uri())
     yield page
     context.close()

@@ -10,7 +10,7 @@ import pytest
 from browser import opened, playing
 from matplotlib.figure import Figure
 from matplotlib.image import imread
-from playwright.sync_api import Browser, Locator, Page, expect
+from playwright.sync_api import Browser, Frame, Locator, Page, expect
 from study_pages import QUANTITIES, TIMES, moving
 
 from snarelab.report.drawing import AFTER, drawing, line, svg
@@ -19,6 +19,11 @@ from snarelab.studies.page import Clock, Picture, Section, write_page
 
 MARK = 3.0
 """Where the green mark stands [s]."""
+
+PACKED = """window.IntersectionObserver = class extends IntersectionObserver {
+    observe(element) { window.unpack = () => super.observe(element); }
+}"""
+"""A page in whose view the playback never comes before `unpack()`: once it shows its time, so do the plots."""
 
 
 def marked(
@@ -64,6 +69,11 @@ class Marked:
         for plot, marks in enumerate(self.marks):
             assert self.lines(plot) == (pytest.approx(marks, abs=1.6) if plot in plots else [])
 
+    def playing(self) -> Frame:
+        """The playback, unpacked now."""
+        self.page.evaluate("unpack()")
+        return playing(self.page)
+
     def point(self, plot: int, panel: int) -> None:
         """Move the pointer onto a mark."""
         self.plots[plot].scroll_into_view_if_needed()
@@ -85,7 +95,7 @@ def marked_page(browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     pictures = [marked(0, 4, 9), marked(2, 10, 6, layout="constrained"), marked(0, 4, 9, "another.csv")]
     sections, clock = [Section("One", (), pictures)], getattr(request, "param", Clock())
     path = write_page("demo", "Test", "It moves.", QUANTITIES, sections, moving().html(1.0), clock=clock)
-    with opened(browser, path, size=(1000, 500)) as page:
+    with opened(browser, path, size=(1000, 500), first=PACKED) as page:
         yield Marked(page)
 
 
@@ -122,7 +132,7 @@ CLOCKS = pytest.mark.parametrize("marked_page", [Clock(), Clock(start=1.0, rate=
 @CLOCKS
 def test_the_playback_moves_the_lines(marked_page: Marked, request: pytest.FixtureRequest) -> None:
     clock = request.node.callspec.params["marked_page"]
-    playback = playing(marked_page.page)
+    playback = marked_page.playing()
     said = marked_page.plots[0].locator(".cursor:visible span:visible")
     expect(said).to_have_text(f"{clock.start + clock.rate:.3f} s")
     playback.locator("#bar input").fill(f"{(MARK - clock.start) / clock.rate}")
@@ -136,7 +146,7 @@ def test_the_playback_moves_the_lines(marked_page: Marked, request: pytest.Fixtu
 @CLOCKS
 def test_a_click_in_a_plot_moves_the_playback(marked_page: Marked, request: pytest.FixtureRequest) -> None:
     clock = request.node.callspec.params["marked_page"]
-    playback = playing(marked_page.page)
+    playback = marked_page.playing()
     marked_page.click(1, panel=1)
     marked_page.at_marks(0, 1)
     playback.wait_for_function(PLAYED, arg=(MARK - clock.start) / clock.rate)
@@ -151,7 +161,7 @@ def test_a_click_in_a_plot_moves_the_playback(marked_page: Marked, request: pyte
 def test_a_time_chosen_before_the_playback_is_unpacked_is_kept(marked_page: Marked) -> None:
     marked_page.click(0, panel=1)
     assert not marked_page.page.locator("#playback-frame").get_attribute("srcdoc")
-    playing(marked_page.page).wait_for_function(PLAYED, arg=MARK)
+    marked_page.playing().wait_for_function(PLAYED, arg=MARK)
     marked_page.at_marks(0, 1)
 
 

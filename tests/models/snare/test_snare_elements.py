@@ -10,9 +10,9 @@ import pytest
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
+from snarelab.models.exudyn_build import exudyn, items
 from snarelab.models.snare.assembly import add_cable
 from snarelab.models.snare.drive import Pose
-from snarelab.models.snare.engine import exudyn, items
 from snarelab.models.snare.model import Accuracy, SnareModel
 from snarelab.models.snare.parameters import SnareParameters
 from snarelab.models.snare.target import Target
