@@ -8,13 +8,13 @@ A case ends where the program gives up: the way out from each state has its own 
 
 from collections.abc import Mapping
 from functools import partial
-from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..cosim.docked import docked_of, margin
-from ..cosim.orbit_capture import SNARE, CaseName, Setting, arrival, column, resistance
+from ..cosim.orbit_capture import SNARE, CaseName, Passive, Setting, arrival, column, resistance
+from ..cosim.state_table import StateTable
 from ..cosim.whole_capture import WholeRun, co_simulate_whole
 from ..models.docking.parameters import DockingParameters
 from ..models.snare.parameters import SnareParameters
@@ -46,11 +46,20 @@ def turned(values: Mapping[str, float]) -> Rotation:
     return Rotation.from_euler("xyz", [values["roll"], values["pitch"], values["yaw"]])
 
 
-def outcome(start: Setting, snare: SnareParameters, values: Mapping[str, float], **others: Any) -> Outcome:
-    """One case from where everything stands; ``others`` go to `co_simulate_whole`."""
+def outcome(
+    start: Setting,
+    snare: SnareParameters,
+    values: Mapping[str, float],
+    *,
+    passive: Passive | None = None,
+    table: StateTable | None = None,
+    scale: float = SCALE,
+    sizes: Mapping[str, float] | None = None,
+) -> Outcome:
+    """One case from where everything stands; the rest as of `co_simulate_whole`."""
     docking = DockingParameters(friction=values["docking_friction"])
     rubbing = snare.with_values(friction=values["friction"])
-    whole = co_simulate_whole(start, snare=rubbing, docking=docking, until=WAY_OUT, **{"scale": SCALE} | others)
+    whole = co_simulate_whole(start, passive, rubbing, docking, table, scale=scale, sizes=sizes, until=WAY_OUT)
     if whole.fault and whole.final == "CLOSE":
         return Outcome.failed(whole.fault)
     d = docked_of(whole)
