@@ -1,10 +1,10 @@
 """Orders of the holds on a two-mass oscillator made of FMUs, and step control's error over its tolerance.
 
-``python bench/cosim_orders.py [docs] [RESULT.json]`` draws ``cosimulation-fmu-orders.svg`` there. The oscillator is that
-of `bench/two_masses.py`, its halves in C (`bench/oscillator_fmu.c`), both masses moving at the start: one that is let
-go at rest has no slopes there, and would hide what the start costs. Ten seconds. FMI 2.0 takes first derivatives of
-inputs; FMI 3.0 has no such call, and under the quadratic hold is given another value for the second half of a step.
-Step control has no constant hold, whose steps would be as small as its tolerance.
+``python bench/cosim_orders.py [docs] [RESULT.json]`` draws ``cosimulation-fmu-orders.svg`` there. The oscillator is
+that of `bench/two_masses.py`, its halves in C (`bench/oscillator_fmu.c`), both masses moving at the start: one that
+is let go at rest has no slopes there, and would hide what the start costs. Ten seconds. FMI 2.0 takes first
+derivatives of inputs; FMI 3.0 has no such call, and under the quadratic hold is given another value for the second half
+of a step. Step control has no constant hold, whose steps would be as small as its tolerance.
 """
 
 import os
