@@ -1,5 +1,7 @@
 """Tolerances of the latch: where a case ends, fewer and coarser ways, and how failures are told."""
 
+import re
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -11,6 +13,7 @@ from snarelab.tolerance.box import why_the_box_fails
 from snarelab.tolerance.capture import Outcome, find_capture
 from snarelab.tolerance.latched import ended_in
 from snarelab.tolerance.rays import STAGE, ends, envelope, most_cases, next_cases, rays
+from snarelab.tolerance.report import summarise
 from snarelab.tolerance.results import Results
 from snarelab.tolerance.study import load_study
 
@@ -100,6 +103,34 @@ def test_failures_are_told_by_the_state_in_which_the_program_gave_up(tmp_path):
     rows += [base | {"state": "LATCHED", "margin": 0.5}]
     words = why_the_box_fails(s, pd.DataFrame(rows))
     assert words.startswith("Of 4 cases of the box 3 do not succeed: 2 given up in SEAT, 1 latched outside its bars.")
+
+
+def test_the_page_says_what_the_proxy_is_worth_and_how_sure_the_boundary_is(tmp_path):
+    s = study(tmp_path)
+    results, _ = walked(tmp_path, s)
+
+    def run(y, radial):
+        fine = abs(y) < 0.033
+        return Outcome(True, radial, 7.0, 5.0, 1.0, latched=0.5 if fine else -1.0, state="LATCHED" if fine else "SEAT")
+
+    for number, (y, radial) in enumerate([(0.01, 0.004), (0.02, 0.02), (0.06, 0.004), (-0.07, 0.02)]):
+        results.add("space", number, s.values(np.array([y, 0.0, 0.0, 0.1])), run(y, radial))
+    content = summarise(s, results)
+    page = (results.folder / "report.html").read_text(encoding="utf-8")
+    p = content["proxy"]
+    walks = len(results) - 4
+    # Of the walks all are on the axis; those beyond 33 mm ended with a margin below zero, in LATCHED by their state.
+    beyond = sum(m <= 0 for m in results.table(STAGE)["margin"])
+    assert (p["cases"], p["latched"]) == (walks + 4, walks - beyond + 2)
+    assert (p["latched_against"], p["failed_against"]) == (1, beyond + 1)
+    assert p["disagree"] == beyond + 2
+    assert p["ends"] == {"LATCHED": beyond, "SEAT": 2}
+    assert "What the proxy is worth" in page
+    for name, row in (("within 10 mm", (walks - beyond + 1, beyond + 1)), ("beyond 10 mm", (1, 1))):
+        cells = re.search(rf">{name}<.*?</tr>", page, re.S)
+        assert cells
+        assert re.findall(r">(\d+)</t", cells[0]) == [str(x) for x in row]
+    assert (" % of the ranges undecided." in content["sentence"]) == (content["width"] > s.width)
 
 
 class Gone:

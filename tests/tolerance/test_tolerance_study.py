@@ -157,7 +157,8 @@ def test_success_may_be_the_latch_and_the_proxy_stands_beside_it():
     table = pd.DataFrame([{**vars(case), "margin": m} for case, m in zip(cases, margins, strict=True)])
     found = proxy_beside(study, table)
     assert found == {
-        "cases": 4, "disagree": 2, "latched_against": 1, "failed_against": 1, "ends": {"ABORTED": 1, "STUCK": 1},
+        "cases": 4, "latched": 2, "disagree": 2, "latched_against": 1, "failed_against": 1,
+        "ends": {"ABORTED": 1, "STUCK": 1},
     }  # fmt: skip
     assert study.identity()["success"]["latched"] is True
     assert "docking_friction" in study.ranges
