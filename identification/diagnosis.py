@@ -190,10 +190,12 @@ class EmpiricalTable:
     times : str
         What its value is multiplied by; empty: nothing.
     knots : tuple of array
-        Along each coordinate [SI].
+        Along each coordinate, in its unit.
     value, std : array
         Of the knots' shape [unit]; the band is two deviations either side.
     unit : str
+    over_units : tuple of str
+        Of each coordinate.
     """
 
     at: str
@@ -203,11 +205,19 @@ class EmpiricalTable:
     value: Array
     std: Array
     unit: str
+    over_units: tuple[str, ...]
 
     def to_json(self) -> dict[str, Any]:
         """The published form."""
         numbers = {"knots": [k.tolist() for k in self.knots], "value": self.value.tolist(), "std": self.std.tolist()}
-        return {"at": self.at, "coordinates": list(self.over), "times": self.times, **numbers, "unit": self.unit}
+        return {
+            "at": self.at,
+            "coordinates": list(self.over),
+            "times": self.times,
+            **numbers,
+            "unit": self.unit,
+            "coordinate_units": list(self.over_units),
+        }
 
 
 @dataclass(frozen=True)

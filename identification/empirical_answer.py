@@ -8,6 +8,8 @@ import numpy as np
 from ..models.effect import written_unit
 from ..models.empirical import NAME, table_values
 from ..models.model import Model
+from ..models.table import UNITS
+from ..models.tree import Joint
 from .answer import channel_fits, moved, traces
 from .diagnosis import Diagnosis, EmpiricalTable, Estimate, Finding, Step
 from .empirical import EmpiricalLaw
@@ -51,6 +53,7 @@ def with_laws(
                 table_values(t, law.at, law.values),
                 table_values(t, law.at, law.values, "std."),
                 unit,
+                tuple(_unit(x, law.at, final.assembly.tree.joints) for x in t.over),
             )
             for t in law.tables
         ]
@@ -76,6 +79,13 @@ def with_laws(
         steps=tuple(steps),
         empirical=tuple(tables),
     )
+
+
+def _unit(coordinate: str, at: str, joints: Sequence[Joint]) -> str:
+    """Unit of a table's coordinate, of whichever joint it belongs to."""
+    what, _, other = coordinate.partition(" of ")
+    joint = next(j for j in joints if j.name == (other or at))
+    return written_unit(UNITS[what], joint.kind)
 
 
 def _beside(finding: Finding, final: Fit) -> Finding:

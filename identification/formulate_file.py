@@ -7,12 +7,11 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..files import written_whole
-from ..models.table import TIMES, Table
+from ..models.table import TIMES, UNITS, Table
 from .formulate import Formulated, Term
 
 Array = NDArray[np.float64]
 
-_UNITS = {"position": "S", "speed": "S/s", "load": "T", "time": "s"}
 _SIGNALS = {"position": 's["q"]', "speed": 'ca.fabs(s["qd"])', "load": 's["load"]', "time": 's["time"]'}
 _FACTORS = {"": "", "direction": " * direction(s)", "speed": ' * s["qd"] / s["speed_scale"]'}
 
@@ -23,9 +22,9 @@ def write_effect(found: Formulated, path: Path) -> None:
     if not name.isidentifier() or path.suffix != ".py":
         raise InputError(f"{path}: the file's name is the effect's; name it like my_effect.py")
     for c in table.over:
-        if c not in _UNITS:
+        if c not in _SIGNALS:
             raise InputError(f"{path}: the formula reads the {c}, and an effect's file reads its own joint's "
-                             f"{', '.join(_UNITS)}; keep the table")  # fmt: skip
+                             f"{', '.join(_SIGNALS)}; keep the table")  # fmt: skip
     if table.times not in _FACTORS:
         raise InputError(f"{path}: a factor{TIMES[table.times]} is not written; keep the table")
     lines, parameters = [], []
@@ -51,12 +50,12 @@ def write_effect(found: Formulated, path: Path) -> None:
 def _written(t: Term, table: Table, values: Array, k: int) -> tuple[str, list[str]]:
     """A term as code, and its parameters as code."""
     i = max(t.of, 0)
-    u, unit = _SIGNALS[table.over[i]], _UNITS[table.over[i]]
+    u, unit = _SIGNALS[table.over[i]], UNITS[table.over[i]]
     if t.of < 0:
         other = _SIGNALS[table.over[1]]
         u = f"({u} {'-' if t.kind == 'difference' else '+'} {other})"
-        if t.kind != "product" and _UNITS[table.over[1]] != unit:
-            raise InputError(f"{table.words}: a sum of {unit} and {_UNITS[table.over[1]]} has no unit; keep the table")
+        if t.kind != "product" and UNITS[table.over[1]] != unit:
+            raise InputError(f"{table.words}: a sum of {unit} and {UNITS[table.over[1]]} has no unit; keep the table")
 
     def amplitude(name: str, unit: str, value: float) -> str:
         return f'Parameter("{name}_{k}", "{unit}", "coefficient of term {k}; found: {value:.6g}")'
@@ -91,7 +90,7 @@ def _written(t: Term, table: Table, values: Array, k: int) -> tuple[str, list[st
         return code, [amplitude("cosine", "T", values[0]), amplitude("sine", "T", values[1]), shape("period")]
     if t.kind == "product":
         code = f"{p.format('product')} * {_SIGNALS[table.over[0]]} * {_SIGNALS[table.over[1]]}"
-        return code, [amplitude("product", f"T/({unit})/({_UNITS[table.over[1]]})", values[0])]
+        return code, [amplitude("product", f"T/({unit})/({UNITS[table.over[1]]})", values[0])]
     if t.kind in ("above", "below"):
         sign = (u, p.format("threshold")) if t.kind == "above" else (p.format("threshold"), u)
         return f"{p.format('slope')} * ca.fmax({sign[0]} - {sign[1]}, 0)", [

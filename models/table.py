@@ -28,6 +28,9 @@ OWN = ("position", "speed", "load", "time", "distance travelled")
 OTHERS = ("position of ", "speed of ")
 """Coordinates of another joint, by its name; speed with its sign."""
 
+UNITS = {"position": "S", "speed": "S/s", "load": "T", "time": "s", "distance travelled": "S"}
+"""Of each coordinate, with S and T for a joint's position and torque."""
+
 TIMES = {
     "": "",
     "direction": " by direction",

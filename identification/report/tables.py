@@ -24,6 +24,12 @@ def words_of(t: EmpiricalTable) -> str:
     return f"Empirical law at {t.at} over {over}, without a name. {shown} Outside, the end value is held."
 
 
+def _along(t: EmpiricalTable, k: int) -> str:
+    """What lies along an axis: a coordinate of the joint, or of another by name, with its unit."""
+    over = t.over[k]
+    return f"{over if ' of ' in over else f'{over} of {t.at}'} [{unit_words(t.over_units[k])}]"
+
+
 def drawn(t: EmpiricalTable) -> bytes:
     """A table as the laws read it, cubic between its knots."""
     knots = tuple(tuple(k.tolist()) for k in t.knots)
@@ -38,7 +44,7 @@ def drawn(t: EmpiricalTable) -> bytes:
             axes.axhline(0, color=GREY, linewidth=0.6)
             axes.fill_between(x, value - 2 * std, value + 2 * std, color=AFTER, alpha=0.25, linewidth=0)
             axes.plot(x, value, color=AFTER, linewidth=1.6)
-            axes.set_xlabel(f"{t.over[0]} of {t.at} [SI]" if " of " not in t.over[0] else f"{t.over[0]} [SI]")
+            axes.set_xlabel(_along(t, 0))
             axes.set_ylabel(f"value [{unit_words(t.unit)}]")
             return svg(chart)
         chart = Figure(figsize=(10.0, 3.4))
@@ -46,6 +52,6 @@ def drawn(t: EmpiricalTable) -> bytes:
         for axes, numbers, title in zip(chart.subplots(1, 2), (t.value, t.std), ("value", "deviation"), strict=True):
             mesh = axes.pcolormesh(t.knots[0], t.knots[1], numbers.T, shading="gouraud", rasterized=True)
             chart.colorbar(mesh, ax=axes, label=f"{title} [{unit_words(t.unit)}]")
-            axes.set_xlabel(f"{t.over[0]} [SI]")
-            axes.set_ylabel(f"{t.over[1]} [SI]")
+            axes.set_xlabel(_along(t, 0))
+            axes.set_ylabel(_along(t, 1))
         return svg(chart)

@@ -12,6 +12,7 @@ from bench.fmu_models import Slave
 from snarelab.fmu.export import export
 from snarelab.identification.diagnose import diagnose
 from snarelab.identification.report.page import write_report
+from snarelab.identification.report.tables import drawn
 from snarelab.identification.simulate import simulate
 from snarelab.models.empirical import tables_of
 from snarelab.models.model_file import load_model
@@ -39,6 +40,8 @@ def test_the_table_is_the_law_and_closes_the_error(found):
     assert d.verdict == "unknown_effect", d.sentence
     assert [(e["name"], e["at"]) for e in told["effects"]] == [("empirical", "joint1")]
     assert "position" in told["effects"][0]["coordinates"]
+    units = {"position": "rad", "speed": "rad/s", "time": "s", "load": "N*m", "distance travelled": "rad"}
+    assert all(t["coordinate_units"] == [units[c] for c in t["coordinates"]] for t in told["empirical"])
     assert d.fit[0].train.rms_after < d.fit[0].train.rms_before
     # 0.3 N·m of disturbance and 0.15 N·m of noise are what an oracle that knows the law leaves, 0.34 N·m at most.
     before, after = d.fit[0].holdout.rms_before, d.fit[0].holdout.rms_after
@@ -83,6 +86,8 @@ def test_the_report_draws_it(found):
     page = (folder / "report.html").read_text()
     assert "Empirical law at joint1 over position" in page
     assert "Outside, the end value is held" in page
+    pictures = "".join(drawn(t).decode() for t in answer.diagnosis.empirical)
+    assert "position of joint1 [rad]" in pictures
 
 
 def test_beyond_its_data_simulation_says_so_once_and_holds(found):
