@@ -69,7 +69,7 @@ def next_step(won: Mapping[int, bool], ways: Ways) -> int | None:
     """Which step of a ray is to be tried next, from those that were; None where its end is known."""
     low, high = last_and_first(won)
     if high is None:
-        return low + FINE // ways.steps if low < FINE else None
+        return min(low + FINE // ways.steps, FINE) if low < FINE else None
     return (low + high) // 2 if high - low > FINE // ways.exact else None
 
 

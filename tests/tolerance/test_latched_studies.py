@@ -79,6 +79,17 @@ def test_asking_for_more_keeps_the_cases(tmp_path):
     assert len(results) == before + 2 * 3
 
 
+def test_asking_for_less_goes_on_from_the_cases_to_the_limit(tmp_path):
+    s = study(tmp_path)
+    results = Results(tmp_path / "found", s)
+    for number in (0, 32):  # the nominal case, and half of the first way
+        results.add(STAGE, number, s.values(next_cases(s, results.table(STAGE))[number]), latching({"radial_y": 0.0}))
+    coarse = study(tmp_path, 'axes = ["radial_y", "pitch"]\nsteps = 1\nexact = 1\n')
+    wanted = next_cases(coarse, Results(tmp_path / "found", coarse).table(STAGE))
+    assert [number % 64 for number in wanted] == [0] * 4  # each way's last point
+    assert np.all(np.abs(list(wanted.values())) <= 0.3)
+
+
 @pytest.mark.parametrize(
     ("envelope", "words"),
     [
