@@ -182,7 +182,7 @@ def _proxy(study: Study, found: dict[str, Any]) -> str:
     both, neither = latched - found["latched_against"], failed - found["failed_against"]
     limit = f"{1e3 * study.success.radial_error:g} mm"
     counts = table(
-        f"Of {total} captures with a result: what the radial error at the soft capture's end says, and what came of it.",
+        f"Of {total} captures with a result: what the radial error after the soft capture says, and what came of it.",
         ["", "latched", "did not"],
         [
             [f"within {limit}", str(both), str(found["failed_against"])],
