@@ -1,0 +1,248 @@
+"""Recordings under a fit, as the evidence sees them: channels with their noise, and every hypothesis."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...models.model import Placed
+from ..deciding import DISCREPANCY, LAW_ERROR
+from ..evidence.evidence import Channel, Evidence, Projected
+from ..evidence.hypotheses import pool
+from ..evidence.pool import Columns, Hypothesis, Item
+from ..evidence.search import Search
+from ..nuisance.curve import SMALL
+from ..nuisance.noise import Noise, Run, learn
+from .fit import Covariances, fit, priors, shift_columns
+from .source import At, Linear, Source, Variant
+
+Array = NDArray[np.float64]
+
+STRONGEST = 10
+"""Directions of what could explain a residual beside which its noise is learnt."""
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """Evidence of some recordings under a fit, the hypotheses, the noise of every channel, and the fit."""
+
+    evidence: Evidence
+    pool: tuple[Hypothesis, ...]
+    noises: tuple[Noise, ...]
+    hangs: tuple[list[Run], ...]
+    """What the noise of every channel of every recording hangs on."""
+    shifts: slice
+    """Where the shifts stand among all that always stands beside."""
+
+    @property
+    def covariances(self) -> Covariances:
+        """Of every recording and channel."""
+        return [[channel.covariance for channel in row] for row in self.evidence.channels]
+
+    def weight(self, tolerance: float) -> Array:
+        """Factors on the prior deviations of what stands beside, for shifts that are known so exactly."""
+        weight = np.ones(self.evidence.n_always)
+        weight[self.shifts] = tolerance
+        return weight
+
+    def searched(
+        self, recordings: Sequence[int], tolerances: Sequence[float], barred: Sequence[int] = ()
+    ) -> tuple[Search, float]:
+        """A search with the shifts' tolerance that the evidence chooses, and that tolerance."""
+        made = [Search(Projected(self.evidence, recordings, self.weight(x)), self.pool, barred) for x in tolerances]
+        if len(made) == 1:
+            return made[0], tolerances[0]
+        values = [s.on.null + s.run((), exchange=False)[0] for s in made]
+        best = int(np.argmax(values))
+        return made[best], tolerances[best]
+
+
+def weigh(
+    source: Source,
+    numbers: Sequence[int],
+    given: At,
+    linear: Linear,
+    known: Weighed | None = None,
+    *,
+    search: bool,
+    alone: Mapping[str, Variant] | None = None,
+) -> Weighed:
+    """Recordings under a fit.
+
+    Parameters
+    ----------
+    source : Source
+    numbers : sequence of int
+        Recordings, those for training first.
+    given : At
+        The model as given.
+    linear : Linear
+        The fit on these recordings.
+    known : Weighed, optional
+        Has the noise, which is learnt without it.
+    search : bool
+        False leaves out all hypotheses: only the evidence of the fit itself is wanted.
+    alone : mapping of str to Variant, optional
+        Laws that were fitted by themselves, by their key: a point more of their grid.
+    """
+    columns, scale = Columns([len(r) for r in linear.residuals]), source.scale()
+    named = _named(source, numbers, linear.at, columns, alone or {}) if search else {}
+    spread = np.concatenate([_spread(source, given, linear.at), np.ones(len(linear.at.shifts))])
+    curves = {k: x for k, x in source.curves(numbers).items() if search or k[1] in SMALL}
+    sizes = {k: _rms_of_curve(x[: len(source.train)]) for k, x in curves.items()}
+    small = {k: [x / sizes[k] for x in own] for k, own in curves.items() if k[1] in SMALL}
+    if known is None:
+        could = [
+            _strongest(
+                [
+                    np.concatenate(
+                        [x[:, c] * spread, columns.some(i, c, columns.of(i, c)[0])]
+                        + [own[i] for (at, _), own in small.items() if at == c],
+                        axis=1,
+                    )
+                    for i, x in enumerate(linear.columns)
+                ]
+            )
+            for c in range(len(scale))
+        ]
+        own = source.hangs(numbers, linear, could)
+        noises = tuple(
+            learn([r[:, c] for r in linear.residuals], could[c], [row[c] for row in own]) for c in range(len(scale))
+        )
+    else:
+        own, noises = known.hangs, known.noises
+    by_words = {}
+    for (c, words), x in curves.items() if search else ():
+        k = x[0].shape[1]
+        by_words[c, words] = Item(columns.add({c: x}), np.full(k, scale[c] / sizes[c, words]), np.zeros(k, bool),
+                                  label=(c, words))  # fmt: skip
+    count = linear.columns[0].shape[2]
+    placed = slice(len(linear.at.values), count)
+    known_shifts = np.concatenate([np.zeros(len(linear.at.values)), linear.at.shifts])
+    wrong = [_wrong(source, linear, c) for c in range(len(scale))]
+    beside: list[list[tuple[NDArray[np.int_], Array]]] = []
+    total = count + sum(x[0].shape[1] for x in small.values())
+    for i, x in enumerate(linear.columns):
+        row, start = [], count
+        for c in range(len(scale)):
+            index, parts = [np.arange(count)], [x[:, c] * spread]
+            for (at, _), curve in small.items():
+                if at == c:
+                    index.append(start + np.arange(curve[i].shape[1]))
+                    parts.append(curve[i] * wrong[c] * scale[c])
+                    start += curve[i].shape[1]
+            row.append((np.concatenate(index), np.concatenate(parts, axis=1)))
+        beside.append(row)
+    channels = [
+        [
+            # The shifts' prior is about what the set-up is said to be, not about where they now are.
+            Channel(r[:, c] + x[:, c] @ known_shifts, noises[c].covariance(hangs[c]), *row[c])
+            for c in range(len(scale))
+        ]
+        for r, x, hangs, row in zip(linear.residuals, linear.columns, own, beside, strict=True)
+    ]
+    hypotheses = tuple(pool(named, by_words, ())) if named or by_words else ()
+    items = [item for h in hypotheses for item in h.items]
+    evidence = Evidence(channels, columns, items, total)
+    return Weighed(evidence, hypotheses, tuple(noises), tuple(own), placed)
+
+
+def by_themselves(source: Source, given: At, linear: Linear, weighed: Weighed) -> dict[str, Variant]:
+    """Every law without amplitudes fitted by itself from the best point of its grid: between two of them it explains
+    much less."""
+    made, _ = weighed.searched(range(len(source.train)), source.tolerances[-1:])
+    found: dict[str, Variant] = {}
+    best, shifted = made.scan([]).item, shift_columns(linear)
+    for h, x in enumerate(weighed.pool):
+        if x.named and x.items[0].whole:
+            v: Variant = weighed.evidence.items[best[h]].label
+            at = linear.at.with_effects([v.placed], v.values)
+            fitted = fit(source, given, at, weighed.covariances[: len(source.train)], shifted)
+            found[x.key] = replace(v, values={k: fitted.at.all_values[k] for k in v.values})
+    return found
+
+
+def _named(
+    source: Source, numbers: Sequence[int], at: At, columns: Columns, alone: Mapping[str, Variant]
+) -> dict[str, tuple[Placed, list[Item]]]:
+    """Every effect that is not there, with its columns at each point of its grid."""
+    found: dict[str, tuple[Placed, list[Item]]] = {}
+    for p in source.library(at.placed):
+        items = [_item(source, numbers, at, columns, v) for v in source.variants(p)]
+        if p.key in alone:
+            items.append(_fitted(source, numbers, at, columns, alone[p.key]))
+        some = [x for x in items if x is not None]
+        if some:
+            found[p.key] = (p, some)
+    return found
+
+
+def _item(source: Source, numbers: Sequence[int], at: At, columns: Columns, v: Variant) -> Item | None:
+    parts = [source.columns(i, at, v) for i in numbers]
+    size = _size(source, parts)
+    if not np.all(np.isfinite(size)) or np.any(size <= 0):
+        return None
+    index = _added(columns, parts)
+    if not v.amplitudes:
+        return Item(index, np.ones(1), np.ones(1, bool), True, replace(v, size=float(size[0])))
+    named = {x.name: x for x in v.placed.effect.parameters}
+    positive = np.array([named[k.rpartition(".")[2]].low >= 0 for k in v.amplitudes])
+    return Item(index, np.full(len(size), v.size) if v.size else 1 / size, positive, label=v)
+
+
+def _fitted(source: Source, numbers: Sequence[int], at: At, columns: Columns, v: Variant) -> Item | None:
+    """A law where it was fitted by itself, and what each parameter's own size more would add."""
+    there = at.with_effects([v.placed], v.values)
+    parts, n = [], len(at.values)
+    for i in numbers:
+        here = source.predicted(i, there)
+        if here is None:
+            return None
+        slopes = source.slopes(i, there, here)[:, :, n:] * there.values[n:]
+        parts.append(np.concatenate([source.columns(i, at, v), slopes], axis=2))
+    size = _size(source, parts)[0]
+    if not np.isfinite(size) or size <= 0:
+        return None
+    index = _added(columns, parts)
+    return Item(index, np.full(len(index), 1 / size), np.arange(len(index)) == 0, label=v)
+
+
+def _size(source: Source, parts: Sequence[Array]) -> Array:
+    """RMS of each column over the training recordings, as a share of the channel that it shows most on (k,)."""
+    whole = np.concatenate(parts[: len(source.train)])
+    return np.max(np.sqrt(np.mean(whole**2, axis=0)) / source.scale()[:, None], axis=0)
+
+
+def _added(columns: Columns, parts: Sequence[Array]) -> NDArray[np.int_]:
+    """Columns entered on every channel that they reach."""
+    reached = np.any([np.any(x, axis=(0, 2)) for x in parts], axis=0)
+    return columns.add({int(c): [x[:, c] for x in parts] for c in np.flatnonzero(reached)})
+
+
+def _spread(source: Source, given: At, at: At) -> Array:
+    """Prior deviation of the free parameters (P,)."""
+    _, own = priors(source, given, at)
+    return np.where(np.isfinite(own), own, np.maximum(np.abs(at.values), 1e-12))
+
+
+def _rms_of_curve(parts: Sequence[Array]) -> float:
+    return float(np.sqrt(np.mean(np.concatenate([np.sum(x**2, axis=1) for x in parts])))) or 1.0
+
+
+def _wrong(source: Source, linear: Linear, c: int) -> float:
+    """How large the small curves are beside every explanation [share of the channel]: no law of the model is exact."""
+    n = len(linear.at.values)
+    laws = [x[:, c, :n] @ linear.at.values for x in linear.columns[: len(source.train)]]
+    share = float(np.sqrt(np.mean(np.concatenate(laws) ** 2))) / source.scale()[c]
+    return float(np.hypot(DISCREPANCY, LAW_ERROR * share))
+
+
+def _strongest(parts: Sequence[Array]) -> list[Array]:
+    """The strongest directions of columns of unit RMS, of unit RMS themselves."""
+    whole = np.concatenate(list(parts))
+    size = np.sqrt(np.mean(whole**2, axis=0))
+    use = size > 1e-9 * size.max(initial=1e-300)
+    u, d, _ = np.linalg.svd(whole[:, use] / size[use], full_matrices=False)
+    kept = u[:, (np.arange(len(d)) < STRONGEST) & (d > 1e-3 * d.max(initial=0.0))] * np.sqrt(len(u))
+    return np.split(kept, np.cumsum([len(p) for p in parts])[:-1])
