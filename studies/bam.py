@@ -16,7 +16,6 @@ import numpy as np
 
 from ..errors import InputError
 from ..exit_status import status_of
-from ..identification.links.diagnose import PROVED
 from ..models.effect import written_unit
 from ..models.effects import effects
 from ..models.model import Placed
