@@ -52,6 +52,12 @@ class Missed:
         return self.gain / max(self.scatter, 1e-12)
 
     @property
+    def explained(self) -> float:
+        """Share of the held-out residual's energy that goes with the effect, 0 to 1."""
+        within, without = self.trial
+        return float(np.clip(1 - (within / without) ** 2, 0.0, 1.0)) if without > 0 else 0.0
+
+    @property
     def told(self) -> bool:
         """Whether it is missed beyond its scatter, and as more than any model has wrong."""
         return self.sure > GATE and self.size >= DISCREPANCY
