@@ -11,6 +11,7 @@ from ..diagnosis import Diagnosis, Estimate, Location, Moved, Step, Trace
 from ..sources.answer import candidates, channel_fits, estimates, finding, limits, not_confirmed, rms
 from ..sources.decide import Decided
 from ..sources.source import At, Linear
+from ..sources.weigh import covariances
 from ..wording import foremost, named
 from .recording import EVERY, Record, unit_of
 from .runs import SHIFTS
@@ -30,7 +31,7 @@ def report_on(source: Dockings, name: str, decided: Decided, seconds: float) -> 
     found, best, records = decided.found, decided.best, source.records
     own, locked = ([records[i] for i in some] for some in (source.train, source.held))
     sizes = source.sizes(source.train), source.sizes(source.held)
-    values = estimates(source, decided.given, best.train, found.weighed.covariances)
+    values = estimates(source, decided.given, best.train, covariances(found.weighed))
     findings = []
     for n in best.names:
         p = n.placed
@@ -41,7 +42,7 @@ def report_on(source: Dockings, name: str, decided: Decided, seconds: float) -> 
             f"out again raises the error of {channel} on the held-out docking from {_size(b, unit)} to "
             f"{_size(a, unit)}."
         )
-        findings.append(finding(decided, n, values[p.key], evidence))
+        findings.append(finding(decided, n, values[p.key], evidence, max(0.0, 1 - (b / max(a, 1e-300)) ** 2)))
     units = [unit_of(c) for c in source.channels]
     fits = channel_fits(decided, source.channels, units, *sizes, [float(n.white) for n in found.noises])
     worst = foremost(findings, fits)

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 
 from ...models.model import Model
+from ..evidence.arm import Weighed
 from ..parameter_list import parameter_list
 from ..sources.answer import estimates, rms, with_found
 from ..sources.fit import deviations, fit, linearised, shift_columns
 from ..sources.source import At, Linear
-from ..sources.weigh import Weighed, weigh
+from ..sources.weigh import covariances, weigh
 from .recording import unit_of
 from .source import Dockings, start
 
@@ -33,15 +34,15 @@ class IdentifiedDockings:
 
     def to_json(self) -> dict[str, Any]:
         """The published form."""
-        source, covariances = self.source, self.weighed.covariances
-        parameters = parameter_list(self.fit.at.placed, estimates(source, self.given, self.fit, covariances))
+        source, noise = self.source, covariances(self.weighed)
+        parameters = parameter_list(self.fit.at.placed, estimates(source, self.given, self.fit, noise))
         fits: dict[str, Any] = {}
         for role, numbers, found in (("train", source.train, self.fit), ("holdout", source.held, self.held)):
             if found is not None:
                 for channel, a, b in zip(source.channels, rms(found), source.sizes(numbers), strict=True):
                     entry = fits.setdefault(channel, {"unit": unit_of(channel)})
                     entry[role] = {"rms": float(a), "relative": float(a / b)}
-        _, own = deviations(source, self.given, self.fit, covariances)
+        _, own = deviations(source, self.given, self.fit, noise)
         size = np.sqrt(np.maximum(np.diag(own), 1e-300))
         condition = float(min(np.linalg.cond(own / np.outer(size, size)), 1e300)) if len(own) else 1.0
         notes = [f"{Path(r.path).name}: {note}" for r in source.records for note in r.notes]
@@ -63,6 +64,6 @@ def identify_dockings(
     progress("fitting the effects' parameters with the simulation in the loop")
     here = linearised(source, source.train, given)
     weighed = weigh(source, source.train, given, here, search=False)
-    found = fit(source, given, here.at, weighed.covariances, shift_columns(here), STEPS)
+    found = fit(source, given, here.at, covariances(weighed), shift_columns(here), STEPS)
     held = linearised(source, source.held, found.at) if holdout else None
     return IdentifiedDockings(with_found(model, found.at), given, source, weighed, found, held)

@@ -31,9 +31,7 @@ def standing(record: Record) -> NDArray[np.bool_]:
     return (slowest < STICKS[0][0] * np.abs(rate).max()) | (rate[1:] * rate[:-1] < 0)
 
 
-def hangs(
-    records: Sequence[Record], linear: Linear, could: Sequence[Sequence[Array]], scale: Array
-) -> tuple[list[Run], ...]:
+def hangs(records: Sequence[Record], linear: Linear, could: Sequence[Sequence[Array]], scale: Array) -> list[list[Run]]:
     """What the noise of every channel hangs on.
 
     While balls touch and slide no law of contact tells the load to the window: a channel may then be off, as a joint
@@ -54,7 +52,7 @@ def hangs(
     kinds = [name.rpartition(".")[0] for name in records[0].channels]
     least = [LEAST_LEVEL * max(x for x, other in zip(scale, kinds, strict=True) if other == kind) for kind in kinds]
     loose = [touching(r, x) for r, x in zip(records, seen, strict=True)]
-    found: tuple[list[Run], ...] = tuple([] for _ in records)
+    found: list[list[Run]] = [[] for _ in records]
     for c, name in enumerate(records[0].channels):
         driven = name.startswith(("tau.", "tension."))
         rows = [(standing(r) & (name == "tau.carriage")) if driven else k for r, k in zip(records, loose, strict=True)]

@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 class Dockings(Runs):
     """Docking tests of a model, the training recordings first."""
 
-    n_shifts, tolerances, steps = len(SHIFTS), (1.0,), 4
+    n_shifts, anew, steps = len(SHIFTS), False, 4
 
     def __init__(self, model: Model, train: Sequence[str | Path], held: Sequence[str | Path] = ()) -> None:
         """Read the recordings; raises InputError for whatever is wrong with one."""
@@ -108,7 +108,7 @@ class Dockings(Runs):
     def curves(self, numbers: Sequence[int]) -> Mapping[tuple[int, str], list[Array]]:
         return {}
 
-    def hangs(self, numbers: Sequence[int], linear: Linear, could: Sequence[Sequence[Array]]) -> tuple[list[Run], ...]:
+    def hangs(self, numbers: Sequence[int], linear: Linear, could: Sequence[Sequence[Array]]) -> list[list[Run]]:
         return hangs([self.records[i] for i in numbers], linear, could, self.scale())
 
     def blocks(self, i: int, x: Array) -> Array:

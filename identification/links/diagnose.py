@@ -15,6 +15,7 @@ from ..fitting.experiment import Experiment, Scales
 from ..sources.decide import Decided, decide
 from ..sources.fit import fit, residuals
 from ..sources.source import Linear
+from ..sources.weigh import covariances
 from .run import load_links
 from .source import Links, links_of, start
 
@@ -72,14 +73,14 @@ def diagnose_links(
 
 def stages(links: Links, decided: Decided) -> list[tuple[str, Linear, Linear]]:
     """Fits after each effect is added at all its joints, every parameter fitted again; the first as given."""
-    best, covariances = decided.best, decided.found.weighed.covariances
+    best, noise = decided.best, covariances(decided.found.weighed)
     found = [("link encoders as given", decided.found.first, decided.before)]
     names = list(dict.fromkeys(n.placed.effect.name for n in best.names))
     for k, name in enumerate(names):
         later = [n.placed.key for n in best.names if n.placed.effect.name in names[k + 1 :]]
         own, there = best.train, best.held
         if later:
-            own = fit(links, decided.given, own.at.without(*later), covariances)
+            own = fit(links, decided.given, own.at.without(*later), noise)
             at = links.settled(own.at, links.held)
             there = Linear(at, residuals(links, links.held, at), ())
         at = [n.placed.at for n in best.names if n.placed.effect.name == name]

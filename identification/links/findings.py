@@ -11,6 +11,7 @@ from ..diagnosis import Estimate, Finding, Rival, Trace
 from ..sources.answer import estimates, finding, not_confirmed, rms
 from ..sources.search import Name
 from ..sources.source import Linear
+from ..sources.weigh import covariances
 from ..wording import percent
 from .diagnose import Compared
 from .source import Links
@@ -31,7 +32,7 @@ def unit_of(links: Links, c: int) -> str:
 def findings_of(one: Compared) -> tuple[Finding, ...]:
     """What the held-out recordings miss most goes first; what adds the same at all times goes last."""
     links, best = one.links, one.decided.best
-    values = estimates(links, one.decided.given, best.train, one.decided.found.weighed.covariances)
+    values = estimates(links, one.decided.given, best.train, covariances(one.decided.found.weighed))
     order = sorted(best.names, key=lambda n: (links.still(n.placed), -best.missed[n.placed.key].gain))
     return tuple(_finding(one, n, values[n.placed.key]) for n in order)
 
@@ -62,7 +63,7 @@ def _finding(one: Compared, n: Name, values: dict[str, Estimate]) -> Finding:
     either = p.effect.at == "sensor" and not p.effect.states
     third = f"hold either encoder of {joint} against a third measurement, such as a laser tracker's"
     rivals = [Rival(p.effect.name, f"q.{joint}", 0.0, False, third)] if either else []
-    return finding(one.decided, n, values, text, rivals)
+    return finding(one.decided, n, values, text, 1 - (within / max(without, 1e-300)) ** 2, rivals)
 
 
 def _twist(one: Compared, n: Name) -> str:

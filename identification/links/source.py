@@ -18,7 +18,7 @@ from ...models.effects import effects, get_effect
 from ...models.hidden_state import reads
 from ...models.model import Model, Placed
 from ...recordings import JointKind
-from ..deciding import BLOCK, LEAST_LEVEL, SIZES, TOLERANCES
+from ..deciding import BLOCK, LEAST_LEVEL, SIZES
 from ..evidence.confirm import FEWEST_BLOCKS
 from ..fitting.assembly import Assembly
 from ..fitting.experiment import Experiment, Scales
@@ -46,7 +46,7 @@ class Links:
     n_train : int
     """
 
-    tolerances, steps = (*TOLERANCES, 1.0), 12
+    anew, steps = True, 12
 
     def __init__(
         self,
@@ -197,12 +197,10 @@ class Links:
             lambda m: np.abs(m.qd[:, j]), lambda m: np.ptp(m.q[:, j])))  # fmt: skip
         return max(speed, 1e-12), max(travel, 1e-12)
 
-    def hangs(
-        self, numbers: Sequence[int], linear: Linear, could: Sequence[Sequence[Array]]
-    ) -> tuple[list[Hangs], ...]:
+    def hangs(self, numbers: Sequence[int], linear: Linear, could: Sequence[Sequence[Array]]) -> list[list[Hangs]]:
         """Where a joint stands, friction holds its drive wound up by what no load tells, and encoders hold their steps:
         what nothing explains there, in the RMS, and `LEAST_LEVEL` of the channel at least."""
-        found: tuple[list[Hangs], ...] = tuple([] for _ in numbers)
+        found: list[list[Hangs]] = [[] for _ in numbers]
         for c in range(len(self.joints)):
             peak, travel = self._moves(c)
             motions, j = [self.rows[i][c].motion for i in numbers], self.rows[0][c].joint
@@ -234,8 +232,7 @@ def links_of(
     scales: Mapping[str, Scales],
 ) -> Links:
     """Some joints' encoders, loaded by the rigid-body torque of a model at its parameters ``theta``."""
-    at = [model.joints.index(j) for j in joints]
-    rows = []
+    at, rows = [model.joints.index(j) for j in joints], []
     for e in (*train, *held):
         load = assembly.evaluate(e, theta).load
         rows.append([Run(e.motion, n, load[:, n], e.mass_matrix[:, n, n]) for n in at])

@@ -35,14 +35,20 @@ def estimates(source: Source, given: At, here: Linear, covariances: Covariances)
 
 
 def finding(
-    decided: Decided, n: Name, values: Mapping[str, Estimate], sentence: str, either: Sequence[Rival] = ()
+    decided: Decided,
+    n: Name,
+    values: Mapping[str, Estimate],
+    sentence: str,
+    explained: float,
+    either: Sequence[Rival] = (),
 ) -> Finding:
-    """A name with its rivals; ``either``: exact aliases that no search has, each as likely.
+    """A name with its rivals; ``explained``: the share of the held-out residual's energy that goes with it; ``either``:
+    exact aliases that no search has, each as likely.
 
     The posterior is shared among those that cannot be told apart; how often such a name is right was counted.
     """
     p, sure = n.placed, decided.best.missed[n.placed.key].sure
-    right = of_name(n.gain, sure)
+    right = of_name(n.gain, sure, explained)
     whole = n.share + sum(share for _, share in n.rivals if share >= CLASS)
     scale = right / max(whole, 1e-12) / (1 + len(either))
     rivals = [

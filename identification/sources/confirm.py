@@ -12,17 +12,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from ..deciding import DISCREPANCY, GATE
+from ..deciding import DISCREPANCY, GATE, TOLERANCES
+from ..evidence.arm import Weighed
 from ..evidence.confirm import scatter
 from ..evidence.evidence import Projected
 from ..evidence.found import Remainder
 from ..evidence.members import Members
 from ..evidence.rounds import as_names, share_of_residual
 from ..evidence.search import Search, Slot
+from ..evidence.tolerant import searched
 from .fit import fit, linearised, shift_columns
-from .search import Found, Name, barred_in, opened
+from .search import Found, Name, opened
 from .source import At, Linear, Source
-from .weigh import Weighed, weigh
+from .weigh import covariances, weigh
 
 Array = NDArray[np.float64]
 
@@ -61,19 +63,19 @@ class Confirmed:
 def confirm(source: Source, given: At, found: Found, progress: Callable[[str], None] = lambda _: None) -> Confirmed:
     """Take out the name that the held-out recordings miss least, until they miss every one."""
     held, last, names = source.held, found.last, list(found.names)
-    shifted, covariances = shift_columns(last), found.weighed.covariances
+    shifted, own = shift_columns(last), covariances(found.weighed)
     progress("confirming on the held-out recordings")
     there = linearised(source, held, source.settled(last.at, held))
     beside = shift_columns(there)
     could = [[x[:, c] for x in there.columns] for c in range(len(source.channels))]
-    noise = replace(found.weighed, hangs=(*found.weighed.hangs, *source.hangs(held, there, could)))
+    noise = replace(found.weighed, runs=[*found.weighed.runs, *source.hangs(held, there, could)])
     whole = _foretold(source, given, last, there, noise)
     missed: dict[str, Missed] = {}
     rejected: list[Name] = []
     while names:
         for name in names:
             key = name.placed.key
-            rest = fit(source, given, last.at.without(key), covariances, shifted)
+            rest = fit(source, given, last.at.without(key), own, shifted)
             other = linearised(source, held, source.settled(rest.at, held), beside)
             density, blocks = _foretold(source, given, rest, other, noise)
             missed[key] = Missed(whole[0] - density, scatter(0.5 * (blocks - whole[1])), rest, other)
@@ -94,9 +96,10 @@ def _foretold(source: Source, given: At, here: Linear, there: Linear, known: Wei
     weighed = weigh(source, [*source.train, *source.held], given, _joined(here, there), known, search=False)
     evidence, n = weighed.evidence, len(source.train)
     every = range(n, n + len(source.held))
+    masses = weighed.beside.tolerant
     priors, ons = [], []
-    for tolerance in source.tolerances:
-        weight = weighed.weight(tolerance)
+    for tolerance in (*TOLERANCES, *weighed.beside.more) if masses.stop > masses.start else TOLERANCES[:1]:
+        weight = weighed.beside.weight(tolerance)
         own = Projected(evidence, range(n), weight)
         priors.append(own.null)
         ons.append(Projected(evidence, every, weight, own.posterior(evidence.n_always)))
@@ -107,7 +110,8 @@ def _foretold(source: Source, given: At, here: Linear, there: Linear, known: Wei
 
 
 def _joined(here: Linear, there: Linear) -> Linear:
-    return Linear(here.at, (*here.residuals, *there.residuals), (*here.columns, *there.columns))
+    # What is the held-out recordings' own stands there alone.
+    return Linear(there.at, (*here.residuals, *there.residuals), (*here.columns, *there.columns))
 
 
 def remainders(source: Source, given: At, best: Confirmed, barred: Collection[str]) -> tuple[Remainder, ...]:
@@ -116,9 +120,9 @@ def remainders(source: Source, given: At, best: Confirmed, barred: Collection[st
     if not source.curves(numbers):
         return ()
     weighed = opened(source, numbers, given, _joined(best.train, best.held), best.noise)
-    made, tolerance = weighed.searched(train, source.tolerances, barred_in(weighed, barred))
-    both = Projected(weighed.evidence, range(len(numbers)), weighed.weight(tolerance))
-    kept = list(as_names(made, made.answer()))
+    weighed, made, slots, tolerance = searched(weighed, train, barred, range(len(weighed.noises)))
+    both = Projected(weighed.evidence, range(len(numbers)), weighed.beside.weight(tolerance))
+    kept = list(as_names(made, slots))
     while True:
         told = {k: _remainder(source, made, both, kept, k) for k, s in enumerate(kept) if _nameless(made, s)}
         weakest = min(told, key=lambda k: told[k].held, default=None)

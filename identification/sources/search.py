@@ -7,13 +7,15 @@ import numpy as np
 
 from ...models.model import Placed
 from ..deciding import ROUNDS
+from ..evidence.arm import Weighed
 from ..evidence.members import Members, log_bayes
 from ..evidence.rounds import as_names, share_of_residual
 from ..evidence.search import Search, Slot
+from ..evidence.tolerant import searched
 from ..nuisance.noise import Noise
 from .fit import fit, linearised, shift_columns
 from .source import At, Linear, Source, Variant
-from .weigh import Weighed, by_themselves, weigh
+from .weigh import by_themselves, covariances, weigh
 
 
 @dataclass(frozen=True)
@@ -73,9 +75,9 @@ def search(
     for number in range(1, ROUNDS + 1):
         progress(f"round {number}: weighing each effect at each place")
         weighed = opened(source, train, given, here)
-        made, _ = weighed.searched(range(len(train)), source.tolerances, barred_in(weighed, barred))
+        weighed, made, slots, _ = searched(weighed, range(len(train)), barred, range(len(weighed.noises)))
         trials = trials or _trials(made)
-        slots = as_names(made, made.answer())
+        slots = as_names(made, slots)
         chosen = _chosen(made, slots)
         if not chosen:
             break
@@ -86,10 +88,10 @@ def search(
             added.append(placed)
             values |= start
         progress("fitting " + ", ".join(f"{p.effect.name} at {p.at}" for p in added))
-        here = fit(source, given, here.at.with_effects(added, values), weighed.covariances, shifted)
+        here = fit(source, given, here.at.with_effects(added, values), covariances(weighed), shifted)
     assert weighed is not None
     if not names:
-        here = fit(source, given, here.at, weighed.covariances, shifted)
+        here = fit(source, given, here.at, covariances(weighed), shifted)
     return Found(tuple(names), first, here, weighed, trials)
 
 
@@ -102,11 +104,6 @@ def opened(source: Source, numbers: Sequence[int], given: At, here: Linear, know
     train = Linear(here.at, here.residuals[:n], here.columns[:n])
     own = by_themselves(source, given, train, weighed)
     return weigh(source, numbers, given, here, known or weighed, search=True, alone=own)
-
-
-def barred_in(weighed: Weighed, keys: Collection[str]) -> list[int]:
-    """Hypotheses by their keys."""
-    return [h for h, x in enumerate(weighed.pool) if x.key in keys]
 
 
 def _chosen(made: Search, slots: Sequence[Slot]) -> list[tuple[Slot, Sequence[Slot]]]:

@@ -113,8 +113,8 @@ class Source(Protocol):
         ...
 
     @property
-    def tolerances(self) -> Sequence[float]:
-        """Factors on the shifts' deviations, of which the evidence chooses one."""
+    def anew(self) -> bool:
+        """Whether shifts may be known to a share of their deviations, which the evidence chooses, or not at all."""
         ...
 
     @property
@@ -178,7 +178,7 @@ class Source(Protocol):
         """Nameless curves by channel and what they run over in words: columns (n, k) for each recording."""
         ...
 
-    def hangs(self, numbers: Sequence[int], linear: Linear, could: Sequence[Sequence[Array]]) -> tuple[list[Run], ...]:
+    def hangs(self, numbers: Sequence[int], linear: Linear, could: Sequence[Sequence[Array]]) -> list[list[Run]]:
         """What the noise of every channel of every recording hangs on; ``could`` (n, k) by channel and recording: what
         could explain the residuals."""
         ...

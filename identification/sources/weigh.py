@@ -1,19 +1,22 @@
 """Recordings under a fit, as the evidence sees them: channels with their noise, and every hypothesis."""
 
+import functools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...models.model import Placed
 from ..deciding import DISCREPANCY, LAW_ERROR
+from ..evidence.arm import Weighed
+from ..evidence.beside import Beside
 from ..evidence.evidence import Channel, Evidence, Projected
 from ..evidence.hypotheses import pool
-from ..evidence.pool import Columns, Hypothesis, Item
+from ..evidence.pool import Columns, Item
 from ..evidence.search import Search
 from ..nuisance.curve import SMALL
-from ..nuisance.noise import Noise, Run, learn
+from ..nuisance.noise import Noise, learn
 from .fit import Covariances, fit, priors, shift_columns
 from .source import At, Linear, Source, Variant
 
@@ -23,39 +26,9 @@ STRONGEST = 10
 """Directions of what could explain a residual beside which its noise is learnt."""
 
 
-@dataclass(frozen=True)
-class Weighed:
-    """Evidence of some recordings under a fit, the hypotheses, the noise of every channel, and the fit."""
-
-    evidence: Evidence
-    pool: tuple[Hypothesis, ...]
-    noises: tuple[Noise, ...]
-    hangs: tuple[list[Run], ...]
-    """What the noise of every channel of every recording hangs on."""
-    shifts: slice
-    """Where the shifts stand among all that always stands beside."""
-
-    @property
-    def covariances(self) -> Covariances:
-        """Of every recording and channel."""
-        return [[channel.covariance for channel in row] for row in self.evidence.channels]
-
-    def weight(self, tolerance: float) -> Array:
-        """Factors on the prior deviations of what stands beside, for shifts that are known so exactly."""
-        weight = np.ones(self.evidence.n_always)
-        weight[self.shifts] = tolerance
-        return weight
-
-    def searched(
-        self, recordings: Sequence[int], tolerances: Sequence[float], barred: Sequence[int] = ()
-    ) -> tuple[Search, float]:
-        """A search with the shifts' tolerance that the evidence chooses, and that tolerance."""
-        made = [Search(Projected(self.evidence, recordings, self.weight(x)), self.pool, barred) for x in tolerances]
-        if len(made) == 1:
-            return made[0], tolerances[0]
-        values = [s.on.null + s.run((), exchange=False)[0] for s in made]
-        best = int(np.argmax(values))
-        return made[best], tolerances[best]
+def covariances(weighed: Weighed) -> Covariances:
+    """Of every recording and channel."""
+    return [[channel.covariance for channel in row] for row in weighed.evidence.channels]
 
 
 def weigh(
@@ -92,26 +65,22 @@ def weigh(
     curves = {k: x for k, x in source.curves(numbers).items() if search or k[1] in SMALL}
     sizes = {k: _rms_of_curve(x[: len(source.train)]) for k, x in curves.items()}
     small = {k: [x / sizes[k] for x in own] for k, own in curves.items() if k[1] in SMALL}
-    if known is None:
-        could = [
-            _strongest(
-                [
-                    np.concatenate(
-                        [x[:, c] * spread, columns.some(i, c, columns.of(i, c)[0])]
-                        + [own[i] for (at, _), own in small.items() if at == c],
-                        axis=1,
-                    )
-                    for i, x in enumerate(linear.columns)
-                ]
-            )
-            for c in range(len(scale))
-        ]
-        own = source.hangs(numbers, linear, could)
-        noises = tuple(
-            learn([r[:, c] for r in linear.residuals], could[c], [row[c] for row in own]) for c in range(len(scale))
-        )
-    else:
-        own, noises = known.hangs, known.noises
+    laws = [[columns.some(i, c, columns.of(i, c)[0]) for i in range(len(numbers))] for c in range(len(scale))]
+
+    def could(c: int, named: bool) -> list[Array]:
+        parts = []
+        for i, x in enumerate(linear.columns):
+            own = [x[:, c] * spread, *(curve[i] for (at, _), curve in small.items() if at == c)]
+            parts.append(np.concatenate([*own, laws[c][i]] if named else own, axis=1))
+        return _strongest(parts)
+
+    beside_laws = [could(c, True) for c in range(len(scale))] if known is None else []
+    runs = source.hangs(numbers, linear, beside_laws) if known is None else known.runs
+
+    def noise(c: int, beside: Sequence[Array]) -> Noise:
+        return learn([r[:, c] for r in linear.residuals], beside, [row[c] for row in runs])
+
+    noises = [noise(c, x) for c, x in enumerate(beside_laws)] if known is None else known.noises
     by_words = {}
     for (c, words), x in curves.items() if search else ():
         k = x[0].shape[1]
@@ -137,28 +106,30 @@ def weigh(
     channels = [
         [
             # The shifts' prior is about what the set-up is said to be, not about where they now are.
-            Channel(r[:, c] + x[:, c] @ known_shifts, noises[c].covariance(hangs[c]), *row[c])
+            Channel(r[:, c] + x[:, c] @ known_shifts, noises[c].covariance(row_of[c]), *row[c])
             for c in range(len(scale))
         ]
-        for r, x, hangs, row in zip(linear.residuals, linear.columns, own, beside, strict=True)
+        for r, x, row_of, row in zip(linear.residuals, linear.columns, runs, beside, strict=True)
     ]
     hypotheses = tuple(pool(named, by_words, ())) if named or by_words else ()
     items = [item for h in hypotheses for item in h.items]
     evidence = Evidence(channels, columns, items, total)
-    return Weighed(evidence, hypotheses, tuple(noises), tuple(own), placed)
+    tolerant = slice(placed.start, placed.stop if source.anew else placed.start)
+    others = Beside([], total, tolerant, [], (1.0,))
+    bare = functools.cache(lambda c: noise(c, could(c, False)))
+    return Weighed(evidence, hypotheses, tuple(noises), others, scale, len(source.train), runs, bare)
 
 
 def by_themselves(source: Source, given: At, linear: Linear, weighed: Weighed) -> dict[str, Variant]:
     """Every law without amplitudes fitted by itself from the best point of its grid: between two of them it explains
     much less."""
-    made, _ = weighed.searched(range(len(source.train)), source.tolerances[-1:])
-    found: dict[str, Variant] = {}
-    best, shifted = made.scan([]).item, shift_columns(linear)
+    on, found = Projected(weighed.evidence, range(len(source.train))), {}
+    best, shifted = Search(on, weighed.pool).scan([]).item, shift_columns(linear)
     for h, x in enumerate(weighed.pool):
         if x.named and x.items[0].whole:
             v: Variant = weighed.evidence.items[best[h]].label
             at = linear.at.with_effects([v.placed], v.values)
-            fitted = fit(source, given, at, weighed.covariances[: len(source.train)], shifted)
+            fitted = fit(source, given, at, covariances(weighed)[: len(source.train)], shifted)
             found[x.key] = replace(v, values={k: fitted.at.all_values[k] for k in v.values})
     return found
 
@@ -234,7 +205,7 @@ def _wrong(source: Source, linear: Linear, c: int) -> float:
     """How large the small curves are beside every explanation [share of the channel]: no law of the model is exact."""
     n = len(linear.at.values)
     laws = [x[:, c, :n] @ linear.at.values for x in linear.columns[: len(source.train)]]
-    share = float(np.sqrt(np.mean(np.concatenate(laws) ** 2))) / source.scale()[c]
+    share = float(np.sqrt(np.mean(np.concatenate([x - x.mean() for x in laws]) ** 2))) / source.scale()[c]
     return float(np.hypot(DISCREPANCY, LAW_ERROR * share))
 
 
