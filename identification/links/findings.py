@@ -1,6 +1,7 @@
 """Encoders in words and numbers: what is named, what is left without a name, noise, traces, notes."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -44,8 +45,12 @@ def _finding(one: Compared, n: Name, values: dict[str, Estimate]) -> Finding:
     without, within = (float(rms(x)[c]) for x in (one.decided.best.missed[p.key].held, one.decided.best.held))
     text = f"{p.effect.sentence[:1].upper()}{p.effect.sentence[1:]}: "
     if links.still(p):
-        (estimate,) = values.values()
-        zeros = links.zeros(one.decided.best.held.at)[list(links.held), c]
+        ((name, estimate),) = values.items()
+        zeros, own = (links.zeros(x.at)[list(y), c] for x, y in ((one.decided.best.held, links.held),
+                                                                 (one.decided.best.train, links.train)))  # fmt: skip
+        # The recordings' own zeros tell it as far as they agree.
+        spread = max(float(np.std(own, ddof=min(1, len(own) - 1))), float(rms(one.decided.best.train)[c]))
+        values = {name: replace(estimate, std=spread / np.sqrt(len(own)))}
         without, within = (float(np.sqrt(within**2 + np.mean((zeros + x) ** 2))) for x in (estimate.value, 0.0))
         text += (
             f"in every recording the link encoder's zero stands off the motor's by the same "

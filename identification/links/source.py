@@ -115,11 +115,17 @@ class Links:
         return found.reshape(*here.shape, -1)
 
     def settled(self, at: At, numbers: Sequence[int]) -> At:
-        """With the zeros of some recordings as they are there."""
-        zeros = at.shifts.reshape(len(self.rows), -1).copy()
+        """With the zeros of some recordings as they are there; what all training recordings share is a bias's."""
+        zeros, values = at.shifts.reshape(len(self.rows), -1).copy(), at.values.copy()
         for i in numbers:
             zeros[i] += np.mean(self._measured[i] - self.predicted(i, at), axis=0) / self._zero
-        return At(at.placed, at.fixed, at.values, zeros.ravel())
+        for k, (p, _) in enumerate(at.free):
+            if self.still(p) and set(self.train) <= set(numbers):
+                c = self.channel(p)
+                shared = float(np.mean(zeros[list(self.train), c]))
+                values[k] += shared * self._zero[c]
+                zeros[list(numbers), c] -= shared
+        return At(at.placed, at.fixed, values, zeros.ravel())
 
     def scale(self) -> Array:
         return self._scale

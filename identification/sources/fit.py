@@ -139,7 +139,8 @@ def fit(
             break
         if np.all(np.abs(share * move) < STILL * size) or gained < STILL:
             break
-    return here
+    settled = source.settled(here.at, numbers)
+    return here if settled is here.at else linearised(source, numbers, settled, shifted)
 
 
 def normal(here: Linear, covariances: Covariances, prior: tuple[Array, Array]) -> tuple[Array, Array]:

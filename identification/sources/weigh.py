@@ -78,7 +78,8 @@ def weigh(
     runs = source.hangs(numbers, linear, beside_laws) if known is None else known.runs
 
     def noise(c: int, beside: Sequence[Array]) -> Noise:
-        return learn([r[:, c] for r in linear.residuals], beside, [row[c] for row in runs])
+        n = len(source.train)
+        return learn([r[:, c] for r in linear.residuals[:n]], beside[:n], [row[c] for row in runs[:n]])
 
     noises = [noise(c, x) for c, x in enumerate(beside_laws)] if known is None else known.noises
     by_words = {}
@@ -163,7 +164,7 @@ def _item(source: Source, numbers: Sequence[int], at: At, columns: Columns, v: V
 
 
 def _fitted(source: Source, numbers: Sequence[int], at: At, columns: Columns, v: Variant) -> Item | None:
-    """A law where it was fitted by itself, and what each parameter's own size more would add."""
+    """A law where it was fitted by itself, and what each parameter's own size more would add: no more than the law."""
     there = at.with_effects([v.placed], v.values)
     parts, n = [], len(at.values)
     for i in numbers:
@@ -172,11 +173,11 @@ def _fitted(source: Source, numbers: Sequence[int], at: At, columns: Columns, v:
             return None
         slopes = source.slopes(i, there, here)[:, :, n:] * there.values[n:]
         parts.append(np.concatenate([source.columns(i, at, v), slopes], axis=2))
-    size = _size(source, parts)[0]
-    if not np.isfinite(size) or size <= 0:
+    size = _size(source, parts)
+    if not np.all(np.isfinite(size)) or size[0] <= 0:
         return None
     index = _added(columns, parts)
-    return Item(index, np.full(len(index), 1 / size), np.arange(len(index)) == 0, label=v)
+    return Item(index, 1 / np.maximum(size, size[0]), np.arange(len(index)) == 0, label=v)
 
 
 def _size(source: Source, parts: Sequence[Array]) -> Array:
