@@ -113,6 +113,11 @@ class Covariance:
         return rows
 
     @property
+    def variance(self) -> Array:
+        """Of what is independent from sample to sample (n,)."""
+        return self._variance
+
+    @property
     def log_det(self) -> float:
         """Log determinant of K."""
         return self._log_det

@@ -200,7 +200,7 @@ def found(monkeypatch, right, share, rivals) -> Finding:
     final = fit([1, 2, 3], std=[0.1, 0.2, 0.3], at_bound=np.array([True, False, True]),
                 assembly={"slots": slots, "index_of": lambda p: [1, 2]})  # fmt: skip
     own = name(COULOMB, share, rivals=rivals, channels=(2, 0))
-    told = decided(names=[own], missed={COULOMB.key: Missed(5.0, 2.0, 0.08, (0.02, 0.08), cast(Any, None))})
+    told = decided(names=[own], missed={COULOMB.key: Missed(5.0, 2.0, 0.08, (0.02, 0.08), 0.9375, cast(Any, None))})
     return answer._finding(own, told, final, ["tau.a", "tau.b", "tau.c"])
 
 
