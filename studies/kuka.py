@@ -82,8 +82,8 @@ def compare(answer: Answer, recordings: list[Path], holdout: Path) -> tuple[list
     train = load_experiments(model, recordings, body)
     band, sizes = train[0].motion.band, scales(train)
     assembly = Assembly(model.tree, (), None, sizes, model.values)
-    sides = [load_links(model, paths, body, band)[1] for paths in (recordings, [holdout])]
-    every = [links_of([axis], model, *sides, assembly, assembly.start, sizes) for axis in AXES]
+    one, other = (load_links(model, paths, body, band)[1] for paths in (recordings, [holdout]))
+    every = [links_of([axis], model, one, other, assembly, assembly.start, sizes) for axis in AXES]
     again = diagnose_links(model, recordings, holdout, body, assembly, assembly.start, sizes, band)
     named = [f"{e.name} at {e.at}" for e in found.effects]
     quantities = [

@@ -81,7 +81,7 @@ def _told(fits: Sequence[ChannelFit]) -> list[float]:
 
 def _fits(one: Compared) -> tuple[ChannelFit, ...]:
     links, every = one.links, range(len(one.links.joints))
-    sizes = [_readings(links, numbers) for numbers in (links.train, links.held)]
+    sizes = _readings(links, links.train), _readings(links, links.held)
     units, floors = [unit_of(links, c) for c in every], [noise_floor(links, c) for c in every]
     return channel_fits(one.decided, links.channels, units, *sizes, floors)
 

@@ -242,7 +242,7 @@ def links_of(
     for e in (*train, *held):
         load = assembly.evaluate(e, theta).load
         rows.append([Run(e.motion, n, load[:, n], e.mass_matrix[:, n, n]) for n in at])
-    kinds = [model.tree.joints[n].kind for n in at]
+    kinds: list[JointKind] = [model.tree.joints[n].kind for n in at]
     return Links(joints, kinds, [scales[j] for j in joints], rows, len(train))
 
 

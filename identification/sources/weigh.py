@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ...models.model import Placed
 from ..deciding import DISCREPANCY, LAW_ERROR
-from ..evidence.arm import Weighed
+from ..evidence.arm import Weighed, principal
 from ..evidence.beside import Beside
 from ..evidence.evidence import Channel, Evidence, Projected
 from ..evidence.hypotheses import pool
@@ -72,7 +72,7 @@ def weigh(
         for i, x in enumerate(linear.columns):
             own = [x[:, c] * spread, *(curve[i] for (at, _), curve in small.items() if at == c)]
             parts.append(np.concatenate([*own, laws[c][i]] if named else own, axis=1))
-        return _strongest(parts)
+        return principal(parts, STRONGEST)
 
     beside_laws = [could(c, True) for c in range(len(scale))] if known is None else []
     runs = source.hangs(numbers, linear, beside_laws) if known is None else known.runs
@@ -208,13 +208,3 @@ def _wrong(source: Source, linear: Linear, c: int) -> float:
     laws = [x[:, c, :n] @ linear.at.values for x in linear.columns[: len(source.train)]]
     share = float(np.sqrt(np.mean(np.concatenate([x - x.mean() for x in laws]) ** 2))) / source.scale()[c]
     return float(np.hypot(DISCREPANCY, LAW_ERROR * share))
-
-
-def _strongest(parts: Sequence[Array]) -> list[Array]:
-    """The strongest directions of columns of unit RMS, of unit RMS themselves."""
-    whole = np.concatenate(list(parts))
-    size = np.sqrt(np.mean(whole**2, axis=0))
-    use = size > 1e-9 * size.max(initial=1e-300)
-    u, d, _ = np.linalg.svd(whole[:, use] / size[use], full_matrices=False)
-    kept = u[:, (np.arange(len(d)) < STRONGEST) & (d > 1e-3 * d.max(initial=0.0))] * np.sqrt(len(u))
-    return np.split(kept, np.cumsum([len(p) for p in parts])[:-1])

@@ -46,8 +46,8 @@ def found(runs):
     fitted = fit(assemble(model, base_parameters(body), sizes), train)
     one = diagnose_links(model, runs[:2], runs[2], body, fitted.assembly, fitted.theta, sizes, band)
     assert one is not None
-    sides = [load_links(model, paths, body, band)[1] for paths in (runs[:2], runs[2:])]
-    every = [links_of([j], model, *sides, fitted.assembly, fitted.theta, sizes) for j in one.links.joints]
+    own, there = (load_links(model, paths, body, band)[1] for paths in (runs[:2], runs[2:]))
+    every = [links_of([j], model, own, there, fitted.assembly, fitted.theta, sizes) for j in one.links.joints]
     return one, every, train, load_experiments(model, runs[2:], body, band)
 
 

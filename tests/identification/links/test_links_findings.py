@@ -184,11 +184,14 @@ def test_notes_tell_every_zero_what_was_not_named_and_what_has_no_name():
     given = replace(given, links=cast(Any, one))
     one.train, one.held = range(2), range(2, 3)
     notes = findings.notes_of(given)
-    words = "on q_link.joint1, a smooth curve over position still explains 25 % of what is left between the encoders (2 mrad)"
+    words = (
+        "on q_link.joint1, a smooth curve over position still explains 25 % of what is left between the encoders "
+        "(2 mrad)"
+    )
     assert notes == [
         "zero of q_link.joint1 against q.joint1, one recording after another: 1, -2.5, 4 mrad",
-        "sensor_gain at q_link.joint1 raised the evidence of the training recordings, and the held-out ones do not miss "
-        "it: not named",
+        "sensor_gain at q_link.joint1 raised the evidence of the training recordings, and the held-out ones do not "
+        "miss it: not named",
         f"without a name: {words}",
     ]
     assert findings.nameless(given) == words
