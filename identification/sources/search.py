@@ -4,9 +4,10 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...models.model import Placed
-from ..deciding import ROUNDS
+from ..deciding import LAW_ERROR, ROUNDS
 from ..evidence.arm import Weighed
 from ..evidence.members import Members, log_bayes
 from ..evidence.rounds import as_names, share_of_residual
@@ -16,6 +17,8 @@ from ..nuisance.noise import Noise
 from .fit import fit, linearised, shift_columns
 from .source import At, Linear, Source, Variant
 from .weigh import by_themselves, covariances, weigh
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -77,7 +80,8 @@ def search(
         weighed = opened(source, train, given, here)
         weighed, made, slots, _ = searched(weighed, range(len(train)), barred, range(len(weighed.noises)))
         trials = trials or _trials(made)
-        slots = as_names(made, slots)
+        error = LAW_ERROR**2 * _taken_out(first, here, weighed)
+        slots = [s for s in as_names(made, slots) if _large(made, s, error)]
         chosen = _chosen(made, slots)
         if not chosen:
             break
@@ -95,6 +99,16 @@ def search(
     return Found(tuple(names), first, here, weighed, trials)
 
 
+def _taken_out(first: Linear, here: Linear, weighed: Weighed) -> Array:
+    """Log-likelihood that the names so far took out of each channel (c,): a law that is wrong by a share of itself
+    leaves the square of that share of it."""
+    taken = np.zeros(len(weighed.noises))
+    for before, now, row in zip(first.residuals, here.residuals, covariances(weighed), strict=True):
+        for c, k in enumerate(row):
+            taken[c] += 0.5 * float(before[:, c] @ k.solve(before[:, c]) - now[:, c] @ k.solve(now[:, c]))
+    return np.maximum(taken, 0.0)
+
+
 def opened(source: Source, numbers: Sequence[int], given: At, here: Linear, known: Weighed | None = None) -> Weighed:
     """Recordings under a fit with every hypothesis; laws without amplitudes fitted by themselves."""
     weighed = weigh(source, numbers, given, here, known, search=True)
@@ -104,6 +118,12 @@ def opened(source: Source, numbers: Sequence[int], given: At, here: Linear, know
     train = Linear(here.at, here.residuals[:n], here.columns[:n])
     own = by_themselves(source, given, train, weighed)
     return weigh(source, numbers, given, here, known or weighed, search=True, alone=own)
+
+
+def _large(made: Search, slot: Slot, error: Array) -> bool:
+    """Does a name add more than the error of the laws that are there?"""
+    reached = made.on.evidence.reached(made.on.evidence.items[slot.taken.item])
+    return not made.pool[slot.taken.hypothesis].named or slot.gain >= float(np.sum(error[reached]))
 
 
 def _chosen(made: Search, slots: Sequence[Slot]) -> list[tuple[Slot, Sequence[Slot]]]:
