@@ -22,6 +22,9 @@ from .pool import Columns, Hypothesis, Item
 Array = NDArray[np.float64]
 Index = NDArray[np.int_]
 
+AT_ONCE = 512
+"""Columns that are divided by a covariance side by side."""
+
 
 @dataclass(frozen=True)
 class Channel:
@@ -85,11 +88,20 @@ class Evidence:
         solved = own.covariance.solve(both)
         gram = both.T @ solved
         m = len(self.numbers[c])
-        beside, score, products = np.zeros((len(own.index), m)), np.zeros(m), np.zeros((m, m))
+        first, products = np.zeros((1 + len(own.index), m)), np.zeros((m, m))
         if pool.size:
-            first = solved.T @ pool
-            beside, score, products = first[1:], first[0], pool.T @ own.covariance.solve(pool)
-        return Products(gram[1:, 1:], gram[1:, 0], own.covariance.log_det, float(gram[0, 0]), beside, score, products)
+            # Some columns at a time: divided all at once, they would take several times the memory of all of them.
+            for some in (slice(k, k + AT_ONCE) for k in range(0, m, AT_ONCE)):
+                columns = np.asarray(pool[:, some], float)
+                first[:, some] = solved.T @ columns
+                divided = own.covariance.solve(columns)
+                for part in (slice(k, k + AT_ONCE) for k in range(0, some.start + 1, AT_ONCE)):
+                    block = np.asarray(pool[:, part], float).T @ divided
+                    products[part, some] = block
+                    products[some, part] = block.T
+        return Products(
+            gram[1:, 1:], gram[1:, 0], own.covariance.log_det, float(gram[0, 0]), first[1:], first[0], products
+        )
 
     def with_covariances(self, c: int, covariances: Sequence[Covariance]) -> "Evidence":
         """The same with other covariances of one channel, one a recording."""
