@@ -134,7 +134,7 @@ def _finding(n: Name, decided: Decided, final: Fit, every: Sequence[str]) -> Fin
     missed = decided.best.missed[placed.key]
     # The posterior is shared among those that cannot be told apart; how often such a name is right was counted.
     whole = n.share + sum(r.probability for r in n.rivals if not r.separable)
-    right = of_name(n.gain, missed.sure)
+    right = of_name(n.gain, missed.sure, missed.explained)
     scale = right / max(whole, 1e-12)
     rivals = tuple(
         Rival(
@@ -147,7 +147,17 @@ def _finding(n: Name, decided: Decided, final: Fit, every: Sequence[str]) -> Fin
         for r in n.rivals
     )
     sentence = evidence_sentence(placed, [every[c] for c in n.channels], *missed.trial)
-    return Finding(placed.effect.name, placed.at, missed.sure, n.share * scale, parameters, sentence, rivals, n.gain)
+    return Finding(
+        placed.effect.name,
+        placed.at,
+        missed.sure,
+        n.share * scale,
+        parameters,
+        sentence,
+        rivals,
+        n.gain,
+        missed.explained,
+    )
 
 
 def _limits(decided: Decided, final: Fit) -> tuple[Limit, ...]:

@@ -12,7 +12,7 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag, cho_factor, cho_solve, cholesky
+from scipy.linalg import cho_factor, cho_solve, cholesky, eigh
 
 from ..models.effects._direction import TRANSITION
 from ..models.empirical import NAME, placed_tables, tables_of
@@ -26,6 +26,7 @@ from .fitting.assembly import Assembly
 from .fitting.experiment import Experiment
 from .fitting.fit import Fit, fit
 from .fitting.problem import gather
+from .fitting.schur import schur
 from .search.refit import carry
 from .search.rest import fitted
 
@@ -115,9 +116,9 @@ def _tables(
             ]
             gram: Array = np.sum([x.T @ k.solve(x) for x, k in zip(own, covariances, strict=False)], axis=0)
             before = gram.shape[0] - 1 - root.shape[0]
-            for s in DEVIATIONS:
-                turn = np.asarray(block_diag(np.eye(before), size * s * root), float)
-                value = _evidence(turn.T @ gram[:-1, :-1] @ turn, turn.T @ gram[:-1, -1], free)
+            gram[np.arange(free, before), np.arange(free, before)] += 1.0  # tables chosen before have their prior
+            curvature, score = schur(gram[:-1, :-1], gram[:-1, -1], before)
+            for s, value in zip(DEVIATIONS, _evidence(root.T @ curvature @ root, root.T @ score, size), strict=True):
                 if best is None or value > best[0]:
                     best = value, _Chosen(table, [x @ (size * s * root) for x in raw], size * s * root)
         if best is not None and best[1].table.words not in [o.table.words for o in chosen]:
@@ -126,8 +127,9 @@ def _tables(
     solved = [k.solve(x) for x, k in zip(own, covariances, strict=False)]
     matrix: Array = np.sum([a.T @ b for a, b in zip(own, solved, strict=True)], axis=0)
     score: Array = np.sum([b.T @ r for b, r in zip(solved, residuals, strict=True)], axis=0)
-    factorised = cho_factor(_with_prior(matrix, free))
-    amplitudes, spread = cho_solve(factorised, score)[free:], cho_solve(factorised, np.eye(len(score)))[free:, free:]
+    curvature, left = schur(matrix, score, free)
+    factorised = cho_factor(curvature + np.eye(len(left)), lower=True)
+    amplitudes, spread = cho_solve(factorised, left), cho_solve(factorised, np.eye(len(left)))
     values: dict[str, float] = {}
     at_column = 0
     for o in chosen:
@@ -147,19 +149,12 @@ def _kernel(shape: Sequence[int], length: float) -> Array:
     return np.exp(-0.5 * apart / length**2) + _NUGGET * np.eye(len(at))
 
 
-def _with_prior(matrix: Array, free: int) -> Array:
-    """Unit prior of what is no parameter of the model; those are held by their own size alone, to be solvable."""
-    loaded = matrix + np.eye(len(matrix))
-    own = np.arange(free)
-    loaded[own, own] += 1e-9 * np.abs(matrix[own, own]) - 1
-    loaded[own, own] += np.where(np.abs(matrix[own, own]) > 0, 0.0, 1.0)
-    return loaded
-
-
-def _evidence(matrix: Array, score: Array, free: int) -> float:
-    """Log evidence but for what all have in common."""
-    low = cholesky(_with_prior(matrix, free), lower=True)
-    return 0.5 * float(score @ cho_solve((low, True), score)) - float(np.sum(np.log(np.diag(low))))
+def _evidence(matrix: Array, score: Array, size: float) -> Array:
+    """Log evidence of each of DEVIATIONS, but for what all have in common, of values of unit prior in units of it."""
+    curvature, turn = eigh(matrix)
+    own = (size * np.array(DEVIATIONS))[:, None] ** 2
+    spread = 1 + own * np.maximum(curvature, 0.0)
+    return np.sum(0.5 * own * (turn.T @ score) ** 2 / spread - 0.5 * np.log(spread), axis=1)
 
 
 def coordinates(assembly: Assembly, e: Experiment, load: Array, c: int, over: Sequence[str]) -> list[Array]:
