@@ -21,6 +21,9 @@ from .pool import Columns, Hypothesis, Item
 Array = NDArray[np.float64]
 Index = NDArray[np.int_]
 
+AT_ONCE = 512
+"""Columns that are worked on side by side: all at once, they would take several times the memory of all of them."""
+
 
 @dataclass(frozen=True)
 class Channel:
@@ -107,14 +110,16 @@ class Evidence:
 
     def _products(self, i: int, c: int) -> Products:
         own, pool = self.channels[i][c], self._pools[i][c]
-        always, columns = np.column_stack([own.residual, own.columns]), np.zeros((len(own.residual), 0))
+        always, columns = np.column_stack([own.residual, own.columns]), np.zeros(pool.shape, order="F")
+        beside = np.zeros((always.shape[1], columns.shape[1]))
         if pool.size:
-            white = own.covariance.white(np.column_stack([always, pool]))
-            always, columns = np.split(white, [always.shape[1]], axis=1)
+            always = own.covariance.white(always)
             gram = always.T @ always
+            for some in (slice(k, k + AT_ONCE) for k in range(0, pool.shape[1], AT_ONCE)):
+                columns[:, some] = own.covariance.white(pool[:, some].astype(float))
+                beside[:, some] = always.T @ columns[:, some]
         else:  # few columns are divided sooner than made white
             gram = always.T @ own.covariance.solve(always)
-        beside = always.T @ columns
         return Products(
             gram[1:, 1:], gram[1:, 0], own.covariance.log_det, float(gram[0, 0]), beside[1:], beside[0], columns
         )
@@ -126,8 +131,11 @@ class Evidence:
             for group in self.alike:
                 at = self.where[c][group.index]
                 rows = np.flatnonzero(at[:, 0] >= 0)
-                each = white.T[at[rows]]
-                found.append((rows, each @ each.transpose(0, 2, 1)))
+                products, step = np.zeros((len(rows), *at.shape[1:] * 2)), max(1, AT_ONCE // at.shape[1])
+                for some in (slice(k, k + step) for k in range(0, len(rows), step)):
+                    each = white.T[at[rows[some]]]
+                    products[some] = each @ each.transpose(0, 2, 1)
+                found.append((rows, products))
             self._own[i, c] = found
         return self._own[i, c]
 
