@@ -14,11 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, cholesky, eigh
 
-from ..models.effects._direction import TRANSITION
-from ..models.empirical import NAME, placed_tables, tables_of
+from ..models.empirical import NAME, placed_tables, read_along, tables_of
 from ..models.floating.tree import n_carriers
 from ..models.model import Placed
-from ..models.table import MOST, OTHERS, Table, read_words
+from ..models.table import MOST, Table, read_words
 from .deciding import GATE
 from .evidence.confirm import blocks, scatter
 from .evidence.diagnose import Decided
@@ -96,8 +95,8 @@ def _tables(
     chosen: list[_Chosen] = []
     loads = [assembly.evaluate(e, final.theta).load for e in train]
     for over, times in wanted:
-        signals = [coordinates(assembly, e, load, c, over) for e, load in zip(train, loads, strict=True)]
-        factors = [factor(assembly, e, load, c, times) for e, load in zip(train, loads, strict=True)]
+        read = [_read(assembly, e, load, c, over, times) for e, load in zip(train, loads, strict=True)]
+        signals, factors = [x[:-1] for x in read], [x[-1] for x in read]
         best: tuple[float, _Chosen] | None = None
         for length in LENGTHS:
             steps = int(np.ceil(2 / length)) + 1
@@ -157,34 +156,18 @@ def _evidence(matrix: Array, score: Array, size: float) -> Array:
     return np.sum(0.5 * own * (turn.T @ score) ** 2 / spread - 0.5 * np.log(spread), axis=1)
 
 
-def coordinates(assembly: Assembly, e: Experiment, load: Array, c: int, over: Sequence[str]) -> list[Array]:
-    """Coordinates of a table at a joint along a recording, each (n,)."""
+def _read(assembly: Assembly, e: Experiment, load: Array, c: int, over: tuple[str, ...], times: str) -> list[Array]:
+    """Coordinates of a table at a joint along a recording, each (n,), and last its factor, as the law reads them."""
     m, names = e.motion, [j.name for j in assembly.tree.joints]
-    found = []
-    for name in over:
-        other = next((start for start in OTHERS if name.startswith(start)), None)
-        if other is not None:
-            found.append((m.q if other == OTHERS[0] else m.qd)[:, names.index(name.removeprefix(other))])
-        elif name == "distance travelled":
-            steps = np.abs(m.qd[:, c]) * m.period
-            found.append(np.concatenate([np.cumsum(steps[s]) - 0.5 * (steps[s][0] + steps[s]) for s in m.segments]))
-        else:
-            own = {"position": m.q[:, c], "speed": np.abs(m.qd[:, c]), "load": load[:, c], "time": e.elapsed}
-            found.append(own[name])
-    return found
-
-
-def factor(assembly: Assembly, e: Experiment, load: Array, c: int, times: str) -> Array:
-    """What a table's value is multiplied by along a recording (n,)."""
-    at, speed = assembly.tree.joints[c].name, e.motion.qd[:, c]
-    peak = assembly.values(assembly.start)[f"speed_scale.{at}"]
-    if not times:
-        return np.ones(len(speed))
-    if times == "speed":
-        return speed / peak
-    drives = load[:, c] * speed > 0
-    part = {"direction": np.ones(len(speed)), "driving": drives, "braking": ~drives}[times]
-    return np.tanh(speed / (TRANSITION * peak)) * part
+    steps = np.abs(m.qd[:, c]) * m.period
+    signals = {"q": m.q[:, c], "qd": m.qd[:, c], "load": load[:, c], "time": e.elapsed}
+    signals["travelled"] = np.concatenate([np.cumsum(steps[s]) - 0.5 * (steps[s][0] + steps[s]) for s in m.segments])
+    signals["speed_scale"] = np.full(len(steps), assembly.values(assembly.start)[f"speed_scale.{names[c]}"])
+    for k, joint in enumerate(Table(over, times, ()).others, 1):
+        i = names.index(joint)
+        signals |= {f"q_of_{k}": m.q[:, i], f"qd_of_{k}": m.qd[:, i]}
+    found = read_along(over, times).call({name: x[None, :] for name, x in signals.items()})
+    return [np.asarray(x, float).ravel() for x in (*(found[f"x{k}"] for k in range(len(over))), found["factor"])]
 
 
 def _refitted(final: Fit, placed: Placed, values: Mapping[str, float], train: Sequence[Experiment]) -> Fit:
@@ -216,7 +199,8 @@ def beyond(assembly: Assembly, e: Experiment, theta: Array) -> list[str]:
         for t in tables_of(p.effect):
             c = assembly.joint_of(p)
             load = assembly.evaluate(e, theta).load
-            for name, x, knots in zip(t.over, coordinates(assembly, e, load, c, t.over), t.knots, strict=True):
+            read = _read(assembly, e, load, c, t.over, t.times)[:-1]
+            for name, x, knots in zip(t.over, read, t.knots, strict=True):
                 out = float(np.mean((x < knots[0]) | (x > knots[-1])))
                 if out > 0:
                     said.append(

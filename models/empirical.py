@@ -5,6 +5,7 @@ It is no file of the vocabulary, which lists laws that can be looked for: tables
 its parameters, at a joint. Several tables at one joint add up.
 """
 
+import functools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -50,6 +51,11 @@ class TableLaw:
                 value = ca.dot(parts[0], ca.reshape(values, t.shape[1], t.shape[0]).T @ parts[1])
             total += value * _factor(s, t.times)
         return total
+
+    def read(self, s: Symbols) -> list[ca.SX]:
+        """Coordinates of the one table, and the factor of its value."""
+        (t,) = self.tables
+        return [*(self._coordinate(s, name) for name in t.over), _factor(s, t.times)]
 
     def held(self, s: Symbols) -> ca.SX:
         """1 where a coordinate lies outside its knots, so that a table is held at its end; 0 inside."""
@@ -107,6 +113,19 @@ def empirical_effect(tables: Iterable[Table]) -> Effect:
         others=others,
         experiment="move {at} through the whole range of its coordinates, once more and in another order",
     )
+
+
+_SIGNALS = ("q", "qd", "load", "time", "travelled", "speed_scale")
+
+
+@functools.cache
+def read_along(over: tuple[str, ...], times: str) -> ca.Function:
+    """Coordinates and factor of a table as its law reads them: of ``q qd load time travelled speed_scale`` and, for
+    each other joint, ``q_of_1 qd_of_1`` and so on; all in rows of samples."""
+    law = TableLaw((Table(over, times, ((0.0,),) * len(over)),), Table(over, times, ()).others)
+    names = [*_SIGNALS, *(f"{x}_of_{k}" for k in range(1, len(law.others) + 1) for x in ("q", "qd"))]
+    s = {name: ca.SX.sym(name) for name in names}
+    return ca.Function("read", list(s.values()), law.read(s), names, [*(f"x{k}" for k in range(len(over))), "factor"])
 
 
 def placed_tables(at: str, tables: Sequence[Table]) -> Placed:

@@ -30,6 +30,9 @@ from .experiment import Experiment, Scales
 
 Array = NDArray[np.float64]
 
+KEPT = 3
+"""Evaluations that stay with a recording: of the model as given, of the last fit, and of a trial beside them."""
+
 
 @dataclass(frozen=True)
 class Slot:
@@ -232,7 +235,18 @@ class Assembly:
         return experiment.measured - experiment.all_to_band(state.tau), banded
 
     def evaluate(self, experiment: Experiment, theta: Array) -> Evaluation:
-        """Rigid-body torque, readings and derivative blocks at full rate."""
+        """Rigid-body torque, readings and derivative blocks at full rate; the last few are kept with the recording."""
+        kept: list[tuple[Assembly, bytes, Evaluation]] = experiment.store.setdefault("evaluated", [])
+        key = theta.tobytes() + self.phi.tobytes()
+        for other, at, found in kept:
+            if other is self and at == key:
+                return found
+        found = self._evaluate(experiment, theta)
+        kept.append((self, key, found))
+        del kept[:-KEPT]
+        return found
+
+    def _evaluate(self, experiment: Experiment, theta: Array) -> Evaluation:
         load, rigid = self._rigid(experiment, theta)
         tau, blocks = load.copy("F"), list(rigid)
         passed: dict[int, list[Callable[[Array], Array]]] = {}
@@ -273,7 +287,10 @@ class Assembly:
         n_joints = len(self._joints)
         if self.base is not None:
             n_base = len(self.base.names)
-            columns = experiment.regressor[:, :, self.base.columns]
+            key = ("base", self.base.columns.tobytes())
+            if key not in experiment.store:
+                experiment.store[key] = experiment.regressor[:, :, self.base.columns]
+            columns = experiment.store[key]
             blocks = [Block(c, np.arange(n_base), columns[:, c], ("base", c)) for c in range(n_joints)]
             return columns @ theta[:n_base] - experiment.carried, blocks
         key = ("rigid", self.phi.tobytes())
