@@ -31,8 +31,8 @@ class Apart:
 
     ``what`` and ``at`` say it; ``columns`` (n, J, k) are torques, of amplitudes whose standard deviation is ``width``;
     ``words`` puts a recording's amplitudes (k,), in units of ``width``, into numbers with their unit. Of what all
-    recordings may share, ``own`` (k,) takes the amplitudes from a fit, and the first recording has no others; None where
-    there is nothing of the kind.
+    recordings may share, ``own`` (k,) takes the amplitudes from a fit, and the first recording has no others; None
+    where there is nothing of the kind.
     """
 
     what: str

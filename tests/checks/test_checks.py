@@ -52,6 +52,23 @@ def test_a_mistake_is_named_placed_and_mended(tmp_path, mistake):
     assert checked(tmp_path, paths) == ()
 
 
+@pytest.mark.parametrize(
+    ("mistake", "odd", "low", "high"), [(bank.zero_moved, 1, 0.2, 0.4), (bank.gain_changed, 2, 1.6, 2.4)]
+)
+def test_of_recordings_that_differ_it_is_said_in_what_which_and_by_how_much(tmp_path, mistake, odd, low, high):
+    made = bank.machine(7)
+    runs, _, places = mistake(made, 7)
+    paths = written(tmp_path, made, runs)
+    (found,) = checked(tmp_path, paths)
+    assert found.name == "mixed"
+    assert {found.at} == places
+    assert f"run{odd}.csv is the one that differs" in found.message
+    values = [float(found.message.partition(f" in run{k}.csv")[0].split()[-1 - (odd == 1)]) for k in range(3)]
+    assert low < values[odd] - (0 if odd == 2 else min(values)) < high
+    assert all(abs(values[k] - (odd == 2)) < 0.2 for k in range(3) if k != odd)
+    assert checked(tmp_path, [path for k, path in enumerate(paths) if k != odd]) == ()
+
+
 def test_all_channels_of_one_mistake_are_told(tmp_path):
     made = bank.machine(7)
     runs, _, places = bank.newton_centimetres(made, 7)

@@ -1,4 +1,4 @@
-"""The bank: 190 recordings with a mistake each in at least 9 of 10, named, placed and mended; 60 sound ones without any."""
+"""The bank: 190 recordings with a mistake each, named, placed and mended in 9 of 10; 60 sound ones without any."""
 
 import faulty_recordings as bank
 import numpy as np

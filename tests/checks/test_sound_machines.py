@@ -11,8 +11,8 @@ from snarelab.studies import cart, tx40
 STUDIES = Path(cart.__file__).parent
 ROOT = Path(__file__).resolve().parents[2]
 
-CURRENTS = "shoulder_pan shoulder_lift elbow_flex wrist_flex wrist_roll gripper".split()
-MOTIONS = "backlash_detection chirp_sweep friction_gravity large_amplitude multisine random_waypoints".split()
+CURRENTS = ["shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper"]
+MOTIONS = ["backlash_detection", "chirp_sweep", "friction_gravity", "large_amplitude", "multisine", "random_waypoints"]
 
 
 def recordings(name):
@@ -51,7 +51,9 @@ def test_a_robot_with_a_coupled_wrist(part):
     assert faults(STUDIES / "tx40" / "tx40.toml", [f"{recordings('tx40') / 'pos_read_data.csv'}@{part}"]) == []
 
 
-@pytest.mark.parametrize("motion", MOTIONS)
+@pytest.mark.parametrize(
+    "motion", [x if x == "friction_gravity" else pytest.param(x, marks=pytest.mark.slow) for x in MOTIONS]
+)
 def test_a_hobby_arm_whose_currents_have_no_known_unit(tmp_path, motion):
     """Lists in cells, stamps in microseconds, currents with a constant that nobody states."""
     place = recordings("so101")
