@@ -31,3 +31,15 @@ html_copy_source = False
 html_show_sphinx = False
 templates_path: list[str] = []
 html_theme_options = {"navigation_with_keys": True}
+
+
+def levelled(app, page, template, context, doctree):  # noqa: ANN001
+    """Captions of the menu are headings; a screen reader wants to hear of which level."""
+    for part in ("body", "furo_navigation_tree", "toctree"):
+        if isinstance(context.get(part), str):
+            context[part] = context[part].replace('role="heading">', 'role="heading" aria-level="2">')
+
+
+def setup(app):  # noqa: ANN001
+    """After the theme has made its menu."""
+    app.connect("html-page-context", levelled, priority=900)
