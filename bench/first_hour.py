@@ -7,6 +7,7 @@ without the repository and without its constraints; then the README's model file
 recordings under names of their own; then ``snarelab diagnose``. ``--demo`` times ``make demo`` in a fresh copy of the
 repository, twice: the second has a warm cache. ``--run`` is what starts a container, where ``podman run --rm`` will
 not do (``--run "docker run --rm"``).
+Beside the seconds stand those of the processor, which a busy machine does not stretch.
 Exit status 1 where a limit is passed or the verdict is not ``missing_physics``.
 """
 
@@ -14,6 +15,7 @@ import argparse
 import json
 import os
 import re
+import resource
 import shlex
 import shutil
 import subprocess
@@ -39,6 +41,7 @@ du -s --apparent-size --block-size=1 "$PLACE/v" | sed 's/^/empty /'
 python3 -c 'import time; print("installed", time.time())'
 "$PLACE/v/bin/snarelab" diagnose my-arm.toml first.csv --holdout second.csv --report report.html --json diagnosis.json
 python3 -c 'import time; print("diagnosed", time.time())'
+times | sed -n '2s/^/processor /p'
 du -s --apparent-size --block-size=1 "$PLACE/v" | sed 's/^/bytes /'
 """
 
@@ -123,6 +126,7 @@ def first_hour(kind: str, name: str, run: list[str], wheel: Path, folder: Path) 
         raise SystemExit(f"{name}: ended with {ran.returncode}:\n{ran.stdout[-2000:]}{ran.stderr[-4000:]}")
     told = dict(re.findall(r"^(python|begun|empty|installed|diagnosed|bytes) (\S+)", ran.stdout, re.MULTILINE))
     begun, installed, diagnosed = (float(told[key]) for key in ("begun", "installed", "diagnosed"))
+    (used,) = re.findall(r"^processor (\S+)m(\S+)s (\S+)m(\S+)s", ran.stdout, re.MULTILINE)
     found = json.loads((folder / "diagnosis.json").read_text(encoding="utf-8"))
     assert (folder / "report.html").stat().st_size > 100_000
     return {
@@ -131,6 +135,7 @@ def first_hour(kind: str, name: str, run: list[str], wheel: Path, folder: Path) 
         "install_seconds": round(installed - begun, 1),
         "diagnose_seconds": round(diagnosed - installed, 1),
         "seconds": round(diagnosed - begun, 1),
+        "processor_seconds": round(60 * (float(used[0]) + float(used[2])) + float(used[1]) + float(used[3]), 1),
         "install_mb": round((int(told["bytes"]) - int(told["empty"])) / 1e6),
         "verdict": found["verdict"],
         "named": sorted({effect["name"] for effect in found["effects"]}),
@@ -141,17 +146,25 @@ def first_hour(kind: str, name: str, run: list[str], wheel: Path, folder: Path) 
 def demo(folder: Path) -> dict[str, object]:
     """``make demo`` in a copy of the repository: once for the cache, then from ``make clean`` again."""
     copied(folder)
-    took = []
+    took, used = [], []
     for _ in range(2):
         subprocess.run(["make", "--silent", "clean"], cwd=folder, check=True)
-        begun = time.monotonic()
+        begun, before = time.monotonic(), resource.getrusage(resource.RUSAGE_CHILDREN)
         ran = subprocess.run(["make", "demo"], cwd=folder, capture_output=True, text=True)
         took.append(round(time.monotonic() - begun, 1))
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        used.append(round(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, 1))
         if ran.returncode:
             raise SystemExit(f"make demo: ended with {ran.returncode}:\n{ran.stderr[-4000:]}")
     files = [path for path in (folder / ".venv").rglob("*") if path.is_file() and not path.is_symlink()]
     size = round(sum(path.stat().st_size for path in files) / 1e6)
-    return {"place": "make demo", "cold_seconds": took[0], "demo_seconds": took[1], "demo_mb": size}
+    return {
+        "place": "make demo",
+        "cold_seconds": took[0],
+        "demo_seconds": took[1],
+        "processor_seconds": used[1],
+        "demo_mb": size,
+    }
 
 
 if __name__ == "__main__":
