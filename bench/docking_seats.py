@@ -8,14 +8,17 @@ seat in both, the pose.
 Impulses are compared in flight, without a push: a body that is pushed and rests has got back from its contacts just
 what pushed it, whatever they are. From the same starts it flies at 20 mm/s, and MuJoCo's own contact forces, summed
 step by step, stand against what our body's momentum has lost, in the first touch and over longer. Both contacts keep
-0.3 of the speed with which a flank is met, ours by Hunt and Crossley's law and MuJoCo's by a linear one. Every start
-done is a line of ``build/bench/docking_seats.jsonl`` and is not done again.
+0.3 of the speed with which a flank is met, ours by Hunt and Crossley's law and MuJoCo's by a linear one. ``--flights``
+does that alone, with friction and without any: MuJoCo's friction cone takes a part of what slides into the normal
+force, and what is left without friction is the bounce and the geometry. Every start done is a line of
+``build/bench/docking_seats.jsonl`` and is not done again.
 """
 
 import argparse
 import json
 import os
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -148,6 +151,18 @@ def flight(
     return pushed_by_us(run, 0.0), push(other, 0.0, FLIGHT, off, turn, SPEED)
 
 
+def touches(body: DockingBody, friction: float, place: Array, turn: Rotation) -> dict[str, Any]:
+    """Impulses in flight in both engines [N·s], `AFTER` the first touch, and by how much they differ (a share)."""
+    own = P.with_values(friction=friction)
+    truth = Truth(friction=friction, mass=MASS, inertia=INERTIA, edge=P.edge, stiffness=P.stiffness)
+    ours, theirs = flight(body, own, truth, place, turn)
+    pairs = [(ours.impulse_after(wait), theirs.impulse_after(wait)) for wait in AFTER]
+    return {
+        "impulses": [[a.tolist(), b.tolist()] for a, b in pairs],
+        "impulse": [float(np.linalg.norm(a - b) / np.linalg.norm(a)) for a, b in pairs],
+    }
+
+
 def compare(body: DockingBody, friction: float, place: Array, turn: Rotation) -> dict[str, Any]:
     """One start in both engines."""
     own = P.with_values(friction=friction)
@@ -155,8 +170,6 @@ def compare(body: DockingBody, friction: float, place: Array, turn: Rotation) ->
     quaternion = turn.as_quat(scalar_first=True)
     run = body.run(own, DURATION, place, quaternion, wrench=[FORCE, 0, 0, 0, 0, 0], longest=2e-3)
     ours, theirs = pushed_by_us(run, FORCE), push(truth, FORCE, DURATION, place, turn)
-    flown = flight(body, own, truth, place, turn)
-    pairs = [(flown[0].impulse_after(wait), flown[1].impulse_after(wait)) for wait in AFTER]
     turned = (
         Rotation.from_quat(ours.quaternion[-1], scalar_first=True)
         * Rotation.from_quat(theirs.quaternion[-1], scalar_first=True).inv()
@@ -165,9 +178,7 @@ def compare(body: DockingBody, friction: float, place: Array, turn: Rotation) ->
         "friction": friction, "ours": bool(ours.off[-1] < SEATED), "mujoco": bool(theirs.off[-1] < SEATED),
         "left": [float(ours.off[-1]), float(theirs.off[-1])],
         "pose": float(np.linalg.norm(ours.place[-1] - theirs.place[-1])), "turn": float(turned.magnitude()),
-        "impulses": [[a.tolist(), b.tolist()] for a, b in pairs],
-        "impulse": [float(np.linalg.norm(a - b) / np.linalg.norm(a)) for a, b in pairs],
-    }  # fmt: skip
+    } | touches(body, friction, place, turn)  # fmt: skip
 
 
 def line(row: dict[str, Any]) -> str:
@@ -185,7 +196,10 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=50)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--out", type=Path, default=ROOT / "build" / "bench" / "docking_seats.jsonl")
+    parser.add_argument("--flights", action="store_true", help="impulses in flight alone, with friction and without")
     given = parser.parse_args()
+    if given.flights:
+        return flights(given.seed, given.count)
     given.out.parent.mkdir(parents=True, exist_ok=True)
     rows = [json.loads(text) for text in given.out.read_text().splitlines()] if given.out.exists() else []
     rows = [row for row in rows if row["seed"] == given.seed][: given.count]
@@ -198,17 +212,32 @@ def main() -> int:
         append(given.out, rows[-1])
         print(line(rows[-1]), flush=True)
     both = [row for row in rows if row["ours"] and row["mujoco"]]
-    apart = [np.array([row["impulse"][k] for row in rows]) for k in range(len(AFTER))]
     print(
         f"agree in {sum(row['ours'] == row['mujoco'] for row in rows)} of {len(rows)}; {len(both)} seat, pose within "
-        f"{1e6 * max((row['pose'] for row in both), default=0.0):.1f} um; impulse of the first touch "
-        + ", ".join(
-            f"{wait:g} s after it began: median {100 * np.median(x):.2g} %, at most {100 * x.max():.2g} %, "
-            f"{(x <= 0.03).sum()} within 3 %"
-            for wait, x in zip(AFTER, apart, strict=True)
-        )
+        f"{1e6 * max((row['pose'] for row in both), default=0.0):.1f} um; {apart(rows)}"
     )
     return 0
+
+
+def flights(seed: int, count: int) -> int:
+    """The same starts in flight: with the friction drawn, and with none."""
+    body = DockingBody(MASS, INERTIA, 1e-6)
+    for drawn, words in ((True, "friction as drawn"), (False, "no friction")):
+        rng = np.random.default_rng(seed)
+        starts = [start(rng) for _ in range(count)]
+        rows = [touches(body, friction if drawn else 0.0, place, turn) for friction, place, turn in starts]
+        print(f"{count} flights, {words}: {apart(rows)}", flush=True)
+    return 0
+
+
+def apart(rows: Sequence[dict[str, Any]]) -> str:
+    """In words, by how much the engines' impulses differ."""
+    shares = [np.array([row["impulse"][k] for row in rows]) for k in range(len(AFTER))]
+    return "impulse of the first touch " + ", ".join(
+        f"{wait:g} s after it began: median {100 * np.median(x):.2g} %, at most {100 * x.max():.2g} %, "
+        f"{(x <= 0.03).sum()} within 3 %"
+        for wait, x in zip(AFTER, shares, strict=True)
+    )
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..models.floating.tree import channel, n_carriers
+from ..models.floating.tree import channel
 from ..models.model import Model
 from .diagnosis import Candidate, ChannelFit, Diagnosis, Estimate, Finding, Limit, Misfit, Moved, Rival, Step, Trace
 from .evidence.diagnose import Decided
@@ -134,7 +134,7 @@ def _finding(n: Name, decided: Decided, final: Fit, every: Sequence[str]) -> Fin
     missed = decided.best.missed[placed.key]
     # The posterior is shared among those that cannot be told apart; how often such a name is right was counted.
     whole = n.share + sum(r.probability for r in n.rivals if not r.separable)
-    right = of_name(n.gain, missed.sure)
+    right = of_name(n.gain, missed.sure, missed.explained)
     scale = right / max(whole, 1e-12)
     rivals = tuple(
         Rival(
@@ -147,7 +147,17 @@ def _finding(n: Name, decided: Decided, final: Fit, every: Sequence[str]) -> Fin
         for r in n.rivals
     )
     sentence = evidence_sentence(placed, [every[c] for c in n.channels], *missed.trial)
-    return Finding(placed.effect.name, placed.at, missed.sure, n.share * scale, parameters, sentence, rivals, n.gain)
+    return Finding(
+        placed.effect.name,
+        placed.at,
+        missed.sure,
+        n.share * scale,
+        parameters,
+        sentence,
+        rivals,
+        n.gain,
+        missed.explained,
+    )
 
 
 def _limits(decided: Decided, final: Fit) -> tuple[Limit, ...]:
@@ -199,7 +209,7 @@ def _noise_floor(experiments: Sequence[Experiment], final: Fit) -> Array:
         top = frequency > min(2 * e.motion.band, 0.4 / e.motion.period)
         # The median of a periodogram is ln 2 of its mean, and is not moved by single lines.
         floors.append(np.sqrt(np.median(density[top], axis=0) / np.log(2) * e.motion.band))
-        carriers = n_carriers(e.body.tree)
+        carriers = e.body.tree.carriers
         if carriers:
             floors[-1][:carriers] = momentum_floor(e)
     return np.min(floors, axis=0)

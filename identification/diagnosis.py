@@ -38,10 +38,11 @@ class Finding:
     """An effect that the model left out, in the field's words.
 
     ``margin`` of torques is what the held-out recordings gain by it, in standard errors over blocks of time; ``gain``
-    its log Bayes factor on the training recordings; ``probability`` is how often a name with these two was right on
+    its log Bayes factor on the training recordings; ``explained`` the share of the held-out residual's energy that goes
+    with it, on the channel where it is largest; ``probability`` is how often a name with these three was right on
     simulated arms, shared with what the recordings cannot tell from it. ``margin`` of encoders and captures is how
     often it, or one that cannot be told from it, beat the others in a bootstrap over blocks of time; these have no
-    Bayes factor, and ``gain`` is None.
+    Bayes factor, and ``gain`` and ``explained`` are None.
     """
 
     name: str
@@ -52,6 +53,7 @@ class Finding:
     evidence: str
     rivals: tuple[Rival, ...]
     gain: float | None = None
+    explained: float | None = None
     coordinates: tuple[str, ...] = ()
 
 
@@ -326,6 +328,7 @@ def _finding(finding: Finding) -> dict[str, Any]:
         "at": finding.at,
         "margin": finding.margin,
         "gain": finding.gain,
+        "explained": finding.explained,
         "probability": finding.probability,
         "parameters": {name: vars(p) for name, p in finding.parameters.items()},
         "evidence": finding.evidence,

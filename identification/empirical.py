@@ -12,13 +12,11 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag, cho_factor, cho_solve, cholesky
+from scipy.linalg import cho_factor, cho_solve, cholesky, eigh
 
-from ..models.effects._direction import TRANSITION
-from ..models.empirical import NAME, placed_tables, tables_of
-from ..models.floating.tree import n_carriers
+from ..models.empirical import NAME, placed_tables, read_along, tables_of
 from ..models.model import Placed
-from ..models.table import MOST, OTHERS, Table, read_words
+from ..models.table import MOST, Table, read_words
 from .deciding import GATE
 from .evidence.confirm import blocks, scatter
 from .evidence.diagnose import Decided
@@ -26,6 +24,7 @@ from .fitting.assembly import Assembly
 from .fitting.experiment import Experiment
 from .fitting.fit import Fit, fit
 from .fitting.problem import gather
+from .fitting.schur import schur
 from .search.refit import carry
 from .search.rest import fitted
 
@@ -61,7 +60,7 @@ def empirical_laws(
     decided: Decided, final: Fit, train: Sequence[Experiment], held: Sequence[Experiment]
 ) -> tuple[Fit, tuple[EmpiricalLaw, ...]]:
     """The fit with a table for each nameless curve that can be one and that the held-out recordings confirm."""
-    carriers, joints = n_carriers(final.assembly.tree), final.assembly.tree.joints
+    carriers, joints = final.assembly.tree.carriers, final.assembly.tree.joints
     found: list[EmpiricalLaw] = []
     for c in sorted({r.channel for r in decided.left.curves if r.channel >= carriers}):
         curves = [r for r in decided.left.curves if r.channel == c]
@@ -95,8 +94,8 @@ def _tables(
     chosen: list[_Chosen] = []
     loads = [assembly.evaluate(e, final.theta).load for e in train]
     for over, times in wanted:
-        signals = [coordinates(assembly, e, load, c, over) for e, load in zip(train, loads, strict=True)]
-        factors = [factor(assembly, e, load, c, times) for e, load in zip(train, loads, strict=True)]
+        read = [_read(assembly, e, load, c, over, times) for e, load in zip(train, loads, strict=True)]
+        signals, factors = [x[:-1] for x in read], [x[-1] for x in read]
         best: tuple[float, _Chosen] | None = None
         for length in LENGTHS:
             steps = int(np.ceil(2 / length)) + 1
@@ -115,9 +114,9 @@ def _tables(
             ]
             gram: Array = np.sum([x.T @ k.solve(x) for x, k in zip(own, covariances, strict=False)], axis=0)
             before = gram.shape[0] - 1 - root.shape[0]
-            for s in DEVIATIONS:
-                turn = np.asarray(block_diag(np.eye(before), size * s * root), float)
-                value = _evidence(turn.T @ gram[:-1, :-1] @ turn, turn.T @ gram[:-1, -1], free)
+            gram[np.arange(free, before), np.arange(free, before)] += 1.0  # tables chosen before have their prior
+            curvature, score = schur(gram[:-1, :-1], gram[:-1, -1], before)
+            for s, value in zip(DEVIATIONS, _evidence(root.T @ curvature @ root, root.T @ score, size), strict=True):
                 if best is None or value > best[0]:
                     best = value, _Chosen(table, [x @ (size * s * root) for x in raw], size * s * root)
         if best is not None and best[1].table.words not in [o.table.words for o in chosen]:
@@ -126,8 +125,9 @@ def _tables(
     solved = [k.solve(x) for x, k in zip(own, covariances, strict=False)]
     matrix: Array = np.sum([a.T @ b for a, b in zip(own, solved, strict=True)], axis=0)
     score: Array = np.sum([b.T @ r for b, r in zip(solved, residuals, strict=True)], axis=0)
-    factorised = cho_factor(_with_prior(matrix, free))
-    amplitudes, spread = cho_solve(factorised, score)[free:], cho_solve(factorised, np.eye(len(score)))[free:, free:]
+    curvature, left = schur(matrix, score, free)
+    factorised = cho_factor(curvature + np.eye(len(left)), lower=True)
+    amplitudes, spread = cho_solve(factorised, left), cho_solve(factorised, np.eye(len(left)))
     values: dict[str, float] = {}
     at_column = 0
     for o in chosen:
@@ -147,49 +147,26 @@ def _kernel(shape: Sequence[int], length: float) -> Array:
     return np.exp(-0.5 * apart / length**2) + _NUGGET * np.eye(len(at))
 
 
-def _with_prior(matrix: Array, free: int) -> Array:
-    """Unit prior of what is no parameter of the model; those are held by their own size alone, to be solvable."""
-    loaded = matrix + np.eye(len(matrix))
-    own = np.arange(free)
-    loaded[own, own] += 1e-9 * np.abs(matrix[own, own]) - 1
-    loaded[own, own] += np.where(np.abs(matrix[own, own]) > 0, 0.0, 1.0)
-    return loaded
+def _evidence(matrix: Array, score: Array, size: float) -> Array:
+    """Log evidence of each of DEVIATIONS, but for what all have in common, of values of unit prior in units of it."""
+    curvature, turn = eigh(matrix)
+    own = (size * np.array(DEVIATIONS))[:, None] ** 2
+    spread = 1 + own * np.maximum(curvature, 0.0)
+    return np.sum(0.5 * own * (turn.T @ score) ** 2 / spread - 0.5 * np.log(spread), axis=1)
 
 
-def _evidence(matrix: Array, score: Array, free: int) -> float:
-    """Log evidence but for what all have in common."""
-    low = cholesky(_with_prior(matrix, free), lower=True)
-    return 0.5 * float(score @ cho_solve((low, True), score)) - float(np.sum(np.log(np.diag(low))))
-
-
-def coordinates(assembly: Assembly, e: Experiment, load: Array, c: int, over: Sequence[str]) -> list[Array]:
-    """Coordinates of a table at a joint along a recording, each (n,)."""
+def _read(assembly: Assembly, e: Experiment, load: Array, c: int, over: tuple[str, ...], times: str) -> list[Array]:
+    """Coordinates of a table at a joint along a recording, each (n,), and last its factor, as the law reads them."""
     m, names = e.motion, [j.name for j in assembly.tree.joints]
-    found = []
-    for name in over:
-        other = next((start for start in OTHERS if name.startswith(start)), None)
-        if other is not None:
-            found.append((m.q if other == OTHERS[0] else m.qd)[:, names.index(name.removeprefix(other))])
-        elif name == "distance travelled":
-            steps = np.abs(m.qd[:, c]) * m.period
-            found.append(np.concatenate([np.cumsum(steps[s]) - 0.5 * (steps[s][0] + steps[s]) for s in m.segments]))
-        else:
-            own = {"position": m.q[:, c], "speed": np.abs(m.qd[:, c]), "load": load[:, c], "time": e.elapsed}
-            found.append(own[name])
-    return found
-
-
-def factor(assembly: Assembly, e: Experiment, load: Array, c: int, times: str) -> Array:
-    """What a table's value is multiplied by along a recording (n,)."""
-    at, speed = assembly.tree.joints[c].name, e.motion.qd[:, c]
-    peak = assembly.values(assembly.start)[f"speed_scale.{at}"]
-    if not times:
-        return np.ones(len(speed))
-    if times == "speed":
-        return speed / peak
-    drives = load[:, c] * speed > 0
-    part = {"direction": np.ones(len(speed)), "driving": drives, "braking": ~drives}[times]
-    return np.tanh(speed / (TRANSITION * peak)) * part
+    steps = np.abs(m.qd[:, c]) * m.period
+    signals = {"q": m.q[:, c], "qd": m.qd[:, c], "load": load[:, c], "time": e.elapsed}
+    signals["travelled"] = np.concatenate([np.cumsum(steps[s]) - 0.5 * (steps[s][0] + steps[s]) for s in m.segments])
+    signals["speed_scale"] = np.full(len(steps), assembly.values(assembly.start)[f"speed_scale.{names[c]}"])
+    for k, joint in enumerate(Table(over, times, ()).others, 1):
+        i = names.index(joint)
+        signals |= {f"q_of_{k}": m.q[:, i], f"qd_of_{k}": m.qd[:, i]}
+    found = read_along(over, times).call({name: x[None, :] for name, x in signals.items()})
+    return [np.asarray(x, float).ravel() for x in (*(found[f"x{k}"] for k in range(len(over))), found["factor"])]
 
 
 def _refitted(final: Fit, placed: Placed, values: Mapping[str, float], train: Sequence[Experiment]) -> Fit:
@@ -221,7 +198,8 @@ def beyond(assembly: Assembly, e: Experiment, theta: Array) -> list[str]:
         for t in tables_of(p.effect):
             c = assembly.joint_of(p)
             load = assembly.evaluate(e, theta).load
-            for name, x, knots in zip(t.over, coordinates(assembly, e, load, c, t.over), t.knots, strict=True):
+            read = _read(assembly, e, load, c, t.over, t.times)[:-1]
+            for name, x, knots in zip(t.over, read, t.knots, strict=True):
                 out = float(np.mean((x < knots[0]) | (x > knots[-1])))
                 if out > 0:
                     said.append(

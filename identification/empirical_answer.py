@@ -59,8 +59,10 @@ def with_laws(
         ]
         gain = max(r.gain for r in decided.left.curves if r.channel == c)
         names = tuple(dict.fromkeys(name for t in law.tables for name in t.over))
-        probability = of_name(gain, law.sure)
-        findings.append(Finding(NAME, law.at, law.sure, probability, {}, evidence, (), gain, coordinates=names))
+        before, after = (float(rms[c]) for rms, _ in pairs)
+        explained = max(0.0, 1 - (after / before) ** 2)
+        probability = of_name(gain, law.sure, explained)
+        findings.append(Finding(NAME, law.at, law.sure, probability, {}, evidence, (), gain, explained, names))
     relative = [
         float(np.sqrt(np.mean((rms / measured) ** 2)))
         for rms, measured in (channel_rms(final.assembly, e, final.theta) for e in (train, held))

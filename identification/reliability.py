@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
+LEAST = 1e-3
+"""What stands for any smaller held-out gain or share."""
+
 BOOTSTRAPS = 400
 """Resamplings of time blocks that a margin is counted over."""
 
@@ -50,10 +53,11 @@ def probability(margin: float) -> float:
     return float(np.interp(margin, knots, frequencies))
 
 
-def of_name(gain: float, sure: float) -> float:
+def of_name(gain: float, sure: float, explained: float) -> float:
     """Frequency with which a name with this evidence was the right one, at the right place.
 
-    A logistic regression on log(1 + gain) and log(sure), counted as ``reliability.json`` says.
+    A logistic regression on log(1 + gain), log(sure) and the log odds of the share explained, counted as
+    ``reliability.json`` says. A name that stands in for another law leaves most of it over.
 
     Parameters
     ----------
@@ -61,7 +65,11 @@ def of_name(gain: float, sure: float) -> float:
         Log Bayes factor on the training recordings.
     sure : float
         What the held-out recordings gain by it [standard errors over blocks of time].
+    explained : float
+        Share of the held-out residual's energy that goes with it, 0 to 1.
     """
-    level, by_gain, by_held = _stored()["logit"]
-    x = level + by_gain * np.log1p(max(gain, 0.0)) + by_held * np.log(max(sure, 1e-3))
+    level, by_gain, by_held, by_share = _stored()["logit"]
+    share = min(max(explained, LEAST), 1 - LEAST)
+    x = level + by_gain * np.log1p(max(gain, 0.0)) + by_held * np.log(max(sure, LEAST))
+    x += by_share * np.log(share / (1 - share))
     return float(1 / (1 + np.exp(-x)))

@@ -5,6 +5,7 @@ It is no file of the vocabulary, which lists laws that can be looked for: tables
 its parameters, at a joint. Several tables at one joint add up.
 """
 
+import functools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +18,6 @@ from ..errors import InputError
 from .axes import neighbours
 from .effect import Effect, Parameter, Symbols
 from .effects._direction import direction
-from .floating.tree import n_carriers
 from .model import Placed
 from .table import FEWEST, MOST, OTHERS, OWN, TIMES, Table, cardinal, is_coordinate
 from .tree import Tree
@@ -50,6 +50,11 @@ class TableLaw:
                 value = ca.dot(parts[0], ca.reshape(values, t.shape[1], t.shape[0]).T @ parts[1])
             total += value * _factor(s, t.times)
         return total
+
+    def read(self, s: Symbols) -> list[ca.SX]:
+        """Coordinates of the one table, and the factor of its value."""
+        (t,) = self.tables
+        return [*(self._coordinate(s, name) for name in t.over), _factor(s, t.times)]
 
     def held(self, s: Symbols) -> ca.SX:
         """1 where a coordinate lies outside its knots, so that a table is held at its end; 0 inside."""
@@ -109,6 +114,19 @@ def empirical_effect(tables: Iterable[Table]) -> Effect:
     )
 
 
+_SIGNALS = ("q", "qd", "load", "time", "travelled", "speed_scale")
+
+
+@functools.cache
+def read_along(over: tuple[str, ...], times: str) -> ca.Function:
+    """Coordinates and factor of a table as its law reads them: of ``q qd load time travelled speed_scale`` and, for
+    each other joint, ``q_of_1 qd_of_1`` and so on; all in rows of samples."""
+    law = TableLaw((Table(over, times, ((0.0,),) * len(over)),), Table(over, times, ()).others)
+    names = [*_SIGNALS, *(f"{x}_of_{k}" for k in range(1, len(law.others) + 1) for x in ("q", "qd"))]
+    s = {name: ca.SX.sym(name) for name in names}
+    return ca.Function("read", list(s.values()), law.read(s), names, [*(f"x{k}" for k in range(len(over))), "factor"])
+
+
 def placed_tables(at: str, tables: Sequence[Table]) -> Placed:
     """An effect of some tables at a joint; its values are held in fits, for a smooth curve can mimic most laws."""
     effect = empirical_effect(tables)
@@ -141,8 +159,8 @@ def read_empirical(
         raise InputError(f"{path}: {NAME} = {entries!r}; allowed are tables headed [[{NAME}]]")
     if entries and system not in ("arm", "zero_g_rig", "free_floating_arm"):
         raise InputError(f"{path}: [[{NAME}]] belongs to a system with joints, not to {system!r}; take it out")
-    joints = [joint.name for joint in tree.joints[n_carriers(tree) :]]
-    axes = [axis.name for axis in (*tree.axes, *neighbours(tree, n_carriers(tree)))]
+    joints = [joint.name for joint in tree.joints[tree.carriers :]]
+    axes = [axis.name for axis in (*tree.axes, *neighbours(tree, tree.carriers))]
     found: dict[str, list[Table]] = {}
     values: dict[str, float] = {}
     for number, entry in enumerate(entries, 1):

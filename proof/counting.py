@@ -1,10 +1,11 @@
 """How often a name with some evidence is right: a logistic regression over names whose truth is known.
 
-    p = 1 / (1 + exp(-(level + by_gain log(1 + gain) + by_held log(held))))
+    p = 1 / (1 + exp(-(level + by_gain log(1 + gain) + by_held log(held) + by_share log(share / (1 - share)))))
 
 ``gain`` is a name's log Bayes factor on the training recordings, ``held`` what the held-out ones gain by it in standard
-errors. The three numbers are those of highest likelihood, with a small ridge (le Cessie and van Houwelingen 1992), so
-that names which were never wrong make no certainty; more evidence never makes a name less likely.
+errors, ``share`` what part of their residual's energy goes with it. The four numbers are those of highest likelihood,
+with a small ridge (le Cessie and van Houwelingen 1992), so that names which were never wrong make no certainty; more
+evidence never makes a name less likely.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from snarelab.identification.reliability import LEAST
+
 from .drives.judge import judge
 
 Array = NDArray[np.float64]
@@ -22,26 +25,24 @@ Array = NDArray[np.float64]
 RIDGE = 0.1
 """Precision of the normal prior of each number, the evidence measured from its mean: they are about 3 at most."""
 
-LEAST_HELD = 1e-3
-"""Held-out gain that stands for any smaller one."""
-
 
 class Row(NamedTuple):
     """A name that was told: its evidence, whether it was right, and the generator of its case."""
 
     gain: float
     held: float
+    share: float
     right: bool
     generator: str
 
 
 @dataclass(frozen=True)
 class Counted:
-    """``logit``: level, by_gain, by_held; ``skill``: by generator, the Brier skill of the map that leaves it out
-    against the constant that is its own frequency of right names; None where there is no such map, or nothing to be
-    told."""
+    """``logit``: level, by_gain, by_held, by_share; ``skill``: by generator, the Brier skill of the map that leaves
+    it out against the constant that is its own frequency of right names; None where there is no such map, or nothing
+    to be told."""
 
-    logit: tuple[float, float, float]
+    logit: tuple[float, ...]
     skill: Mapping[str, float | None]
 
 
@@ -62,8 +63,8 @@ def counted(rows: Sequence[Row]) -> Counted:
     return Counted(fitted(rows), skill)
 
 
-def fitted(rows: Sequence[Row]) -> tuple[float, float, float]:
-    """Level, by_gain and by_held of some rows."""
+def fitted(rows: Sequence[Row]) -> tuple[float, ...]:
+    """Level, by_gain, by_held and by_share of some rows."""
     x, right = _evidence(rows), np.array([r.right for r in rows], float)
     mean = x.mean(axis=0)
     columns = np.column_stack([np.ones(len(x)), x - mean])
@@ -73,9 +74,9 @@ def fitted(rows: Sequence[Row]) -> tuple[float, float, float]:
         value = float(np.sum(np.logaddexp(0.0, z) - right * z) + 0.5 * RIDGE * w @ w)
         return value, columns.T @ (1 / (1 + np.exp(-z)) - right) + RIDGE * w
 
-    bounds = [(None, None), (0.0, None), (0.0, None)]
-    w = minimize(cost, np.zeros(3), jac=True, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-14, "gtol": 1e-9}).x
-    return float(w[0] - w[1:] @ mean), float(w[1]), float(w[2])
+    start, bounds = np.zeros(columns.shape[1]), [(None, None), *[(0.0, None)] * x.shape[1]]
+    w = minimize(cost, start, jac=True, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-14, "gtol": 1e-9}).x
+    return float(w[0] - w[1:] @ mean), *(float(v) for v in w[1:])
 
 
 def probability(logit: Sequence[float], rows: Sequence[Row]) -> Array:
@@ -84,11 +85,15 @@ def probability(logit: Sequence[float], rows: Sequence[Row]) -> Array:
 
 
 def _evidence(rows: Sequence[Row]) -> Array:
-    """log(1 + gain) and log(held) (n, 2)."""
-    both = np.array([[r.gain, r.held] for r in rows], float)
-    if not np.isfinite(both).all():
-        raise ValueError("a name's gain or held-out gain is no number")
-    return np.column_stack([np.log1p(np.maximum(both[:, 0], 0.0)), np.log(np.maximum(both[:, 1], LEAST_HELD))])
+    """log(1 + gain), log(held) and the log odds of the share (n, 3)."""
+    every = np.array([[r.gain, r.held, r.share] for r in rows], float)
+    if not np.isfinite(every).all():
+        raise ValueError("a name's gain, held-out gain or share is no number")
+    gain, held, share = every.T
+    share = np.clip(share, LEAST, 1 - LEAST)
+    return np.column_stack(
+        [np.log1p(np.maximum(gain, 0.0)), np.log(np.maximum(held, LEAST)), np.log(share / (1 - share))]
+    )
 
 
 def _skill(logit: Sequence[float], rows: Sequence[Row]) -> float | None:
@@ -109,10 +114,13 @@ def of_effects(effects: Sequence[Mapping[str, Any]], right: Sequence[bool], gene
     """
     found = []
     for effect, is_right in zip(effects, right, strict=True):
-        if "gain" not in effect or "margin" not in effect:
-            raise ValueError(f"{effect['name']} at {effect['at']} was kept without gain and margin; diagnose it again")
+        if not {"gain", "margin", "explained"} <= set(effect):
+            raise ValueError(
+                f"{effect['name']} at {effect['at']} was kept without gain, margin and explained; diagnose it again"
+            )
         if effect["gain"] is not None:
-            found.append(Row(float(effect["gain"]), float(effect["margin"]), bool(is_right), generator))
+            gain, held, share = (float(effect[x]) for x in ("gain", "margin", "explained"))
+            found.append(Row(gain, held, share, bool(is_right), generator))
     return found
 
 

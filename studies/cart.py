@@ -12,7 +12,7 @@ from ..exit_status import status_of
 from ..identification.diagnose import Answer
 from ..recordings import find_recording
 from .foreign import Machine, alike, run
-from .outcome import Quantity
+from .outcome import Quantity, interval
 from .page import Section
 
 HERE = Path(__file__).parent
@@ -37,7 +37,7 @@ def main() -> int:
 def mass(answer: Answer) -> list[Quantity]:
     """The mass beside the makers'."""
     return [
-        Quantity("mass", m.unit, m.after, "predicted", MASS, m.after - 2 * m.std, m.after + 2 * m.std)
+        Quantity("mass", m.unit, m.after, "predicted", MASS, *interval(m.after, m.std))
         for m in answer.diagnosis.moved
         if m.name == "inertia.body.mass"
     ]

@@ -32,7 +32,7 @@ from ..progress import stages
 from ..recordings import find_recording
 from ..report.provenance import provenance
 from .kuka_figures import MDEG, differences, left_over, pattern, rms, without
-from .outcome import FOLDER, Quantity, table, write_json, write_result
+from .outcome import FOLDER, Quantity, interval, table, write_json, write_result
 from .page import Picture, Section, write_page
 
 HERE = Path(__file__).parent
@@ -134,8 +134,7 @@ def compare(answer: Answer, recordings: list[Path], holdout: Path) -> tuple[list
                         p.value,
                         "reference" if makers is None else "predicted",
                         makers,
-                        p.value - 2 * p.std,
-                        p.value + 2 * p.std,
+                        *interval(p.value, p.std),
                     )
                 )
     left = [p.named.trial.placed.key for link in again for p in link.proofs]

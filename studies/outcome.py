@@ -1,6 +1,7 @@
 """What a study leaves behind for scripts: ``result.json``, and the same numbers as a table for people."""
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -35,6 +36,11 @@ class Quantity:
     paper: float | None = None
     low: float | None = None
     high: float | None = None
+
+
+def interval(value: float, std: float) -> tuple[float, float] | tuple[None, None]:
+    """Two deviations either way; none where the recordings leave a value open."""
+    return (value - 2 * std, value + 2 * std) if math.isfinite(std) else (None, None)
 
 
 def write_result(

@@ -13,7 +13,7 @@ from ..exit_status import status_of
 from ..identification.diagnose import Answer
 from ..recordings import find_recording
 from .foreign import Machine, alike, run
-from .outcome import Quantity
+from .outcome import Quantity, interval
 from .page import Section
 
 HERE = Path(__file__).parent
@@ -49,8 +49,7 @@ def coupling(answer: Answer) -> list[Quantity]:
             p.value,
             "predicted" if f"{e.name}.{name}" in MAKERS else "reference",
             MAKERS.get(f"{e.name}.{name}"),
-            p.value - 2 * p.std,
-            p.value + 2 * p.std,
+            *interval(p.value, p.std),
         )
         for e in answer.diagnosis.effects
         if e.at == "motor6"

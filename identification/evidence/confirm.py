@@ -38,12 +38,14 @@ class Foretold:
 @dataclass(frozen=True)
 class Missed:
     """What the held-out recordings lose without an effect: log density and its scatter; how far the two models' torques
-    are apart [RMS, share of the channel's]; relative errors with and without; and the fit without."""
+    are apart [RMS, share of the channel's]; relative errors with and without; the share of the residual's energy that
+    goes with it, 0 to 1; and the fit without."""
 
     gain: float
     scatter: float
     size: float
     trial: tuple[float, float]
+    explained: float
     fit: Fit
 
     @property
@@ -185,7 +187,19 @@ def _missed(
     worst = c[int(np.argmax(apart[c] / measured[c]))]
     trial = float(with_it[worst] / measured[worst]), float(rms[worst] / measured[worst])
     size = float(apart[worst] / measured[worst])
-    return Missed(whole.density - other.density, scatter(0.5 * (other.blocks - whole.blocks)), size, trial, rest)
+    gain = whole.density - other.density
+    explained = _explained(found, final, rest, held, worst)
+    return Missed(gain, scatter(0.5 * (other.blocks - whole.blocks)), size, trial, explained, rest)
+
+
+def _explained(found: Found, final: Fit, rest: Fit, held: Sequence[Experiment], c: int) -> float:
+    """Share of a channel's residual energy that goes with an effect, every sample by its own variance: near rest, where
+    a joint holds any torque, little counts. What wanders counts as left over, for a law without a name may be it."""
+    n, sums = found.weighed.n_train, np.zeros(2)
+    for e, row in zip(held, found.weighed.evidence.channels[n:], strict=True):
+        both = [f.assembly.residual(e, f.theta)[0][:, c] for f in (final, rest)]
+        sums += [float(np.sum(x**2 / row[c].covariance.variance)) for x in both]
+    return float(np.clip(1 - sums[0] / sums[1], 0.0, 1.0)) if sums[1] > 0 else 0.0
 
 
 def _apart(one: Fit, other: Fit, held: Sequence[Experiment]) -> Array:

@@ -7,7 +7,6 @@ masses, small curves. With S = K + A A' a hypothesis is H = C' S⁻¹ C and g = 
 nothing is ½ g' (H + κ⁻²)⁻¹ g - ½ log det(1 + κ² H). Letters: n samples, m columns, P parameters beside.
 """
 
-import functools
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
@@ -37,7 +36,7 @@ class Channel:
 @dataclass(frozen=True)
 class Products:
     """What one channel of one recording says: A'K⁻¹A (p, p), A'K⁻¹r (p,), log det K, r'K⁻¹r, A'K⁻¹C (p, m), C'K⁻¹r
-    (m,) and C'K⁻¹C (m, m), p and m the channel's own."""
+    (m,), p and m the channel's own, and the columns C made white (n, m): C'K⁻¹C is wanted for few pairs of them."""
 
     always: Array
     seen: Array
@@ -45,7 +44,18 @@ class Products:
     energy: float
     beside: Array
     score: Array
-    gram: Array
+    white: Array
+
+
+@dataclass(frozen=True)
+class Alike:
+    """Items of the same number of columns k, side by side: their numbers (N,), columns and spreads (N, k), signs."""
+
+    numbers: Index
+    index: Index
+    spread: Array
+    positive: NDArray[np.bool_]
+    whole: bool
 
 
 class Evidence:
@@ -72,6 +82,22 @@ class Evidence:
         self.numbers = [columns.of(0, c)[0] for c in range(len(channels[0]))]
         self.where = [_inverse(x, columns.count) for x in self.numbers]
         self._made: dict[tuple[int, int], Products] = {}
+        self._arrange()
+
+    def _arrange(self) -> None:
+        """Sort the items by their number of columns; nothing is known of their products yet."""
+        by: dict[tuple[int, bool], list[int]] = {}
+        for number, item in enumerate(self.items):
+            by.setdefault((len(item.index), item.whole), []).append(number)
+        self.alike: list[Alike] = []
+        for (_, whole), numbers in by.items():
+            rows = [self.items[x] for x in numbers]
+            index, spread, positive = (
+                np.stack(x) for x in zip(*((r.index, r.spread, r.positive) for r in rows), strict=True)
+            )
+            self.alike.append(Alike(np.array(numbers), index, spread, positive, whole))
+        self._own: dict[tuple[int, int], list[tuple[Index, Array]]] = {}
+        self._rows: dict[tuple[int, int, int], Array] = {}
 
     def products(self, i: int, c: int) -> Products:
         """Of channel c of recording i, worked out when they are asked for: a search needs the training recordings'."""
@@ -81,24 +107,52 @@ class Evidence:
 
     def _products(self, i: int, c: int) -> Products:
         own, pool = self.channels[i][c], self._pools[i][c]
-        both = np.column_stack([own.residual, own.columns])
-        solved = own.covariance.solve(both)
-        gram = both.T @ solved
-        m = len(self.numbers[c])
-        beside, score, products = np.zeros((len(own.index), m)), np.zeros(m), np.zeros((m, m))
+        always, columns = np.column_stack([own.residual, own.columns]), np.zeros((len(own.residual), 0))
         if pool.size:
-            first = solved.T @ pool
-            beside, score, products = first[1:], first[0], pool.T @ own.covariance.solve(pool)
-        return Products(gram[1:, 1:], gram[1:, 0], own.covariance.log_det, float(gram[0, 0]), beside, score, products)
+            white = own.covariance.white(np.column_stack([always, pool]))
+            always, columns = np.split(white, [always.shape[1]], axis=1)
+            gram = always.T @ always
+        else:  # few columns are divided sooner than made white
+            gram = always.T @ own.covariance.solve(always)
+        beside = always.T @ columns
+        return Products(
+            gram[1:, 1:], gram[1:, 0], own.covariance.log_det, float(gram[0, 0]), beside[1:], beside[0], columns
+        )
+
+    def own(self, i: int, c: int) -> list[tuple[Index, Array]]:
+        """Of each of `alike`, on channel c of recording i: which items have columns there, and C'K⁻¹C (., k, k)."""
+        if (i, c) not in self._own:
+            white, found = self.products(i, c).white, []
+            for group in self.alike:
+                at = self.where[c][group.index]
+                rows = np.flatnonzero(at[:, 0] >= 0)
+                each = white.T[at[rows]]
+                found.append((rows, each @ each.transpose(0, 2, 1)))
+            self._own[i, c] = found
+        return self._own[i, c]
+
+    def row(self, i: int, c: int, number: int) -> Array:
+        """C_item'K⁻¹C of an item with every column of channel c of recording i (k, m)."""
+        key = (i, c, number)
+        if key not in self._rows:
+            white = self.products(i, c).white
+            self._rows[key] = white[:, self.where[c][self.items[number].index]].T @ white
+        return self._rows[key]
 
     def with_covariances(self, c: int, covariances: Sequence[Covariance]) -> "Evidence":
         """The same with other covariances of one channel, one a recording."""
         other = copy(self)
         other.channels = [list(row) for row in self.channels]
-        other._made = {key: x for key, x in self._made.items() if key[1] != c}
+        other._forget(c)
         for i, covariance in enumerate(covariances):
             other.channels[i][c] = replace(self.channels[i][c], covariance=covariance)
         return other
+
+    def _forget(self, c: int) -> None:
+        """Forget, on a copy, what hangs on the covariance of a channel."""
+        self._made = {key: x for key, x in self._made.items() if key[1] != c}
+        self._own = {key: x for key, x in self._own.items() if key[1] != c}
+        self._rows = {key: x for key, x in self._rows.items() if key[1] != c}
 
     def alone(self, c: int, pool: Sequence[Hypothesis]) -> "tuple[Evidence, list[Hypothesis], Index]":
         """One channel by itself: its evidence, the hypotheses that reach it, and which always stand beside it."""
@@ -114,13 +168,14 @@ class Evidence:
         other.numbers = [np.arange(other.n_columns)]
         other.where = [np.arange(other.n_columns)]
         other._made = {(i, 0): x for (i, k), x in self._made.items() if k == c}
+        other._arrange()
         return other, own, always
 
     def with_channel(self, c: int, alone: "Evidence") -> "Evidence":
         """The same with one channel as it became by itself: another covariance, and its products."""
         other = copy(self)
         other.channels = [list(row) for row in self.channels]
-        other._made = {key: x for key, x in self._made.items() if key[1] != c}
+        other._forget(c)
         for i, row in enumerate(alone.channels):
             other.channels[i][c] = replace(self.channels[i][c], covariance=row[0].covariance)
         other._made |= {(i, c): x for (i, _), x in alone._made.items()}
@@ -159,15 +214,9 @@ def _inverse(numbers: Index, count: int) -> Index:
 
 
 @dataclass(frozen=True)
-class Group:
-    """Items of the same number of columns k, side by side: their numbers (N,), columns (N, k), spreads and signs, and
-    curvature (N, k, k) and score (N, k) with all that stands beside projected out."""
+class Group(Alike):
+    """The same with their curvature (N, k, k) and score (N, k), all that stands beside projected out."""
 
-    numbers: Index
-    index: Index
-    spread: Array
-    positive: NDArray[np.bool_]
-    whole: bool
     curvature: Array
     score: Array
 
@@ -216,11 +265,6 @@ class Projected:
         self._low = cholesky(0.5 * (matrix + matrix.T) + (1 + rounding) * np.eye(n_always), lower=True)
         self._seen = solve_triangular(self._low, seen, lower=True)
         self.null = float(-0.5 * (energy - self._seen @ self._seen + log_det) - np.sum(np.log(np.diag(self._low))))
-        # Of one recording, they are its own, which many searches share.
-        self._grams: list[Array] = [
-            functools.reduce(np.add, [evidence.products(i, c).gram for i in recordings])
-            for c in range(len(evidence.where))
-        ]
         self.beside_all = solve_triangular(self._low, beside, lower=True)
         self.score_all = score - self.beside_all.T @ self._seen
         self._crossed: dict[int, Array] = {}
@@ -229,26 +273,19 @@ class Projected:
         self._at = {int(x): (g, row) for g in self.groups for row, x in enumerate(g.numbers)}
 
     def _grouped(self) -> list[Group]:
-        by: dict[tuple[int, bool], list[int]] = {}
-        for number, item in enumerate(self.evidence.items):
-            by.setdefault((len(item.index), item.whole), []).append(number)
-        made = []
-        for (k, whole), numbers in by.items():
-            items = [self.evidence.items[x] for x in numbers]
-            index = np.stack([x.index for x in items])
-            spread = np.stack([x.spread for x in items])
-            curvature = np.zeros((len(items), k, k))
-            for gram, where in zip(self._grams, self.evidence.where, strict=True):
-                at = where[index]
-                rows = np.flatnonzero(at[:, 0] >= 0)
-                curvature[rows] += gram[at[rows][:, :, None], at[rows][:, None, :]]
-            beside = self.beside_all[:, index]
+        made = [np.zeros((*x.index.shape, x.index.shape[1])) for x in self.evidence.alike]
+        for c in range(len(self.evidence.where)):
+            for i in self.recordings:
+                for total, (rows, own) in zip(made, self.evidence.own(i, c), strict=True):
+                    total[rows] += own
+        groups = []
+        for x, curvature in zip(self.evidence.alike, made, strict=True):
+            beside = self.beside_all[:, x.index]
             curvature -= np.einsum("pak,pal->akl", beside, beside, optimize=True)
-            curvature *= spread[:, :, None] * spread[:, None, :]
-            score = self.score_all[index] * spread
-            positive = np.stack([x.positive for x in items])
-            made.append(Group(np.array(numbers), index, spread, positive, whole, curvature, score))
-        return made
+            curvature *= x.spread[:, :, None] * x.spread[:, None, :]
+            score = self.score_all[x.index] * x.spread
+            groups.append(Group(x.numbers, x.index, x.spread, x.positive, x.whole, curvature, score))
+        return groups
 
     def left(self, c: int) -> float:
         """e' K⁻¹ e of a channel of all these recordings, e what is left by all that stands beside, at its mean."""
@@ -266,10 +303,9 @@ class Projected:
         if number not in self._crossed:
             item = self.evidence.items[number]
             total = np.zeros((len(item.index), self.evidence.n_columns))
-            for gram, where, numbers in zip(self._grams, self.evidence.where, self.evidence.numbers, strict=True):
-                here = where[item.index]
-                if here[0] >= 0:
-                    total[:, numbers] += gram[here]
+            for c in self.evidence.reached(item):
+                for i in self.recordings:
+                    total[:, self.evidence.numbers[c]] += self.evidence.row(i, c, number)
             total -= self.beside_all[:, item.index].T @ self.beside_all
             self._crossed[number] = total * item.spread[:, None]
         return self._crossed[number]

@@ -11,6 +11,7 @@ x (all processes and e, sample by sample) K = D + H Q⁻¹ H' with a banded prec
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +20,6 @@ from scipy.linalg import cho_solve_banded, cholesky_banded
 Array = NDArray[np.float64]
 
 ROOT6 = np.sqrt(6.0)
-
-MANY = 150
-"""Columns from which on they are divided side by side."""
 
 
 @dataclass(frozen=True)
@@ -71,6 +69,7 @@ class Covariance:
             return
         first = np.zeros(n, bool)
         first[[s.start for s in segments if s.stop > s.start]] = True
+        self._first, self._decays = first, np.exp(-step / np.array(times))
         band = np.zeros(((2 * width if has else width) + 1, n * width))
         for s, time in enumerate(times):
             decay = np.where(first, 0.0, np.exp(-step / time))  # from the sample before
@@ -114,6 +113,11 @@ class Covariance:
         return rows
 
     @property
+    def variance(self) -> Array:
+        """Of what is independent from sample to sample (n,)."""
+        return self._variance
+
+    @property
     def log_det(self) -> float:
         """Log determinant of K."""
         return self._log_det
@@ -129,10 +133,7 @@ class Covariance:
             for offset, weight in rows:
                 skip = -(offset // width) if offset < 0 else 0
                 hidden[skip * width + offset :: width][: n - skip] += weight[skip:, None] * z[skip:]
-            if flat.shape[1] < MANY:
-                hidden = cho_solve_banded((self._factor, True), hidden, overwrite_b=True, check_finite=False)
-            else:
-                hidden = _substituted(self._factor, hidden)
+            hidden = cho_solve_banded((self._factor, True), hidden, overwrite_b=True, check_finite=False)
             back = np.zeros_like(flat)
             for offset, weight in rows:
                 skip = -(offset // width) if offset < 0 else 0
@@ -140,27 +141,53 @@ class Covariance:
             z -= back / self._variance[:, None]
         return z.reshape(x.shape)
 
+    def white(self, x: Array) -> Array:
+        """Columns x (n, k) made white, so that white(x)' white(y) = x' K⁻¹ y: `solve` at half its cost for many.
+
+        What each sample has that those before it do not foretell, in units of its deviation (a Kalman filter's
+        innovations; Durbin and Koopman 2012, chapter 4). All columns go through one pass.
+        """
+        if not self._width:
+            return x / np.sqrt(self._variance)[:, None]
+        steps = self._steps
+        d = steps.shape[1] - 1
+        found = np.empty_like(x, dtype=float)
+        now, then = np.zeros((2, d + 1, x.shape[1]))
+        for t, step in enumerate(steps):
+            now[d] = x[t]
+            np.matmul(step, now, out=then)
+            found[t] = then[d]
+            now, then = then, now
+        return found
+
+    @cached_property
+    def _steps(self) -> Array:
+        """Maps (n, d + 1, d + 1) from what is foretold of the hidden values (d,), and a sample, to what is foretold
+        next, and the sample's innovation."""
+        n, s = len(self._variance), len(self._levels)
+        weights = np.stack([*self._levels, *(self._derivative or ())], axis=1)
+        d = weights.shape[1]
+        forward, start = np.zeros((d, d)), np.eye(d)
+        forward[:s, :s] = np.diag(self._decays)
+        news = np.diag(np.concatenate([1 - self._decays**2, np.zeros(d - s)]))
+        if d > s:  # e_t is new; the two before it move on
+            forward[s + 1, s] = forward[s + 2, s + 1] = news[s, s] = 1.0
+            start[s + 1 :, s + 1 :] = 0.0
+        steps, spread = np.zeros((n, d + 1, d + 1)), start
+        for t, (h, variance) in enumerate(zip(weights, self._variance, strict=True)):
+            if self._first[t]:
+                spread = start
+                if t:
+                    steps[t - 1, :d] = 0.0  # nothing is remembered
+            seen = spread @ h
+            total = float(h @ seen) + variance
+            gain = forward @ (seen / total)
+            steps[t, :d, :d], steps[t, :d, d] = forward - np.outer(gain, h), gain
+            steps[t, d, :d], steps[t, d, d] = -h / np.sqrt(total), 1 / np.sqrt(total)
+            spread = forward @ (spread - np.outer(seen, seen / total)) @ forward.T + news
+        return steps
+
     def dense(self) -> Array:
         """K itself (n, n); for tests."""
         n = len(self._variance)
         return np.asarray(np.linalg.inv(self.solve(np.eye(n))), float)
-
-
-def _substituted(factor: Array, right: Array) -> Array:
-    """L⁻ᵀ L⁻¹ of many columns side by side: LAPACK takes banded systems column by column, three times as slowly."""
-    width, n = len(factor) - 1, len(right)
-    padded = np.zeros((n + 2 * width, right.shape[1]))
-    inner = padded[width : width + n]
-    before, after = np.zeros((n, width)), np.zeros((n, width))
-    for d in range(1, width + 1):
-        before[d:, width - d] = factor[d, : n - d]
-        after[: n - d, d - 1] = factor[d, : n - d]
-    scale = 1 / factor[0]
-    before, after = before * scale[:, None], after * scale[:, None]
-    np.multiply(right, scale[:, None], out=inner)
-    for i in range(n):
-        inner[i] -= before[i] @ padded[i : i + width]
-    inner *= scale[:, None]
-    for i in range(n - 1, -1, -1):
-        inner[i] -= after[i] @ padded[i + width + 1 : i + 2 * width + 1]
-    return inner

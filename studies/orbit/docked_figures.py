@@ -108,6 +108,7 @@ def _ledger(d: Docked) -> Picture:
         "#999933",
         "#882255",
         "#44AA99",
+        "#66CCEE",
         "#CC1111",
     )
     with drawing():

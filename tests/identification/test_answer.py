@@ -194,13 +194,13 @@ def test_candidates_are_what_explains_anything_by_itself(reported):
 
 
 def found(monkeypatch, right, share, rivals) -> Finding:
-    """The finding of a name that is right in so many of all cases with its evidence: 30, and 2.5 standard errors."""
-    monkeypatch.setattr(answer, "of_name", lambda gain, sure: right if (gain, sure) == (30.0, 2.5) else np.nan)
+    """The finding of a name that is right in so many of all cases with its evidence: 30, 2.5 errors, and 15/16."""
+    monkeypatch.setattr(answer, "of_name", lambda *own: right if own == (30.0, 2.5, 0.9375) else np.nan)
     slots = [SimpleNamespace(name=n, unit=u) for n, u in (("other", "m"), ("level", "N*m"), ("more", "s"))]
     final = fit([1, 2, 3], std=[0.1, 0.2, 0.3], at_bound=np.array([True, False, True]),
                 assembly={"slots": slots, "index_of": lambda p: [1, 2]})  # fmt: skip
     own = name(COULOMB, share, rivals=rivals, channels=(2, 0))
-    told = decided(names=[own], missed={COULOMB.key: Missed(5.0, 2.0, 0.08, (0.02, 0.08), cast(Any, None))})
+    told = decided(names=[own], missed={COULOMB.key: Missed(5.0, 2.0, 0.08, (0.02, 0.08), 0.9375, cast(Any, None))})
     return answer._finding(own, told, final, ["tau.a", "tau.b", "tau.c"])
 
 

@@ -21,7 +21,7 @@ def confirmed(monkeypatch, sure: float) -> bool:
     monkeypatch.setattr(confirming, "foretold", lambda *_: None)
     monkeypatch.setattr(confirming, "_without", lambda model, _: model)
     monkeypatch.setattr(
-        confirming, "_missed", lambda *_: confirming.Missed(sure, 1.0, 0.2, (0.1, 0.2), cast(Any, None))
+        confirming, "_missed", lambda *_: confirming.Missed(sure, 1.0, 0.2, (0.1, 0.2), 0.75, cast(Any, None))
     )
     found: Any = SimpleNamespace(names=(name,), model=None, fit=None)
     return bool(confirming.confirm(found, [], [], {}, lambda _: None).names)

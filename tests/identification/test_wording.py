@@ -136,20 +136,24 @@ def forgotten():
 
 
 @pytest.mark.parametrize(
-    ("gain", "held", "odds"),
+    ("gain", "held", "share", "odds"),
     [
-        (0.0, 1.0, np.exp(-1)),
-        (np.e - 1, 1.0, np.exp(-0.5)),  # half a unit for each of log(1 + gain)
-        (0.0, 4.0, np.exp(-1) * 16),  # odds grow with the square of what the held-out recordings gain
-        (-3.0, 1.0, np.exp(-1)),
-        (0.0, -7.0, np.exp(-1) * 1e-6),  # what they lose counts as next to nothing gained
+        (0.0, 1.0, 0.5, np.exp(-1)),
+        (np.e - 1, 1.0, 0.5, np.exp(-0.5)),  # half a unit for each of log(1 + gain)
+        (0.0, 4.0, 0.5, np.exp(-1) * 16),  # odds grow with the square of what the held-out recordings gain
+        (-3.0, 1.0, 0.5, np.exp(-1)),
+        (0.0, -7.0, 0.5, np.exp(-1) * 1e-6),  # what they lose counts as next to nothing gained
+        (0.0, 1.0, 0.8, np.exp(-1) * 2),  # and with the root of the odds of the share
+        (0.0, 1.0, 0.0, np.exp(-1) / np.sqrt(999)),
     ],
 )
-def test_how_often_a_name_of_torques_is_right_is_logistic_in_both_evidences(gain, held, odds, tmp_path, monkeypatch):
-    (tmp_path / "reliability.json").write_text('{"logit": [-1.0, 0.5, 2.0]}')
+def test_how_often_a_name_of_torques_is_right_is_logistic_in_its_evidence(
+    gain, held, share, odds, tmp_path, monkeypatch
+):
+    (tmp_path / "reliability.json").write_text('{"logit": [-1.0, 0.5, 2.0, 0.5]}')
     monkeypatch.setattr(reliability, "__file__", str(tmp_path / "reliability.py"))
     with forgotten():
-        assert reliability.of_name(gain, held) == pytest.approx(odds / (1 + odds), rel=1e-12)
+        assert reliability.of_name(gain, held, share) == pytest.approx(odds / (1 + odds), rel=1e-12)
 
 
 def test_what_a_noise_is_made_of_is_told_with_sizes_and_times():

@@ -11,15 +11,14 @@ from proof import calibrate
 from proof.counting import Row, counted, fitted, of_effects, of_lines, probability
 from snarelab.identification import reliability
 
-TRUE = (-2.0, 0.6, 1.5)
+TRUE = (-2.0, 0.6, 1.5, 0.7)
 
 
 def drawn(count, seed=0, generator="a", logit=TRUE):
     """Names whose being right is logistic in their evidence, as it is."""
     rng = np.random.default_rng(seed)
-    some = [
-        Row(g, h, False, generator) for g, h in zip(rng.uniform(1, 300, count), rng.uniform(0.3, 8, count), strict=True)
-    ]
+    evidence = zip(rng.uniform(1, 300, count), rng.uniform(0.3, 8, count), rng.uniform(0.02, 0.98, count), strict=True)
+    some = [Row(g, h, s, False, generator) for g, h, s in evidence]
     right = rng.random(count) < probability(logit, some)
     return [row._replace(right=bool(x)) for row, x in zip(some, right, strict=True)]
 
@@ -32,7 +31,8 @@ def test_the_map_that_names_follow_is_found():
 def test_the_map_has_the_highest_penalised_likelihood():
     """Against its own definition, written out: no small step in any direction is likelier."""
     rows = drawn(400, seed=1)
-    x = np.column_stack([np.log1p([r.gain for r in rows]), np.log([r.held for r in rows])])
+    share = np.array([r.share for r in rows])
+    x = np.column_stack([np.log1p([r.gain for r in rows]), np.log([r.held for r in rows]), np.log(share / (1 - share))])
     mean, right = x.mean(axis=0), np.array([r.right for r in rows])
 
     def value(level, slopes):
@@ -43,7 +43,7 @@ def test_the_map_has_the_highest_penalised_likelihood():
     level, *slopes = fitted(rows)
     assert min(slopes) > 0.1  # at no bound
     best = value(level, np.array(slopes))
-    for step in np.concatenate([np.eye(3), -np.eye(3)]) * 1e-2:
+    for step in np.concatenate([np.eye(4), -np.eye(4)]) * 1e-2:
         assert value(level + step[0], slopes + step[1:]) < best
 
 
@@ -55,18 +55,18 @@ def test_names_that_were_never_wrong_are_not_certain():
     assert np.all(found < 0.999)
 
 
-@pytest.mark.parametrize(("evidence", "slope"), [("gain", 1), ("held", 2)])
-def test_more_evidence_never_makes_a_name_less_likely(evidence, slope):
+@pytest.mark.parametrize(("evidence", "slope", "most"), [("gain", 1, 10), ("held", 2, 10), ("share", 3, 1)])
+def test_more_evidence_never_makes_a_name_less_likely(evidence, slope, most):
     """Where the smaller were right and the larger wrong, that evidence counts for nothing."""
-    plain = Row(10.0, 2.0, True, "a")
-    rows = [plain._replace(**{evidence: x}, right=x < 5) for x in np.linspace(1, 10, 40)]
+    plain = Row(10.0, 2.0, 0.5, True, "a")
+    rows = [plain._replace(**{evidence: x * most}, right=x < 0.5) for x in np.linspace(0.1, 1, 40)]
     logit = fitted(rows)
     assert logit[slope] == 0
     assert probability(logit, rows[:1]) == pytest.approx(np.mean([r.right for r in rows]), abs=0.05)
 
 
 def test_evidence_against_a_name_counts_as_none():
-    one, other = Row(-5.0, -2.0, True, "a"), Row(0.0, 1e-3, True, "a")
+    one, other = Row(-5.0, -2.0, -0.1, True, "a"), Row(0.0, 1e-3, 1e-3, True, "a")
     assert probability(TRUE, [one]) == probability(TRUE, [other])
     assert fitted([one, *drawn(30)]) == fitted([other, *drawn(30)])
 
@@ -74,7 +74,7 @@ def test_evidence_against_a_name_counts_as_none():
 def test_the_skill_of_a_generator_is_that_of_a_map_which_never_saw_it():
     """1 - Brier / Brier of its own frequency. Where names of b are right against their evidence, a's map does worse
     on them than that constant."""
-    a, b = drawn(400, 2), drawn(400, 3, "b")
+    a, b = drawn(2000, 2), drawn(400, 3, "b")
     found = counted([*a, *b])
     assert found.logit == fitted([*a, *b])
     right = np.array([r.right for r in b])
@@ -96,7 +96,7 @@ def test_one_generator_alone_has_no_skill_nor_one_whose_names_are_all_right():
     assert counted([*drawn(50), *b]).skill["b"] is None
 
 
-@pytest.mark.parametrize("rows", [[], [Row(np.nan, 1.0, True, "a")], [Row(1.0, np.inf, True, "a")]])
+@pytest.mark.parametrize("rows", [[], [Row(np.nan, 1.0, 0.5, True, "a")], [Row(1.0, np.inf, 0.5, True, "a")]])
 def test_nothing_is_counted_of_nothing(rows):
     with pytest.raises(ValueError, match="no n"):
         counted(rows)
@@ -105,20 +105,23 @@ def test_nothing_is_counted_of_nothing(rows):
 def test_the_program_reads_the_map_as_it_was_counted(monkeypatch):
     logit = fitted(drawn(300))
     monkeypatch.setattr(reliability, "_stored", lambda: {"logit": list(logit)})
-    rows = [*drawn(20, 7), Row(-1.0, -3.0, True, "a"), Row(0.0, 0.0, True, "a")]
-    assert [reliability.of_name(r.gain, r.held) for r in rows] == pytest.approx(probability(logit, rows).tolist())
+    rows = [*drawn(20, 7), Row(-1.0, -3.0, 1.0, True, "a"), Row(0.0, 0.0, 0.0, True, "a")]
+    assert [reliability.of_name(r.gain, r.held, r.share) for r in rows] == pytest.approx(
+        probability(logit, rows).tolist()
+    )
 
 
 def effect(name, at, gain: Any = 12.0, margin=3.0, rivals=()):
-    return {"name": name, "at": at, "gain": gain, "margin": margin, "probability": 0.5, "parameters": {},
-            "rivals": [{"name": n, "at": p, "probability": 0.1, "separable": s} for n, p, s in rivals]}  # fmt: skip
+    own = {"name": name, "at": at, "gain": gain, "margin": margin, "explained": 0.4}
+    others = [{"name": n, "at": p, "probability": 0.1, "separable": s} for n, p, s in rivals]
+    return {**own, "probability": 0.5, "parameters": {}, "rivals": others}
 
 
 def test_names_of_encoders_are_left_out_and_old_ones_without_evidence_refused():
     both = [effect("backlash", "joint1"), effect("sensor_delay", "q_link.joint1", None, 0.9)]
-    assert of_effects(both, [True, False], "x") == [Row(12.0, 3.0, True, "x")]
+    assert of_effects(both, [True, False], "x") == [Row(12.0, 3.0, 0.4, True, "x")]
     old = {k: v for k, v in both[0].items() if k != "gain"}
-    with pytest.raises(ValueError, match="backlash at joint1 was kept without gain and margin; diagnose it again"):
+    with pytest.raises(ValueError, match="backlash at joint1 was kept without gain, margin and explained"):
         of_effects([old], [True], "x")
 
 
@@ -136,7 +139,7 @@ def test_of_the_second_generator_a_class_is_right_and_what_is_true_of_every_case
     ]
     concealed = [{"name": "makkar_friction", "at": "joint1", "size": 1.0, "values": {}}]
     rows = of_lines([line(told, concealed, ["payload_mass"])])
-    assert rows == [Row(1.0, 1.5, True, "drives"), Row(2.0, 2.5, False, "drives")]
+    assert rows == [Row(1.0, 1.5, 0.4, True, "drives"), Row(2.0, 2.5, 0.4, False, "drives")]
     assert len(of_lines([line(told, concealed)])) == 3
     with pytest.raises(ValueError, match=r"^0007: "):
         of_lines([line([{k: v for k, v in told[0].items() if k != "margin"}], concealed)])
@@ -174,7 +177,7 @@ def test_names_of_the_proofs_own_generator_are_judged_as_the_proof_judges_them(t
     monkeypatch.setattr(calibrate, "prepare", lambda *_: (truths, [tmp_path] * 2, SimpleNamespace(answers="")))
     monkeypatch.setattr(calibrate, "fill", lambda *_: found)
     monkeypatch.setattr(calibrate, "score", lambda *_: SimpleNamespace(figures={}))
-    assert calibrate.own(2, 1, 1, print) == [Row(7.0, 1.5, True, "mujoco"), Row(8.0, 2.5, False, "mujoco")]
+    assert calibrate.own(2, 1, 1, print) == [Row(7.0, 1.5, 0.4, True, "mujoco"), Row(8.0, 2.5, 0.4, False, "mujoco")]
 
 
 class _Nobody:
@@ -194,6 +197,7 @@ def test_stored_curve_never_falls_and_is_never_certain():
 
 
 def test_stored_map_rises_with_evidence_and_is_never_certain():
-    more = [reliability.of_name(g, h) for g, h in ((0.0, 1.0), (10.0, 1.0), (10.0, 5.0), (1000.0, 30.0))]
+    grid = ((0.0, 1.0, 0.01), (10.0, 1.0, 0.01), (10.0, 5.0, 0.01), (10.0, 5.0, 0.5), (1000.0, 30.0, 0.9))
+    more = [reliability.of_name(*evidence) for evidence in grid]
     assert np.all(np.diff(more) >= 0)
     assert 0 < more[0] < more[-1] < 1

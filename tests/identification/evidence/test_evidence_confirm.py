@@ -24,7 +24,7 @@ def names(n=N):
 
 
 def missed_by(gain, fit=None, scatter_=1.0) -> Missed:
-    return Missed(gain, scatter_, 0.2, (0.1, 0.2), cast(Any, fit))
+    return Missed(gain, scatter_, 0.2, (0.1, 0.2), 0.75, cast(Any, fit))
 
 
 def eager(rise) -> set[int]:

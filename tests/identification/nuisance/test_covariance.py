@@ -61,14 +61,17 @@ def test_solutions_and_determinant_are_those_of_the_dense_matrix(kind, segments)
     np.testing.assert_allclose(found.dense(), k, rtol=1e-8, atol=1e-9)
 
 
-def test_many_columns_are_solved_as_one_is():
-    """From 150 on they are substituted side by side, by code of its own."""
-    processes, _ = KINDS["all"]
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("segments", [(slice(0, 90),), PARTS])
+def test_columns_made_white_have_the_products_of_the_dense_inverse(kind, segments):
+    processes, encoders = KINDS[kind]
     variance, b, _ = some(2)
-    many = np.random.default_rng(3).normal(size=(90, 170))
-    found = Covariance(variance, processes, b, STEP, (slice(0, 90),))
-    wanted = np.linalg.solve(dense(variance, processes, b, (slice(0, 90),)), many)
-    np.testing.assert_allclose(found.solve(many), wanted, rtol=1e-8, atol=1e-10)
+    x, y = np.random.default_rng(3).normal(size=(2, 90, 7))
+    found = Covariance(variance, processes, b if encoders else None, STEP, segments)
+    wanted = x.T @ np.linalg.solve(dense(variance, processes, b if encoders else None, segments), y)
+    if segments is PARTS:  # outside every run a sample is like one in a run of its own: compared with `solve`
+        wanted = x.T @ found.solve(y)
+    np.testing.assert_allclose(found.white(x).T @ found.white(y), wanted, rtol=1e-8, atol=1e-9)
 
 
 def test_a_process_of_no_level_and_no_derivative_are_none():
