@@ -41,7 +41,8 @@ du -s --apparent-size --block-size=1 "$PLACE/v" | sed 's/^/empty /'
 python3 -c 'import time; print("installed", time.time())'
 "$PLACE/v/bin/snarelab" diagnose my-arm.toml first.csv --holdout second.csv --report report.html --json diagnosis.json
 python3 -c 'import time; print("diagnosed", time.time())'
-times | sed -n '2s/^/processor /p'
+times > "$PLACE/times"
+sed -n '2s/^/processor /p' "$PLACE/times"
 du -s --apparent-size --block-size=1 "$PLACE/v" | sed 's/^/bytes /'
 """
 
