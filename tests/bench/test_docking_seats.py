@@ -44,3 +44,10 @@ def test_an_impulse_counts_from_the_first_touch():
     impulse = np.outer(np.where(time > 0.35, time, 0.0), [1.0, 0.0, 0.0])
     pushed = Pushed(time, np.zeros((10, 3)), np.zeros((10, 4)), impulse, np.zeros(10))
     np.testing.assert_allclose(pushed.impulse_after(0.3), [0.7, 0, 0])
+
+
+def test_what_still_moves_does_not_rest():
+    time = np.linspace(0.0, 2.0, 2001)
+    for speed, rests in ((1e-6, True), (1e-3, False)):
+        place = np.outer(time, [0.0, speed, 0.0])
+        assert Pushed(time, place, np.zeros((2001, 4)), place, np.zeros(2001)).rests == rests
