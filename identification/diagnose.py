@@ -63,7 +63,7 @@ def diagnose(
     progress : callable
         Told in a few words what is under way.
     seed : int
-        Of random starts, and of bootstraps over link encoders and captures.
+        Of random starts, and of bootstraps over captures.
     jobs : int or None
         Processes in which captures are simulated; None: one a core, at most four. For captures only.
     anyway : bool
@@ -118,20 +118,11 @@ def diagnose(
     values = {**model.values, **final.assembly.values(final.theta), **inertial_values(model, inertia)}
     of_links = tuple(p for p in model.effects if p.at.startswith("q_link."))
     after = replace(model, effects=(*final.assembly.placed, *of_links), values=values)
-    links, compared = diagnose_links(
-        model,
-        recordings,
-        held,
-        body,
-        final.assembly,
-        final.theta,
-        scales(train),
-        band,
-        progress=progress,
-        seed=seed,
+    compared = diagnose_links(
+        model, recordings, held, body, final.assembly, final.theta, scales(train), band, progress=progress
     )
-    if links:
-        diagnosis, after = with_links(diagnosis, after, links, compared)
+    if compared is not None:
+        diagnosis, after = with_links(diagnosis, after, compared)
     notes = (*model.tree.notes, *said, *notes_on(final), *diagnosis.notes)
     curves = tuple(friction_curves(final, train))
     return Answer(replace(diagnosis, checks=checks, notes=notes, curves=curves), settled(after))

@@ -21,14 +21,15 @@ from ...errors import InputError
 from ...models.axes import Place, place
 from ...models.effect import Parameter, written_unit
 from ...models.model import Placed
-from ...models.rig.kinematics import sling_of
-from ...models.rig.rig import Rig
 from ...models.tree import Tree
 from .base_parameters import INERTIAL, BaseParameters
 from .effect_terms import contributions
 from .experiment import Experiment, Scales
 
 Array = NDArray[np.float64]
+
+KEPT = 3
+"""Evaluations that stay with a recording: of the model as given, of the last fit, and of a trial beside them."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +106,6 @@ class Assembly:
         placed = tuple(p for p in placed if not p.at.startswith("q_link."))
         self.tree, self.placed, self.base, self.scales = tree, placed, base, scales
         self._joints = [j.name for j in tree.joints]
-        self._links = [link.name for link in tree.links]
         self._speeds = {at: values.get(f"speed_scale.{at}", s.speed) for at, s in scales.items()}
         self.phi = np.array(
             [
@@ -152,11 +152,8 @@ class Assembly:
 
     def joint_of(self, p: Placed) -> int:
         """Index of the joint that an effect's place belongs to; of an axis, the first of its joints."""
-        if isinstance(self.tree, Rig) and p.effect.at == "sling":
-            return sling_of(self.tree, p.at).link
-        if p.effect.at in ("link", "boom", "base"):
-            return self._links.index(p.at)
-        return int(self.place_of(p).channels[0])
+        link = self.tree.link_at(p.effect.at, p.at)
+        return int(self.place_of(p).channels[0]) if link is None else link
 
     def place_of(self, p: Placed) -> Place:
         """The joint, or the axis, that an effect acts at, or whose channel it reads."""
@@ -232,7 +229,18 @@ class Assembly:
         return experiment.measured - experiment.all_to_band(state.tau), banded
 
     def evaluate(self, experiment: Experiment, theta: Array) -> Evaluation:
-        """Rigid-body torque, readings and derivative blocks at full rate."""
+        """Rigid-body torque, readings and derivative blocks at full rate; the last few are kept with the recording."""
+        kept: list[tuple[Assembly, bytes, Evaluation]] = experiment.store.setdefault("evaluated", [])
+        key = theta.tobytes() + self.phi.tobytes()
+        for other, at, found in kept:
+            if other is self and at == key:
+                return found
+        found = self._evaluate(experiment, theta)
+        kept.append((self, key, found))
+        del kept[:-KEPT]
+        return found
+
+    def _evaluate(self, experiment: Experiment, theta: Array) -> Evaluation:
         load, rigid = self._rigid(experiment, theta)
         tau, blocks = load.copy("F"), list(rigid)
         passed: dict[int, list[Callable[[Array], Array]]] = {}
@@ -273,7 +281,10 @@ class Assembly:
         n_joints = len(self._joints)
         if self.base is not None:
             n_base = len(self.base.names)
-            columns = experiment.regressor[:, :, self.base.columns]
+            key = ("base", self.base.columns.tobytes())
+            if key not in experiment.store:
+                experiment.store[key] = experiment.regressor[:, :, self.base.columns]
+            columns = experiment.store[key]
             blocks = [Block(c, np.arange(n_base), columns[:, c], ("base", c)) for c in range(n_joints)]
             return columns @ theta[:n_base] - experiment.carried, blocks
         key = ("rigid", self.phi.tobytes())

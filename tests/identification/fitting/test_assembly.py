@@ -209,3 +209,18 @@ def test_what_is_held_is_not_fitted_but_acts(arm, experiment):
 def test_a_link_effect_beside_free_inertia_is_refused(arm, experiment):
     with pytest.raises(InputError, match=r"payload_mass at link3 with inertia = 'free'"):
         build(arm, experiment, placed(("payload_mass", "link3")), base_parameters(arm[1]))
+
+
+def test_no_model_is_evaluated_twice_at_the_same_parameters(arm, experiment, monkeypatch):
+    """Of two models in turn, as a report compares them; another inertia is another model."""
+    counted, worked_out = [], Assembly._evaluate
+    monkeypatch.setattr(Assembly, "_evaluate", lambda self, *own: counted.append(self) or worked_out(self, *own))
+    models = [build(arm, experiment, placed((name, "joint1"))) for name in ("viscous_friction", "coulomb_friction")]
+    for _ in range(3):
+        torques = [model.torque(experiment, model.start + 1.0) for model in models]
+    assert counted == models
+    assert not np.allclose(torques[0], torques[1])
+    models[0].phi = 2 * models[0].phi
+    again = models[0].torque(experiment, models[0].start + 1.0)
+    assert counted == [*models, models[0]]
+    assert not np.allclose(again, torques[0])
