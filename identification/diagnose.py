@@ -28,7 +28,7 @@ from .fitting.held_out import demand_apart
 from .fitting.recorded import read_all, with_recorded_joints
 from .identify import demand_one_process, inertial_values, physical
 from .links.answer import with_links
-from .links.diagnose import LinkDiagnosis, diagnose_links
+from .links.diagnose import diagnose_links
 from .search.refit import without
 from .search.rest import fitted
 
