@@ -28,7 +28,7 @@ from .fitting.held_out import demand_apart
 from .fitting.recorded import read_all, with_recorded_joints
 from .identify import demand_one_process, inertial_values, physical
 from .links.answer import with_links
-from .links.diagnose import LinkDiagnosis, diagnose_links
+from .links.diagnose import diagnose_links
 from .search.refit import without
 from .search.rest import fitted
 
@@ -63,7 +63,7 @@ def diagnose(
     progress : callable
         Told in a few words what is under way.
     seed : int
-        Of random starts, and of bootstraps over link encoders and captures.
+        Of random starts, and of bootstraps over captures.
     jobs : int or None
         Processes in which captures are simulated; None: one a core, at most four. For captures only.
     anyway : bool
@@ -118,24 +118,13 @@ def diagnose(
     values = {**model.values, **final.assembly.values(final.theta), **inertial_values(model, inertia)}
     of_links = tuple(p for p in model.effects if p.at.startswith("q_link."))
     after = replace(model, effects=(*final.assembly.placed, *of_links), values=values)
-    links: tuple[LinkDiagnosis, ...] = ()
-    compared: list[Experiment] = []
     # Without a second encoder anywhere, they need not be read again.
     if any(str(name).startswith("q_link.") for d in read for name in d.data_vars):
-        links, compared = diagnose_links(
-            model,
-            recordings,
-            held,
-            body,
-            final.assembly,
-            final.theta,
-            scales(train),
-            band,
-            progress=progress,
-            seed=seed,
+        compared = diagnose_links(
+            model, recordings, held, body, final.assembly, final.theta, scales(train), band, progress=progress
         )
-    if links:
-        diagnosis, after = with_links(diagnosis, after, links, compared)
+        if compared is not None:
+            diagnosis, after = with_links(diagnosis, after, compared)
     notes = (*model.tree.notes, *said, *notes_on(final), *diagnosis.notes)
     curves = tuple(friction_curves(final, train))
     return Answer(replace(diagnosis, checks=checks, notes=notes, curves=curves), settled(after))

@@ -20,9 +20,12 @@ from ..identification.diagnose import Answer, diagnose
 from ..identification.fitting.assembly import Assembly
 from ..identification.fitting.experiment import Experiment, load_experiments, scales
 from ..identification.links.diagnose import diagnose_links
-from ..identification.links.pair import Pair, fit_pair, held_out, load_links, pair_of
-from ..identification.links.search import starts
+from ..identification.links.run import load_links
+from ..identification.links.source import Links, links_of
+from ..identification.nuisance.covariance import Covariance
 from ..identification.report.page import write_report
+from ..identification.sources.fit import fit, residuals
+from ..identification.sources.source import At
 from ..models.effects import effects
 from ..models.model import Placed
 from ..models.model_file import load_model
@@ -30,11 +33,13 @@ from ..models.model_write import save_model
 from ..models.rigid_body import RigidBody
 from ..progress import stages
 from ..recordings import find_recording
+from ..report.provenance import provenance
 from .kuka_figures import MDEG, differences, left_over, pattern, rms, without
 from .outcome import FOLDER, Quantity, interval, table, write_json, write_result
 from .page import Picture, Section, write_page
 
 HERE = Path(__file__).parent
+MODEL = HERE / "kuka" / "kr300.toml"
 AXES = ("axis1", "axis2", "axis3")
 
 CHECK = {"nothing": (38.1, 30.0, 30.5), "spring": (22.2, 20.3, 21.7), "skew": (2.5, 3.0, 3.1)}
@@ -54,7 +59,7 @@ def main() -> int:
         print(f"The KR 300 recordings cannot be had: {error}", file=sys.stderr)
         return 2
     answer = diagnose(
-        load_model(HERE / "kuka" / "kr300.toml"),
+        load_model(MODEL),
         recordings,
         holdout,
         progress=stages(partial(print, flush=True)),
@@ -64,10 +69,11 @@ def main() -> int:
     folder.mkdir(parents=True, exist_ok=True)
     found = answer.diagnosis
     save_model(answer.model, folder / "model.toml", found.sentence)
-    write_report(found, folder / "diagnosis.html")
+    files = [("Model", MODEL), *(("Training", x) for x in recordings), ("Held-out", holdout)]
+    write_report(found, folder / "diagnosis.html", provenance("make study-kuka", files))
     write_json(folder / "diagnosis.json", found.to_json())
     write_result("kuka", quantities, time.monotonic() - begun, {"steps": [vars(s) for s in found.steps]})
-    page = write_page("kuka", "KUKA KR 300: motor and link encoders", found.sentence, quantities, sections)
+    page = write_page("kuka", "KUKA KR 300: motor and link encoders", found.sentence, quantities, sections, files=files)
     print(f"{table(quantities)}\n\n{found.sentence}\nReport: {page.resolve()}")
     return 0
 
@@ -79,32 +85,30 @@ def compare(answer: Answer, recordings: list[Path], holdout: Path) -> tuple[list
     train = load_experiments(model, recordings, body)
     band, sizes = train[0].motion.band, scales(train)
     assembly = Assembly(model.tree, (), None, sizes, model.values)
-    pairs: list[list[Pair]] = []
-    for paths in (recordings, [holdout]):
-        _, links = load_links(model, paths, body, band)
-        pairs.append([pair_of(axis, model, links, assembly, assembly.start, sizes[axis]) for axis in AXES])
-    again, _ = diagnose_links(model, recordings, holdout, body, assembly, assembly.start, sizes, band)
+    one, other = (load_links(model, paths, body, band)[1] for paths in (recordings, [holdout]))
+    every = [links_of([axis], model, one, other, assembly, assembly.start, sizes) for axis in AXES]
+    again = diagnose_links(model, recordings, holdout, body, assembly, assembly.start, sizes, band)
     named = [f"{e.name} at {e.at}" for e in found.effects]
     quantities = [
         Quantity("leads_with", "", found.effects[0].name if found.effects else found.verdict, "predicted"),
         Quantity("named", "", ", ".join(named), "reference"),
     ]
     channels = {f.channel: f for f in found.fit}
-    felt = springs_of_measured_torque(pairs, train, load_experiments(model, [holdout], body, band))
+    felt = springs_of_measured_torque(every, train, load_experiments(model, [holdout], body, band))
     before, after, words = [], [], []
-    for number, (axis, pair, locked) in enumerate(zip(AXES, *pairs, strict=True)):
+    for number, (axis, links) in enumerate(zip(AXES, every, strict=True)):
         fit = channels[f"q_link.{axis}"].holdout
         # The band's end was chosen with run C in sight, and on axis 2 it decides between 3.1 and 3.7 mdeg.
         kind = "calibrated" if axis == "axis2" else "predicted"
         quantities += [
             Quantity(f"nothing.{axis}", "mdeg", MDEG * fit.rms_before, "predicted", CHECK["nothing"][number]),
             Quantity(f"spring_of_measured_torque.{axis}", "mdeg", felt[number], "predicted", CHECK["spring"][number]),
-            Quantity(f"spring_of_modelled_load.{axis}", "mdeg", spring_alone(pair, locked), "reference"),
+            Quantity(f"spring_of_modelled_load.{axis}", "mdeg", spring_alone(links), "reference"),
             Quantity(f"named.{axis}", "mdeg", MDEG * fit.rms_after, kind, CHECK["skew"][number]),
         ]
-        before.append(left_over(locked, None)[0])
-        after.append(left_over(locked, model)[0])
-        wave = pattern(left_over(pair, model))
+        before.append(left_over(links, links.held, None)[0])
+        after.append(left_over(links, links.held, model)[0])
+        wave = pattern(left_over(links, links.train, model))
         rest = without([after[-1]], *wave)
         quantities += [
             Quantity(f"unfiltered.{axis}", "mdeg", rms([after[-1]]), "reference"),
@@ -134,12 +138,12 @@ def compare(answer: Answer, recordings: list[Path], holdout: Path) -> tuple[list
                         *interval(p.value, p.std),
                     )
                 )
-    left = [p.named.trial.placed.key for link in again for p in link.proofs]
+    left = [n.placed.key for n in again.decided.best.names] if again else []
     quantities.append(Quantity("named_in_the_improved_model", "", ", ".join(left) or "nothing", "reference"))
     picture = Picture(
         differences(AXES, before, after),
         "Difference of link and motor encoder over time on run C, for three axes, as recorded and with what was named.",
-        "Run C, which no fit has seen, unfiltered. Of it only each axis' zero is taken.",
+        "Run C, which is held out, unfiltered. Of it only each axis' zero is taken.",
     )
     lead = (
         f"Root mean square on run C in the band of 0 to {band:.3g} Hz, which ends below what gears and encoders "
@@ -151,25 +155,31 @@ def compare(answer: Answer, recordings: list[Path], holdout: Path) -> tuple[list
     ]
 
 
-def spring_alone(pair: Pair, locked: Pair) -> float:
-    """RMS on the held-out recording with a spring without damping as the only difference [mdeg]: a damper may act as a
-    delay."""
-    placed = [Placed(effects()["joint_elasticity"], pair.joint, hold=("damping",))]
-    zeros = np.array([float(np.mean(run.measured)) for run in pair.runs])
-    grid = sorted({float(s[0]) for s in starts(pair, placed[0])})
-    fits = [fit_pair(pair, placed, np.concatenate([[stiffness, 0.0], zeros])) for stiffness in grid]
-    best = min(fits, key=lambda f: f.energy)
-    return float(MDEG * np.sqrt(np.mean(held_out(pair, locked, best).residual ** 2)))
+def spring_alone(links: Links) -> float:
+    """RMS of one axis on the held-out recording with a spring without damping as the only difference, by least squares
+    [mdeg]: a damper may act as a delay."""
+    placed = Placed(effects()["joint_elasticity"], links.joints[0], hold=("damping",))
+    stiffness, damping = (f"{placed.key}.{name}" for name in ("stiffness", "damping"))
+    size = 1e-3 * float(links.scale()[0])
+    white = [[Covariance(np.full(len(links.measured(i)), size**2), [], None, 1.0, ())] for i in links.train]
+    fits = []
+    for value in sorted({v.values[stiffness] for v in links.variants(placed)}):
+        at = links.settled(At.of([placed], {stiffness: value, damping: 0.0}, links.n_shifts), links.train)
+        fits.append(fit(links, at.without(placed.key), at, white))
+    best = min(fits, key=lambda f: sum(float(np.sum(r**2)) for r in f.residuals))
+    left = residuals(links, links.held, links.settled(best.at, links.held))
+    return float(MDEG * np.sqrt(np.mean(np.concatenate(left) ** 2)))
 
 
 def springs_of_measured_torque(
-    pairs: Sequence[Sequence[Pair]], train: Sequence[Experiment], locked: Sequence[Experiment]
+    every: Sequence[Links], train: Sequence[Experiment], locked: Sequence[Experiment]
 ) -> list[float]:
     """RMS on the held-out recording with a compliance times the measured torque, friction and all, by axis [mdeg]."""
     found = []
-    for pair, there in zip(*pairs, strict=True):
+    for links in every:
         sides = []
-        for runs, experiments in ((pair.runs, train), (there.runs, locked)):
+        for numbers, experiments in ((links.train, train), (links.held, locked)):
+            runs = [links.rows[i][0] for i in numbers]
             torque = [e.motion.to_band(e.motion.tau[:, r.joint]) for e, r in zip(experiments, runs, strict=True)]
             sides.append(
                 [np.concatenate([x - np.mean(x) for x in own]) for own in (torque, [r.measured for r in runs])]

@@ -6,8 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from ..identification.links.pair import Pair
-from ..identification.links.search import library
+from ..identification.links.source import Links, start
 from ..models.model import Model
 from ..report.drawing import AFTER, BEFORE, GREY, drawing, line, margins, svg
 from ..report.time_axes import over_time
@@ -23,17 +22,16 @@ MOST_CYCLES = 2000
 """Cycles per turn tried; at 25°/s and 250 samples a second more would alias."""
 
 
-def left_over(pair: Pair, model: Model | None) -> list[Left]:
-    """Unfiltered difference of the encoders in every recording, less what a model says of it and less its own mean."""
-    places = (pair.joint, f"q.{pair.joint}", f"q_link.{pair.joint}")
-    own = [p for p in (model.effects if model else ()) if p.at in places and p.key in {q.key for q in library(pair)}]
-    found = []
-    for run in pair.runs:
+def left_over(links: Links, numbers: Sequence[int], model: Model | None) -> list[Left]:
+    """Unfiltered difference of one axis' encoders in some recordings, less what a model says of it and less its own
+    mean."""
+    found, at = [], None if model is None else start(links, model)
+    for i in numbers:
+        run = links.rows[i][0]
         difference = run.motion.tau[:, run.joint]
         link = run.motion.q[:, run.joint] + difference
-        for p in own:
-            values = np.array([(model.values if model else {})[f"{p.key}.{x.name}"] for x in p.effect.parameters])
-            difference = difference - run.term(p, values)[0]
+        if at is not None:
+            difference = difference - sum(run.term(p, at.of_effect(p))[0] for p in at.placed)
         found.append((run.motion.time, link, difference - np.mean(difference)))
     return found
 

@@ -4,17 +4,13 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from ...errors import InputError
-from ...models.docking.bench_setup import DockingTree
 from ...models.model import Model
 from ...recordings.part import several
-from ..deciding import SECOND_CHOICES
 from ..diagnosis import Diagnosis
-from .answer import report_on, with_found
-from .confirm import confirm
-from .recording import load_records
-from .runs import Runs
-from .search import search
+from ..sources.answer import with_found
+from ..sources.decide import decide
+from .answer import report_on
+from .source import Dockings, start
 
 
 def diagnose_dockings(
@@ -44,26 +40,9 @@ def diagnose_dockings(
     InputError
         Whatever is wrong with a recording, or a model that cannot be simulated from where it starts.
     """
-    assert isinstance(model.tree, DockingTree)
-    if not recordings:
-        raise InputError("recordings: none is given; give one or more")
     begun = time.monotonic()
     progress("reading the recordings")
-    records = load_records(model, [*recordings, *several(holdout)])
-    runs = Runs(model.tree.setup, records)
-    train, held = range(len(recordings)), range(len(recordings), len(records))
-    found = search(runs, train, model, progress=progress)
-    best = confirm(runs, train, held, model, found, progress)
-    rejected = {n.placed.key: n for n in best.rejected}
-    last = best
-    for _ in range(SECOND_CHOICES):
-        if best.names or not last.rejected:
-            break
-        progress("looking for what else could explain what the held-out recording did not confirm")
-        again = search(runs, train, model, barred=rejected, progress=progress)
-        last = confirm(runs, train, held, model, again, progress)
-        rejected |= {n.placed.key: n for n in last.rejected}
-        if len(last.names) > len(best.names):
-            found, best = again, last
-    diagnosis = report_on(runs, model, found, best, train, held, time.monotonic() - begun)
-    return diagnosis, with_found(model, best.train)
+    source = Dockings(model, recordings, several(holdout))
+    decided = decide(source, start(model), progress)
+    diagnosis = report_on(source, model.name, decided, time.monotonic() - begun)
+    return diagnosis, with_found(model, decided.best.train.at)

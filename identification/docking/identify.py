@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError
-from ...models.docking.bench_setup import DockingTree
 from ...models.model import Model
+from ..evidence.arm import Weighed
 from ..parameter_list import parameter_list
-from .answer import channel_rms, channel_sizes, estimates, with_found
-from .fit import Linear, fit, linearised, normal, priors, shift_columns, start
-from .recording import Record, load_records, unit_of
-from .runs import Runs
-from .weigh import Weighed, covariances, weigh
+from ..sources.answer import estimates, rms, with_found
+from ..sources.fit import deviations, fit, linearised, shift_columns
+from ..sources.source import At, Linear
+from ..sources.weigh import covariances, weigh
+from .recording import unit_of
+from .source import Dockings, start
 
 STEPS = 8
 """Most steps of the fit."""
@@ -26,29 +26,26 @@ class IdentifiedDockings:
     """A fit of docking tests, the model with its values, and the recordings."""
 
     model: Model
-    given: Model
-    runs: Runs
+    given: At
+    source: Dockings
     weighed: Weighed
     fit: Linear
-    train: tuple[Record, ...]
-    holdout: tuple[Record, ...]
     held: Linear | None
 
     def to_json(self) -> dict[str, Any]:
         """The published form."""
-        parameters = parameter_list(self.fit.at.placed, estimates(self.given, self.fit, self.weighed))
+        source, noise = self.source, covariances(self.weighed)
+        parameters = parameter_list(self.fit.at.placed, estimates(source, self.given, self.fit, noise))
         fits: dict[str, Any] = {}
-        for role, records, found in (("train", self.train, self.fit), ("holdout", self.holdout, self.held)):
+        for role, numbers, found in (("train", source.train, self.fit), ("holdout", source.held, self.held)):
             if found is not None:
-                rms, sizes = channel_rms(found), channel_sizes(records)
-                for channel, a, b in zip(records[0].channels, rms, sizes, strict=True):
+                for channel, a, b in zip(source.channels, rms(found), source.sizes(numbers), strict=True):
                     entry = fits.setdefault(channel, {"unit": unit_of(channel)})
                     entry[role] = {"rms": float(a), "relative": float(a / b)}
-        _, matrix = normal(self.fit, covariances(self.weighed), priors(self.given, self.fit.at))
-        own = matrix[: len(self.fit.at.values), : len(self.fit.at.values)]
+        _, own = deviations(source, self.given, self.fit, noise)
         size = np.sqrt(np.maximum(np.diag(own), 1e-300))
         condition = float(min(np.linalg.cond(own / np.outer(size, size)), 1e300)) if len(own) else 1.0
-        notes = [f"{Path(r.path).name}: {note}" for r in (*self.train, *self.holdout) for note in r.notes]
+        notes = [f"{Path(r.path).name}: {note}" for r in source.records for note in r.notes]
         return {
             "model": self.model.name, "parameters": parameters, "fit": fits, "condition": condition, "notes": notes
         }  # fmt: skip
@@ -62,17 +59,11 @@ def identify_dockings(
     progress: Callable[[str], None] = lambda _: None,
 ) -> IdentifiedDockings:
     """Fit every parameter of a docking's effects; arguments and errors as `diagnose_dockings`."""
-    assert isinstance(model.tree, DockingTree)
-    if not recordings:
-        raise InputError("recordings: none is given; give one or more")
     progress("reading the recordings")
-    records = load_records(model, [*recordings, *holdout])
-    runs, n = Runs(model.tree.setup, records), len(recordings)
+    source, given = Dockings(model, recordings, holdout), start(model)
     progress("fitting the effects' parameters with the simulation in the loop")
-    here = linearised(runs, range(n), start(model))
-    weighed = weigh(runs, range(n), model, here, search=False)
-    found = fit(runs, range(n), model, here.at, covariances(weighed), shift_columns(here), STEPS)
-    held = linearised(runs, range(n, len(records)), found.at) if holdout else None
-    return IdentifiedDockings(
-        with_found(model, found), model, runs, weighed, found, tuple(records[:n]), tuple(records[n:]), held
-    )
+    here = linearised(source, source.train, given)
+    weighed = weigh(source, source.train, given, here, search=False)
+    found = fit(source, given, here.at, covariances(weighed), shift_columns(here), STEPS)
+    held = linearised(source, source.held, found.at) if holdout else None
+    return IdentifiedDockings(with_found(model, found.at), given, source, weighed, found, held)

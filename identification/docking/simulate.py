@@ -10,9 +10,9 @@ from ...errors import InputError
 from ...models.docking.bench import SEEN
 from ...models.docking.bench_setup import DockingTree
 from ...models.model import Model
-from .fit import start
 from .recording import EVERY, KNOTS, load_records
 from .runs import SHIFTS, Runs
+from .source import start
 
 
 def simulate_docking(model: Model, motion: str | Path | None = None) -> xr.Dataset:

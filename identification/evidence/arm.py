@@ -206,17 +206,17 @@ def _noise(
             if along.assembly.base is None:
                 own.append(regressor_columns(e, channel))
             parts.append(np.concatenate(own, axis=1))
-        return _principal(parts)
+        return principal(parts, STRONGEST)
 
     own = [row[channel] for row in runs[:n]]
     return learn([r[:, channel] for r in residuals[:n]], beside_all([*laws, *small]), own, freely=bool(named))
 
 
-def _principal(parts: Sequence[Array]) -> list[Array]:
+def principal(parts: Sequence[Array], most: int) -> list[Array]:
     """The strongest directions of columns of unit RMS, of unit RMS themselves."""
     whole = np.concatenate(list(parts))
     size = np.sqrt(np.mean(whole**2, axis=0))
     use = size > 1e-9 * size.max(initial=1e-300)
     u, d, _ = np.linalg.svd(whole[:, use] / size[use], full_matrices=False)
-    kept = u[:, (np.arange(len(d)) < STRONGEST) & (d > 1e-3 * d.max(initial=0.0))] * np.sqrt(len(u))
+    kept = u[:, (np.arange(len(d)) < most) & (d > 1e-3 * d.max(initial=0.0))] * np.sqrt(len(u))
     return np.split(kept, np.cumsum([len(p) for p in parts])[:-1])

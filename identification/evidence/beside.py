@@ -30,6 +30,8 @@ class Beside:
     tolerant: slice
     baseline: list[list[Part]]
     """The baseline's own columns, in units of the parameters."""
+    more: tuple[float, ...] = ()
+    """Tolerances beyond `TOLERANCES` that may be chosen."""
 
     def weight(self, tolerance: float) -> Array:
         """Factors on the prior deviations (count,) for masses that are known to a share."""

@@ -84,7 +84,7 @@ def search(
         noises = weighed.noises
         if not trials:
             trials = _trials(made, weighed)
-        slots = _as_names(made, slots)
+        slots = as_names(made, slots)
         news = [s for s in slots if weighed.pool[s.taken.hypothesis].named]
         if not news:
             break
@@ -174,7 +174,7 @@ def _reached(weighed: Weighed, slot: Slot) -> list[int]:
     return weighed.evidence.reached(weighed.evidence.items[slot.taken.item])
 
 
-def _as_names(search: Search, slots: Sequence[Slot]) -> list[Slot]:
+def as_names(search: Search, slots: Sequence[Slot]) -> list[Slot]:
     """Slots in which a curve that a name's law nearly is has become that name, and a law that is nearly a special case
     of it that special case (the principle of marginality: Nelder 1977). What it is not is found afterwards."""
     taken = [s.taken for s in slots]

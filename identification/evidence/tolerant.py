@@ -33,7 +33,7 @@ def searched(
     wanders. ``channels`` are those of which that may have changed.
     """
     masses = weighed.beside.tolerant
-    tolerances = TOLERANCES if masses.stop > masses.start else TOLERANCES[:1]
+    tolerances = (*TOLERANCES, *weighed.beside.more) if masses.stop > masses.start else TOLERANCES[:1]
     best = max((_best(weighed, recordings, barred, x) for x in tolerances), key=lambda b: b.value)
     before = weighed
     for c in sorted(channels):

@@ -5,29 +5,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...models.effects import effects
-from ...models.model import Model, Placed
-from ..diagnosis import ChannelFit, Diagnosis, Finding, Location, Misfit, Step
+from ...models.model import Model
+from ..diagnosis import ChannelFit, Diagnosis, Finding, Location, Step
 from ..fitting.experiment import Experiment
 from ..search.locate import locate
-from .diagnose import LinkDiagnosis
-from .findings import (
-    candidates_of,
-    findings_of,
-    length,
-    limits_of,
-    nameless,
-    noise_floor,
-    notes_of,
-    traces_of,
-    unit_of,
-)
-from .pair import Pair, PairFit
+from ..sources.answer import candidates, channel_fits, limits, rms, with_found
+from .diagnose import Compared
+from .findings import findings_of, length, nameless, noise_floor, notes_of, traces_of, unit_of
+from .source import Links
 
 
-def with_links(
-    diagnosis: Diagnosis, model: Model, links: Sequence[LinkDiagnosis], train: Sequence[Experiment]
-) -> tuple[Diagnosis, Model]:
+def with_links(diagnosis: Diagnosis, model: Model, one: Compared) -> tuple[Diagnosis, Model]:
     """One answer from the torques' diagnosis and the encoders'.
 
     Effects are ordered by the share of its own channel's misfit that each kind of channel was told by what is named:
@@ -39,52 +27,51 @@ def with_links(
         Of the torques.
     model : Model
         With what the torques asked for.
-    links : sequence of LinkDiagnosis
-    train : sequence of Experiment
-        Training recordings with link less motor position in place of torque.
+    one : Compared
 
     Returns
     -------
     diagnosis, and the model with what was named
     """
-    findings = findings_of(links)
-    fits = tuple(_fit(link) for link in links)
+    links, decided = one.links, one.decided
+    findings, fits = findings_of(one), _fits(one)
+    still = {(n.placed.effect.name, n.placed.at) for n in decided.best.names if links.still(n.placed)}
     first = bool(findings) and (not diagnosis.effects or max(_told(fits)) >= max(_told(diagnosis.fit)))
     own = {(f.name, f.at) for f in findings}
     others = tuple(f for f in diagnosis.effects if (f.name, f.at) not in own)
     # A constant difference of zeros explains nothing that moves, and comes last.
-    offsets = tuple(f for f in findings if f.name == "sensor_bias")
-    moving = tuple(f for f in findings if f.name != "sensor_bias")
+    offsets = tuple(f for f in findings if (f.name, f.at) in still)
+    moving = tuple(f for f in findings if (f.name, f.at) not in still)
     verdict, description = diagnosis.verdict, diagnosis.description
     sentences, spoken_of = [diagnosis.sentence], diagnosis.foremost
     if findings:
         spoken_of = _foremost(fits).channel if first else spoken_of
-        said = _sentence(moving or offsets, fits)
+        said = _sentence(moving, offsets, fits)
         if verdict == "adequate":
             sentences = ["The torques ask for nothing that these recordings can show."]
         sentences = [said, *sentences] if first else [*sentences, said]
         verdict = "missing_physics"
-    elif any(map(nameless, links)) and verdict != "missing_physics":
-        description = "; ".join(filter(None, [description, *map(nameless, links)]))
+    elif nameless(one) and verdict != "missing_physics":
+        description = "; ".join(filter(None, [description, nameless(one)]))
         sentences = [f"Something is missing that no effect of the vocabulary explains: {description}."]
         verdict = "unknown_effect"
-    steps, torques = _steps(links), diagnosis
+    steps, torques = _steps(one), diagnosis
     answer = replace(
         diagnosis,
         verdict=verdict,
         sentence=" ".join(sentences),
         description=description,
         effects=(*moving, *others, *offsets) if first else (*others, *moving, *offsets),
-        location=_location(diagnosis, links, fits, train) if findings else diagnosis.location,
+        location=_location(diagnosis, one, fits) if findings else diagnosis.location,
         fit=(*fits, *torques.fit) if first else (*torques.fit, *fits),
         steps=(*steps, *torques.steps) if first else (*torques.steps, *steps),
-        candidates=(*torques.candidates, *(c for link in links for c in candidates_of(link))),
-        traces=(*torques.traces, *(t for link in links for t in traces_of(link))),
-        limits=(*torques.limits, *(x for link in links for x in limits_of(link))),
-        notes=(*torques.notes, *(n for link in links for n in notes_of(link))),
+        candidates=(*torques.candidates, *candidates(decided)),
+        traces=(*torques.traces, *traces_of(one)),
+        limits=(*torques.limits, *limits(links, decided)),
+        notes=(*torques.notes, *notes_of(one)),
         foremost=spoken_of,
     )
-    return answer, _model(model, links)
+    return answer, with_found(model, decided.best.train.at)
 
 
 def _told(fits: Sequence[ChannelFit]) -> list[float]:
@@ -92,20 +79,17 @@ def _told(fits: Sequence[ChannelFit]) -> list[float]:
     return [max(0.0, 1 - (f.holdout.rms_after / max(f.holdout.rms_before, 1e-300)) ** 2) for f in fits]
 
 
-def _fit(link: LinkDiagnosis) -> ChannelFit:
-    def misfit(pair: Pair, first: PairFit, last: PairFit) -> Misfit:
-        reading = np.concatenate([r.motion.to_band(r.motion.q[:, r.joint]) + r.measured for r in pair.runs])
-        size = float(np.sqrt(np.mean(reading**2)))
-        before, after = (float(np.sqrt(np.mean(f.residual**2))) for f in (first, last))
-        return Misfit(before, after, before / size, after / size)
+def _fits(one: Compared) -> tuple[ChannelFit, ...]:
+    links, every = one.links, range(len(one.links.joints))
+    sizes = _readings(links, links.train), _readings(links, links.held)
+    units, floors = [unit_of(links, c) for c in every], [noise_floor(links, c) for c in every]
+    return channel_fits(one.decided, links.channels, units, *sizes, floors)
 
-    return ChannelFit(
-        f"q_link.{link.pair.joint}",
-        unit_of(link.pair),
-        misfit(link.pair, link.steps[0], link.steps[-1]),
-        misfit(link.locked, link.held[0], link.held[-1]),
-        noise_floor(link),
-    )
+
+def _readings(links: Links, numbers: Sequence[int]) -> np.ndarray:
+    """RMS of each link encoder's own reading (c,)."""
+    rows = [[r.motion.to_band(r.motion.q[:, r.joint]) + r.measured for r in links.rows[i]] for i in numbers]
+    return np.sqrt(np.mean(np.concatenate([np.stack(row, axis=1) for row in rows]) ** 2, axis=0))
 
 
 def _foremost(fits: Sequence[ChannelFit]) -> ChannelFit:
@@ -114,20 +98,19 @@ def _foremost(fits: Sequence[ChannelFit]) -> ChannelFit:
     return max(changed or fits, key=lambda f: f.holdout.rms_before)
 
 
-def _sentence(findings: Sequence[Finding], fits: Sequence[ChannelFit]) -> str:
-    """What the encoders say, first the kind that is named at most joints."""
-    if not findings:
-        return ""
+def _sentence(moving: Sequence[Finding], offsets: Sequence[Finding], fits: Sequence[ChannelFit]) -> str:
+    """What the encoders say; of zeros only where nothing moves."""
+    findings = moving or offsets
     by_name: dict[str, list[str]] = {}
     for f in findings:
         by_name.setdefault(f.name, []).append(f.at)
     words = []
     for name, places in by_name.items():
         value = [next(iter(f.parameters.values())) for f in findings if f.name == name]
-        extra = f" of {', '.join(f'{1e3 * v.value:.3g}' for v in value)} ms" if name == "sensor_delay" else ""
+        extra = f" of {', '.join(f'{1e3 * v.value:.3g}' for v in value)} ms" if value[0].unit == "s" else ""
         words.append(f"{name.replace('_', ' ')}{extra} at {', '.join(places)}")
     said = f"Link and motor encoders differ by {'; '.join(words)}."
-    if all(f.name == "sensor_bias" for f in findings):
+    if not moving:
         return said
     worst = _foremost(fits)
     before, after = (length(x, worst.unit) for x in (worst.holdout.rms_before, worst.holdout.rms_after))
@@ -137,73 +120,32 @@ def _sentence(findings: Sequence[Finding], fits: Sequence[ChannelFit]) -> str:
     )
 
 
-def _location(
-    diagnosis: Diagnosis, links: Sequence[LinkDiagnosis], fits: Sequence[ChannelFit], train: Sequence[Experiment]
-) -> tuple[Location, ...]:
+def _location(diagnosis: Diagnosis, one: Compared, fits: Sequence[ChannelFit]) -> tuple[Location, ...]:
     """Channels by the share of their own misfit that is told; torques and encoders have no unit in common."""
     told = dict(zip((f.channel for f in diagnosis.fit), _told(diagnosis.fit), strict=True))
     places = [(told[p.channel], p) for p in diagnosis.location if told.get(p.channel, 0.0) > 0]
-    for link, share in zip(links, _told(fits), strict=True):
-        if not link.proofs:
+    links, decided = one.links, one.decided
+    named = {c for n in decided.best.names for c in n.channels}
+    for c, share in enumerate(_told(fits)):
+        if c not in named:
             continue
-        number = link.pair.runs[0].joint
         loaded, changes = [], []
-        residual = link.steps[0].residual - link.steps[-1].residual
-        at = 0
-        for e, run in zip(train, link.pair.runs, strict=True):
-            tau = np.zeros_like(e.motion.tau)
-            tau[:, number] = run.load
+        pairs = zip(decided.found.first.residuals, decided.best.train.residuals, strict=True)
+        for e, row, (before, after) in zip(one.train, links.rows, pairs, strict=False):
+            tau, change = np.zeros_like(e.motion.tau), np.zeros((len(before), e.motion.tau.shape[1]))
+            tau[:, row[c].joint], change[:, row[c].joint] = row[c].load, (before - after)[:, c]
             loaded.append(Experiment(replace(e.motion, tau=tau), e.body))
-            change = np.zeros((len(run.measured), tau.shape[1]))
-            change[:, number] = residual[at : at + len(change)]
-            at += len(change)
             changes.append(change)
-        found = locate(loaded, changes)
-        places += [(share, replace(p, channel=f"q_link.{link.pair.joint}")) for p in found]
+        places += [(share, replace(p, channel=links.channels[c])) for p in locate(loaded, changes)]
     total = sum(share for share, _ in places)
     places.sort(key=lambda x: -x[0])
     return tuple(replace(p, share=float(share / total) * (1 - 1e-12)) for share, p in places)
 
 
-def _steps(links: Sequence[LinkDiagnosis]) -> list[Step]:
+def _steps(one: Compared) -> list[Step]:
     """Relative misfit of the encoders, each effect's name added at all its joints at once."""
-
-    def line(label: str, upto: dict[str, int]) -> Step:
-        values = []
-        for pairs, fits in (("pair", "steps"), ("locked", "held")):
-            squares = []
-            for link in links:
-                pair, found = getattr(link, pairs), getattr(link, fits)[upto[link.pair.joint]]
-                reading = np.concatenate([r.motion.to_band(r.motion.q[:, r.joint]) + r.measured for r in pair.runs])
-                squares.append(found.energy / float(reading @ reading))
-            values.append(float(np.sqrt(np.mean(squares))))
-        return Step(label, values[0], values[1])
-
-    upto = {link.pair.joint: 0 for link in links}
-    lines = [line("link encoders as given", upto)]
-    for depth in range(max(len(link.proofs) for link in links) if links else 0):
-        by_name: dict[str, list[LinkDiagnosis]] = {}
-        for link in links:
-            if depth < len(link.proofs):
-                by_name.setdefault(link.proofs[depth].named.trial.placed.effect.name, []).append(link)
-        for name, members in by_name.items():
-            upto |= {link.pair.joint: depth + 1 for link in members}
-            places = ", ".join(link.proofs[depth].named.trial.placed.at for link in members)
-            lines.append(line(f"+ {name} at {places}", upto))
-    return lines
-
-
-def _model(model: Model, links: Sequence[LinkDiagnosis]) -> Model:
-    """The model with what the encoders asked for."""
-    placed, values = {p.key: p for p in model.effects}, dict(model.values)
-    for link in links:
-        found = link.steps[-1]
-        for p in found.placed:
-            placed[p.key] = p
-            for parameter, value in zip(p.effect.parameters, found.theta[found.parameters(p)], strict=True):
-                values[f"{p.key}.{parameter.name}"] = float(value)
-        if link.offset is not None:
-            bias = Placed(effects()["sensor_bias"], f"q_link.{link.pair.joint}")
-            placed[bias.key] = bias
-            values[f"{bias.key}.offset"] = link.offset.value
-    return replace(model, effects=tuple(placed.values()), values=values)
+    sizes = [_readings(one.links, numbers) for numbers in (one.links.train, one.links.held)]
+    return [
+        Step(label, *(float(np.sqrt(np.mean((rms(x) / s) ** 2))) for x, s in zip(fits, sizes, strict=True)))
+        for label, *fits in one.stages
+    ]

@@ -1,28 +1,23 @@
-"""One joint's encoders in words and numbers: what is named, what would have been seen, what is left without a name."""
+"""Encoders in words and numbers: what is named, what is left without a name, noise, traces, notes."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.effects import effects
-from ...models.model import Placed
-from ..diagnosis import Candidate, Estimate, Finding, Limit, Rival, Trace
-from ..reliability import probability as reliability
-from ..wording import experiment_sentence, percent
-from .diagnose import LinkDiagnosis, Proof
-from .pair import Pair, PairFit, deviations
+from ..diagnosis import Estimate, Finding, Rival, Trace
+from ..sources.answer import estimates, finding, not_confirmed, rms
+from ..sources.search import Name
+from ..sources.source import Linear
+from ..sources.weigh import covariances
+from ..wording import percent
+from .diagnose import Compared
+from .source import Links
 
 Array = NDArray[np.float64]
-
-
-NAMELESS = 0.1
-"""Smooth curves that explain this share of the difference, in blocks they did not see, mean a nameless effect."""
-
-EITHER = ("sensor_gain", "sensor_drift", "sensor_bias")
-"""Faults that either of the two encoders may have."""
 
 
 def length(value: float, unit: str) -> str:
@@ -30,99 +25,67 @@ def length(value: float, unit: str) -> str:
     return f"{1e3 * value:.3g} m{unit}"
 
 
-def unit_of(pair: Pair) -> str:
-    """The joint's position unit."""
-    return "m" if pair.kind == "prismatic" else "rad"
+def unit_of(links: Links, c: int) -> str:
+    """A joint's position unit."""
+    return "m" if links.kinds[c] == "prismatic" else "rad"
 
 
-def _estimates(link: LinkDiagnosis, placed: Placed) -> dict[str, Estimate]:
-    found = link.steps[-1]
-    span, std = found.parameters(placed), deviations(link.pair, found)
-    made = {}
-    for p, value, s in zip(placed.effect.parameters, found.theta[span], std[span], strict=True):
-        low, high = link.pair.bounds(p)
-        bound = bool(value - low <= 1e-6 * abs(value) or high - value <= 1e-6 * abs(value))
-        made[p.name] = Estimate(float(value), float(s), link.pair.unit(p), bound)
-    return made
+def findings_of(one: Compared) -> tuple[Finding, ...]:
+    """What the held-out recordings miss most goes first; what adds the same at all times goes last."""
+    links, best = one.links, one.decided.best
+    values = estimates(links, one.decided.given, best.train, covariances(one.decided.found.weighed))
+    order = sorted(best.names, key=lambda n: (links.still(n.placed), -best.missed[n.placed.key].gain))
+    return tuple(_finding(one, n, values[n.placed.key]) for n in order)
 
 
-def findings_of(links: Sequence[LinkDiagnosis]) -> tuple[Finding, ...]:
-    """What was named first at each joint goes first, and of these what explains most."""
-    ranked = [
-        (depth, -proof.named.trial.explained, _finding(link, proof))
-        for link in links
-        for depth, proof in enumerate(link.proofs)
-    ]
-    ranked.sort(key=lambda x: x[:2])
-    return (*(f for _, _, f in ranked), *(f for link in links for f in _offset(link)))
-
-
-def _offset(link: LinkDiagnosis) -> list[Finding]:
-    found = []
-    if link.offset is not None:
-        effect, at = effects()["sensor_bias"], f"q_link.{link.pair.joint}"
-        unit = unit_of(link.pair)
-        without, within = (length(x, unit) for x in (link.offset.without, link.offset.within))
-        sentence = (
-            f"{effect.sentence[:1].upper()}{effect.sentence[1:]}: in every recording the link encoder's zero stands "
-            f"off the motor's by the same {length(link.offset.value, unit)}; without it the held-out recording is "
-            f"missed by {without}, with it by {within}. It explains nothing that moves."
+def _finding(one: Compared, n: Name, values: dict[str, Estimate]) -> Finding:
+    links, p = one.links, n.placed
+    c = links.channel(p)
+    unit, joint = unit_of(links, c), links.joints[c]
+    without, within = (float(rms(x)[c]) for x in (one.decided.best.missed[p.key].held, one.decided.best.held))
+    text = f"{p.effect.sentence[:1].upper()}{p.effect.sentence[1:]}: "
+    if links.still(p):
+        ((name, estimate),) = values.items()
+        zeros, own = (links.zeros(x.at)[list(y), c] for x, y in ((one.decided.best.held, links.held),
+                                                                 (one.decided.best.train, links.train)))  # fmt: skip
+        # The recordings' own zeros tell it as far as they agree.
+        spread = max(float(np.std(own, ddof=min(1, len(own) - 1))), float(rms(one.decided.best.train)[c]))
+        values = {name: replace(estimate, std=spread / np.sqrt(len(own)))}
+        without, within = (float(np.sqrt(within**2 + np.mean((zeros + x) ** 2))) for x in (estimate.value, 0.0))
+        text += (
+            f"in every recording the link encoder's zero stands off the motor's by the same "
+            f"{length(estimate.value, unit)}; without it the held-out recording is missed by {length(without, unit)}, "
+            f"with it by {length(within, unit)}. It explains nothing that moves."
         )
-        estimate = Estimate(link.offset.value, link.offset.std, unit)
-        rival = _either(link.pair, Placed(effect, at), reliability(1.0) / 2)
-        found.append(Finding(effect.name, at, 0.5, reliability(1.0) / 2, {"offset": estimate}, sentence, (rival,)))
-    return found
+    else:
+        share = max(0.0, 1 - (within / max(without, 1e-300)) ** 2)
+        text += (
+            f"it explains {percent(share)} of what motor and link encoder of {joint} differ by without it; taking it "
+            f"out again raises the difference left on the held-out recording from {length(within, unit)} to "
+            f"{length(without, unit)}.{_twist(one, n)}"
+        )
+    # Of a fault that time does not tell apart, the two cannot say which of the two encoders is off.
+    either = p.effect.at == "sensor" and not p.effect.states
+    third = f"hold either encoder of {joint} against a third measurement, such as a laser tracker's"
+    rivals = [Rival(p.effect.name, f"q.{joint}", 0.0, False, third)] if either else []
+    return finding(one.decided, n, values, text, 1 - (within / max(without, 1e-300)) ** 2, rivals)
 
 
-def _finding(link: LinkDiagnosis, proof: Proof) -> Finding:
-    named, unit = proof.named, unit_of(link.pair)
-    placed = named.trial.placed
-    right = reliability(named.margin)
-    rivals = [
-        Rival(p.effect.name, p.at, w * right, separable, experiment_sentence(placed, p))
-        for p, w, separable in named.rivals
-        if w >= 0.005 or not separable
-    ]
-    margin = named.margin
-    if placed.effect.name in EITHER:
-        # Which of the two encoders is off, the two cannot tell.
-        margin /= 2
-        rivals.append(_either(link.pair, placed, margin * right))
-    text = placed.effect.sentence
-    evidence = (
-        f"{text[:1].upper()}{text[1:]}: it explains {percent(named.trial.explained)} of what motor and link encoder of "
-        f"{link.pair.joint} so far differed by; taking it out again raises the difference left on the held-out "
-        f"recording from {length(proof.within, unit)} to {length(proof.without, unit)}.{_twist(link, placed)}"
-    )
-    return Finding(
-        placed.effect.name, placed.at, margin, margin * right, _estimates(link, placed), evidence, tuple(rivals)
-    )
-
-
-def _twist(link: LinkDiagnosis, placed: Placed) -> str:
+def _twist(one: Compared, n: Name) -> str:
     """How far a drive twists, beside what it does not explain."""
-    if placed.effect.acts_on != "position":
+    if n.placed.effect.acts_on != "position":
         return ""
-    found = link.steps[-1]
-    parameters = found.theta[found.parameters(placed)]
-    twist = np.concatenate([run.term(placed, parameters)[0] for run in link.pair.runs])
-    return f" The drive twists over {length(float(np.ptp(twist)), unit_of(link.pair))} in all."
+    links, at = one.links, one.decided.best.train.at
+    c = links.channel(n.placed)
+    twist = [links.rows[i][c].term(n.placed, at.of_effect(n.placed))[0] for i in links.train]
+    return f" The drive twists over {length(float(np.ptp(np.concatenate(twist))), unit_of(links, c))} in all."
 
 
-def _either(pair: Pair, placed: Placed, probability: float) -> Rival:
-    return Rival(
-        placed.effect.name,
-        f"q.{pair.joint}",
-        probability,
-        False,
-        f"hold either encoder of {pair.joint} against a third measurement, such as a laser tracker's",
-    )
-
-
-def noise_floor(link: LinkDiagnosis) -> float:
+def noise_floor(links: Links, c: int) -> float:
     """RMS in the analysis band of white noise as strong as the raw difference above twice that band."""
     floors = []
-    for run in link.pair.runs:
+    for i in links.train:
+        run = links.rows[i][c]
         longest = max(run.motion.segments, key=lambda s: s.stop - s.start)
         part = run.motion.tau[longest, run.joint]
         part = (part - np.mean(part)) * np.hanning(len(part))
@@ -134,97 +97,46 @@ def noise_floor(link: LinkDiagnosis) -> float:
     return min(floors)
 
 
-def nameless(link: LinkDiagnosis) -> str:
-    """What has no name, in words; empty where there is none, or no more than the encoders' noise."""
-    size = float(np.sqrt(link.nameless * link.steps[-1].energy / len(link.steps[-1].residual)))
-    if link.nameless < NAMELESS or size < 2 * noise_floor(link):
-        return ""
-    return (
-        f"on q_link.{link.pair.joint}, smooth curves over position, speed, load and time together still explain "
-        f"{percent(link.nameless)} of what is left between the encoders ({length(size, unit_of(link.pair))}) in blocks "
-        f"that they were not fitted to"
+def nameless(one: Compared) -> str:
+    """What has no name, in words; empty where there is nothing."""
+    after = rms(one.decided.best.train)
+    return "; ".join(
+        f"on {one.links.channels[r.channel]}, a smooth curve over {r.over} still explains {percent(r.explained)} of "
+        f"what is left between the encoders "
+        f"({length(float(np.sqrt(r.explained) * after[r.channel]), unit_of(one.links, r.channel))})"
+        for r in one.decided.left
     )
 
 
-def candidates_of(link: LinkDiagnosis) -> list[Candidate]:
-    """What each effect explains by itself of how the encoders differ, best first."""
-    named = {p.named.trial.placed.key for p in link.proofs}
-    trials = sorted(link.searched.opening, key=lambda t: -t.explained)
-    return [
-        Candidate(t.placed.effect.name, t.placed.at, float(t.explained), float(t.score), t.placed.key in named)
-        for t in trials
-        if t.explained > 0
-    ]
-
-
-def traces_of(link: LinkDiagnosis) -> list[Trace]:
+def traces_of(one: Compared) -> list[Trace]:
     """How the encoders differ over time, measured, as given and after: for pictures."""
-    made: list[Trace] = []
-    sets: tuple[tuple[Literal["train", "holdout"], Pair, PairFit, PairFit], ...] = (
-        ("train", link.pair, link.steps[0], link.steps[-1]),
-        ("holdout", link.locked, link.held[0], link.held[-1]),
+    links, decided = one.links, one.decided
+    sets: tuple[tuple[Literal["train", "holdout"], Sequence[int], Linear, Linear], ...] = (
+        ("train", links.train, decided.found.first, decided.best.train),
+        ("holdout", links.held, decided.before, decided.best.held),
     )
-    for role, pair, first, last in sets:
-        at = 0
-        for run in pair.runs:
-            m = run.motion
-            part = slice(at, at + len(run.measured))
-            at = part.stop
-            made.append(
-                Trace(
-                    Path(m.path).name,
-                    role,
-                    f"q_link.{pair.joint}",
-                    unit_of(pair),
-                    m.to_band(m.time),
-                    m.to_band(m.q[:, run.joint]),
-                    m.to_band(m.qd[:, run.joint]),
-                    run.measured,
-                    run.measured - first.residual[part],
-                    run.measured - last.residual[part],
+    made: list[Trace] = []
+    for c, channel in enumerate(links.channels):
+        for role, numbers, before, after in sets:
+            for i, a, b in zip(numbers, before.residuals, after.residuals, strict=True):
+                run = links.rows[i][c]
+                m, own = run.motion, run.measured
+                columns = m.to_band(m.time), m.to_band(m.q[:, run.joint]), m.to_band(m.qd[:, run.joint])
+                made.append(
+                    Trace(
+                        Path(m.path).name, role, channel, unit_of(links, c), *columns, own, own - a[:, c], own - b[:, c]
+                    )
                 )
-            )
     return made
 
 
-def limits_of(link: LinkDiagnosis) -> list[Limit]:
-    """Smallest delay, gain error and drift, and softest spring, that these recordings would have shown."""
-    pair, segments, whiten = link.pair, link.pair.segments, link.searched.whiten
-    found = link.steps[-1]
-    base = whiten(found.jacobian, segments)
-    named = {p.effect.name for p in found.placed}
-    columns = {
-        "sensor_delay": [r.motion.qd[:, r.joint] for r in pair.runs],
-        "sensor_gain": [r.motion.q[:, r.joint] for r in pair.runs],
-        "sensor_drift": [r.motion.time - r.motion.time[0] for r in pair.runs],
-        "joint_elasticity": [r.load for r in pair.runs],
-    }
-    made = []
-    for name, parts in columns.items():
-        if name in named:
-            continue
-        column = whiten(np.concatenate([r.motion.to_band(x) for r, x in zip(pair.runs, parts, strict=True)]), segments)
-        rest = column - base @ np.linalg.lstsq(base, column, rcond=None)[0]
-        needed = link.searched.bar + 0.5 * np.log(len(column))
-        size = float(np.sqrt(2 * needed / max(float(rest @ rest), 1e-300)))
-        effect = effects()[name]
-        parameter = effect.parameters[0]
-        at = pair.joint if effect.at == "joint" else f"q_link.{pair.joint}"
-        made.append(Limit(name, at, parameter.name, 1 / size if effect.at == "joint" else size, pair.unit(parameter)))
-    return made
-
-
-def notes_of(link: LinkDiagnosis) -> list[str]:
+def notes_of(one: Compared) -> list[str]:
     """Zeros of every recording, and what was not named, in words."""
-    unit = unit_of(link.pair)
-    zeros = ", ".join(length(z, "").removesuffix(" m") for z in (*link.steps[-1].zeros, *link.held[-1].zeros))
-    notes = [
-        f"zero of q_link.{link.pair.joint} against q.{link.pair.joint}, one recording after another: {zeros} m{unit}"
-    ]
-    notes += [
-        f"{p.effect.name} at {p.at} passed on the training recordings but made the held-out one hardly better: "
-        f"not named"
-        for p in link.rejected
-    ]
-    words = nameless(link)
-    return notes + ([f"without a name: {words}"] if words else [])
+    links, best, notes = one.links, one.decided.best, []
+    every = links.zeros(best.train.at)[list(links.train)], links.zeros(best.held.at)[list(links.held)]
+    for c, joint in enumerate(links.joints):
+        zeros = ", ".join(length(z, "").removesuffix(" m") for z in np.concatenate(every)[:, c])
+        unit = unit_of(links, c)
+        notes.append(f"zero of q_link.{joint} against q.{joint}, one recording after another: {zeros} m{unit}")
+    words = nameless(one)
+    return notes + not_confirmed(one.decided) + ([f"without a name: {words}"] if words else [])

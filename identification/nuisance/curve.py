@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...recordings.condition import Motion
 from ..fitting.assembly import Evaluation
 from ..fitting.experiment import Experiment
 
@@ -46,7 +47,11 @@ class Coordinates:
     @staticmethod
     def of(experiment: Experiment, state: Evaluation, joint: int, peak: float, travel: float) -> "Coordinates":
         """Of a joint with its peak speed and travel over the training recordings."""
-        m, load = experiment.motion, state.load[:, joint]
+        return Coordinates.along(experiment.motion, state.load[:, joint], joint, peak, travel)
+
+    @staticmethod
+    def along(m: Motion, load: Array, joint: int, peak: float, travel: float) -> "Coordinates":
+        """The same of a motion and the joint's load (n,)."""
         speed = m.qd[:, joint]
         power = load * speed
         return Coordinates(
@@ -55,7 +60,7 @@ class Coordinates:
             load,
             np.tanh(speed / (TURNING * peak)),
             speed / peak,
-            experiment.elapsed,
+            m.time - m.time[0],
             np.concatenate([np.cumsum(np.abs(speed[s])) * m.period for s in m.segments]),
             0.5 * (1 + np.tanh(3 * power / max(float(np.std(power)), 1e-300))),
             np.log10(1 + _since_turning(speed, m.segments, m.period) / max(SHORTEST * travel, 1e-300)),

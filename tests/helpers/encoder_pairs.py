@@ -5,10 +5,8 @@ from typing import Any
 import numpy as np
 
 from snarelab.identification.fitting.experiment import Scales
-from snarelab.identification.links.diagnose import LinkDiagnosis
-from snarelab.identification.links.pair import Pair, PairFit, Run
-from snarelab.identification.links.search import Named, Searched, Trial
-from snarelab.identification.search.noise import Whitener
+from snarelab.identification.links.run import Run
+from snarelab.identification.links.source import Links
 from snarelab.models.effects import get_effect
 from snarelab.models.model import Placed
 from snarelab.recordings import JointKind
@@ -44,23 +42,6 @@ def run(q, difference, load=None, inertia=1.0, joint=0, **given):
     return Run(made, joint, np.broadcast_to(0.0 if load is None else load, n).copy(), np.full(n, inertia))
 
 
-def pair(*runs, kind: JointKind = "revolute", scales=SCALES):
-    return Pair("joint1", kind, scales, tuple(runs))
-
-
-def named(effect, explained=0.5, margin=0.9, rivals=()):
-    """An effect taken that explained so much, and won so many bootstraps against its rivals."""
-    none: Any = None
-    return Named(Trial(effect, none, np.zeros(1), 1.0, 1.0, explained, True), margin, tuple(rivals))
-
-
-def link(
-    *, joint="joint1", kind: JointKind = "revolute", runs=(), locked=(), steps=(), held=(), opening=(), bar=1.0, **given
-):
-    """A diagnosis of one joint in which nothing was found unless given; white noise of one."""
-    none: Any = None
-    empty = PairFit((), np.zeros(0), np.ones(1), np.zeros((1, 0)))
-    searched = Searched((), none, none, tuple(opening), Whitener(np.zeros(0), 1.0, 0), bar)
-    plain: dict[str, Any] = {"proofs": (), "offset": None, "rejected": (), "nameless": 0.0}
-    fitted, unseen = (Pair(joint, kind, SCALES, tuple(r)) for r in (runs, locked))
-    return LinkDiagnosis(fitted, unseen, searched, tuple(steps) or (empty,), tuple(held) or (empty,), **(plain | given))
+def links(*runs, kind: JointKind = "revolute", scales=SCALES, n_train=None):
+    """Recordings of one joint, all for training unless said otherwise."""
+    return Links(["joint1"], [kind], [scales], [[r] for r in runs], len(runs) if n_train is None else n_train)

@@ -92,7 +92,7 @@ def becomes(alike: float) -> bool:
     run = Search(Projected(made.evidence(), (0,)), several)
     slots = run.answer()
     assert [s.taken.hypothesis for s in slots] == [0]
-    return rounds._as_names(run, slots)[0].taken.hypothesis == 1
+    return rounds.as_names(run, slots)[0].taken.hypothesis == 1
 
 
 def test_a_curve_becomes_the_name_that_it_nearly_is(monkeypatch):

@@ -29,7 +29,7 @@ def searching(monkeypatch, rounds_with_news: int) -> tuple[int, set[float]]:
         "assemble": lambda *_: None, "fit": lambda *_, **__: None, "fitted": lambda *_: None, "planned": planned,
         "refitted": lambda *_: None, "weigh": lambda *_, **__: weighed,
         "searched": lambda *_: (weighed, made, next(left), 0.0),
-        "_trials": lambda *_: (), "_as_names": lambda _, slots: slots, "_error_of_laws": lambda *_: [0.0],
+        "_trials": lambda *_: (), "as_names": lambda _, slots: slots, "_error_of_laws": lambda *_: [0.0],
         "_reached": lambda *_: [0], "_tuned": lambda *_: {},
         "_name": lambda *_: (SimpleNamespace(placed=weighed.pool[0].label, channels=(0,)), {}),
     }  # fmt: skip

@@ -14,8 +14,10 @@ from snarelab.identification.fitting.base_parameters import base_parameters
 from snarelab.identification.fitting.experiment import load_experiments, scales
 from snarelab.identification.fitting.fit import fit
 from snarelab.identification.links.diagnose import diagnose_links
-from snarelab.identification.links.pair import load_links, pair_of
+from snarelab.identification.links.run import load_links
+from snarelab.identification.links.source import links_of
 from snarelab.identification.search.refit import assemble
+from snarelab.identification.sources.answer import rms
 from snarelab.models.model_file import load_model
 from snarelab.models.rigid_body import RigidBody
 from snarelab.studies.kuka import CHECK, STIFFNESS, spring_alone, springs_of_measured_torque
@@ -42,53 +44,48 @@ def found(runs):
     train = load_experiments(model, runs[:2], body)
     band, sizes = train[0].motion.band, scales(train)
     fitted = fit(assemble(model, base_parameters(body), sizes), train)
-    links, _ = diagnose_links(model, runs[:2], runs[2], body, fitted.assembly, fitted.theta, sizes, band)
-    pairs = []
-    for paths in (runs[:2], runs[2:]):
-        _, own = load_links(model, paths, body, band)
-        axes = (link.pair.joint for link in links)
-        pairs.append([pair_of(j, model, own, fitted.assembly, fitted.theta, sizes[j]) for j in axes])
-    return links, pairs, train, load_experiments(model, runs[2:], body, band)
+    one = diagnose_links(model, runs[:2], runs[2], body, fitted.assembly, fitted.theta, sizes, band)
+    assert one is not None
+    own, there = (load_links(model, paths, body, band)[1] for paths in (runs[:2], runs[2:]))
+    every = [links_of([j], model, own, there, fitted.assembly, fitted.theta, sizes) for j in one.links.joints]
+    return one, every, train, load_experiments(model, runs[2:], body, band)
 
 
 def test_three_axes_have_two_encoders(found):
-    assert [link.pair.joint for link in found[0]] == ["axis1", "axis2", "axis3"]
+    assert found[0].links.joints == ("axis1", "axis2", "axis3")
 
 
 @pytest.mark.parametrize("number", range(3))
 def test_time_skew_leads_and_the_bar_is_met(found, number):
-    link = found[0][number]
-    held = [MDEG * np.sqrt(np.mean(h.residual**2)) for h in link.held]
-    assert held[0] == pytest.approx(CHECK["nothing"][number], rel=0.01)
-    assert held[-1] <= 3.5
-    first = link.proofs[0].named
-    assert first.trial.placed.key == f"sensor_delay.q_link.axis{number + 1}"
-    assert first.trial.explained > 0.95
-    assert first.margin > 0.95
-    delay = link.steps[-1].theta[link.steps[-1].parameters(first.trial.placed)][0]
-    assert delay == pytest.approx(0.003, rel=0.05)
+    one, key = found[0], f"sensor_delay.q_link.axis{number + 1}"
+    before, after = (float(MDEG * rms(x)[number]) for x in (one.decided.before, one.decided.best.held))
+    assert before == pytest.approx(CHECK["nothing"][number], rel=0.01)
+    assert after <= 3.5
+    own = [n for n in one.decided.best.names if n.channels == (number,)]
+    assert own[0].placed.key == key
+    assert MDEG * rms(one.decided.best.missed[key].held)[number] > 4 * after
+    assert one.decided.best.train.at.all_values[f"{key}.delay"] == pytest.approx(0.003, rel=0.05)
 
 
 @pytest.mark.parametrize("number", range(3))
 def test_elasticity_is_little(found, number):
     """Of the makers' order of size where it is named, and a small share of what the encoders differ by."""
-    link = found[0][number]
-    for proof in link.proofs[1:]:
-        placed = proof.named.trial.placed
-        if placed.effect.name == "joint_elasticity":
-            stiffness = link.steps[-1].theta[link.steps[-1].parameters(placed)][0]
-            assert 0.7 < stiffness / STIFFNESS[number] < 2.5
-            assert proof.without**2 - proof.within**2 < 0.02 * np.mean(link.held[0].residual ** 2)
+    best, axis = found[0].decided.best, f"joint_elasticity.axis{number + 1}"
+    if axis in best.missed:
+        stiffness = best.train.at.all_values[f"{axis}.stiffness"]
+        assert 0.7 < stiffness / STIFFNESS[number] < 2.5
+        without, within = (rms(x)[number] for x in (best.missed[axis].held, best.held))
+        assert without**2 - within**2 < 0.02 * rms(found[0].decided.before)[number] ** 2
 
 
 def test_a_spring_alone_only_seems_to_explain(found):
     """Of the measured torque it takes a third, as the check found: the torque's friction follows the velocity. Of the
     modelled load, which has no friction in it, it takes next to nothing."""
-    _, pairs, train, locked = found
-    felt = springs_of_measured_torque(pairs, train, locked)
+    _, every, train, locked = found
+    felt = springs_of_measured_torque(every, train, locked)
     assert felt == pytest.approx(CHECK["spring"], rel=0.05)
-    for number in range(3):
-        assert spring_alone(pairs[0][number], pairs[1][number]) > 0.9 * CHECK["nothing"][number]
+    for number, links in enumerate(every):
+        assert spring_alone(links) > 0.9 * CHECK["nothing"][number]
 
 
 def test_pattern_is_found_where_it_was_put():

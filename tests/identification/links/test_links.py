@@ -22,6 +22,7 @@ from snarelab.identification.fitting.experiment import load_experiments, scales
 from snarelab.identification.fitting.fit import fit
 from snarelab.identification.links.diagnose import diagnose_links
 from snarelab.identification.search.refit import assemble
+from snarelab.identification.sources.answer import rms
 from snarelab.models.model_file import load_model
 from snarelab.models.rigid_body import RigidBody
 
@@ -70,21 +71,20 @@ def links_of(folder, paths):
     body = RigidBody(model.tree)
     train = load_experiments(model, paths[:2], body)
     found = fit(assemble(model, None, scales(train)), train)
-    links, _ = diagnose_links(
+    one = diagnose_links(
         model, paths[:2], paths[2], body, found.assembly, found.theta, scales(train), train[0].motion.band
     )
-    return {link.pair.joint: link for link in links}
+    assert one is not None
+    return one
 
 
-def named(link):
-    names = [p.named.trial.placed.key for p in link.proofs]
-    return names + [f"sensor_bias.q_link.{link.pair.joint}"] * (link.offset is not None)
+def named(one, at="joint2"):
+    return [n.placed.key for n in one.decided.best.names if one.links.joints[n.channels[0]] == at]
 
 
-def parameters(link, name):
-    (placed,) = [p for p in link.steps[-1].placed if p.effect.name == name]
-    values = link.steps[-1].theta[link.steps[-1].parameters(placed)]
-    return dict(zip((p.name for p in placed.effect.parameters), values, strict=True))
+def parameters(one, name, at="joint2"):
+    values = one.decided.best.train.at.all_values
+    return {k.rpartition(".")[2]: v for k, v in values.items() if k.startswith(f"{name}.") and f"{at}." in k}
 
 
 @pytest.fixture(scope="module")
@@ -96,11 +96,10 @@ def rigid(tmp_path_factory):
 def test_alike_encoders_are_left_alone(rigid, tmp_path):
     folder, recordings = rigid
     for seed in range(2):
-        links = links_of(folder, write(tmp_path, recordings, seed))
-        assert [named(link) for link in links.values()] == [[], []]
-        for link in links.values():
-            assert np.sqrt(np.mean(link.held[-1].residual ** 2)) < NOISE
-            assert link.nameless < 0.1
+        one = links_of(folder, write(tmp_path, recordings, seed))
+        assert [named(one, j) for j in JOINTS] == [[], []]
+        assert np.all(rms(one.decided.best.held) < NOISE)
+        assert one.decided.left == ()
 
 
 @pytest.mark.parametrize(
@@ -115,35 +114,33 @@ def test_alike_encoders_are_left_alone(rigid, tmp_path):
 )
 def test_a_sensor_fault_is_named_with_its_size(rigid, tmp_path, change, key, parameter, value, within):
     folder, recordings = rigid
-    links = links_of(folder, write(tmp_path, recordings, change=change))
-    assert named(links["joint1"]) == []
-    assert named(links["joint2"]) == [key]
-    assert parameters(links["joint2"], key.partition(".")[0])[parameter] == pytest.approx(value, rel=within)
+    one = links_of(folder, write(tmp_path, recordings, change=change))
+    assert named(one, "joint1") == []
+    assert named(one) == [key]
+    assert one.decided.left == ()
+    assert parameters(one, key.partition(".")[0])[parameter] == pytest.approx(value, rel=within)
 
 
 def test_a_zero_is_a_bias_only_where_it_stays(rigid, tmp_path):
     folder, recordings = rigid
-    links = links_of(folder, write(tmp_path, recordings, change=lambda t, q: q - 0.002))
-    assert named(links["joint2"]) == ["sensor_bias.q_link.joint2"]
-    offset = links["joint2"].offset
-    assert offset is not None
-    assert offset.value == pytest.approx(-0.002, rel=0.01)
+    one = links_of(folder, write(tmp_path, recordings, change=lambda t, q: q - 0.002))
+    assert named(one) == ["sensor_bias.q_link.joint2"]
+    assert parameters(one, "sensor_bias")["offset"] == pytest.approx(-0.002, rel=0.01)
     zeros = iter((0.002, 0.0015, -0.001))  # referenced anew before the last
-    assert named(links_of(folder, write(tmp_path, recordings, change=lambda t, q: q + next(zeros)))["joint2"]) == []
+    assert named(links_of(folder, write(tmp_path, recordings, change=lambda t, q: q + next(zeros)))) == []
 
 
 @pytest.mark.parametrize("gap", [0.0, 8e-4])
 def test_a_spring_is_told_from_a_delay_and_from_play(tmp_path, gap):
     spring = Elasticity(4e4, 40.0, gap)
     recordings = record(tmp_path, elasticity={"joint2": spring}, armature={"joint2": 1.0})
-    links = links_of(tmp_path, write(tmp_path, recordings))
-    assert named(links["joint1"]) == []
-    first = named(links["joint2"])[0]
-    assert first in ("joint_elasticity.joint2", "backlash.joint2")
+    one = links_of(tmp_path, write(tmp_path, recordings))
+    assert named(one, "joint1") == []
+    assert named(one)[0] in ("joint_elasticity.joint2", "backlash.joint2")
     if gap:
-        assert parameters(links["joint2"], "backlash")["gap"] == pytest.approx(gap, rel=0.1)
+        assert parameters(one, "backlash")["gap"] == pytest.approx(gap, rel=0.1)
     else:
-        assert parameters(links["joint2"], "joint_elasticity")["stiffness"] == pytest.approx(4e4, rel=0.1)
+        assert parameters(one, "joint_elasticity")["stiffness"] == pytest.approx(4e4, rel=0.1)
 
 
 @pytest.mark.usefixtures("compiler")

@@ -7,15 +7,15 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from diagnoses import spelt
-from encoder_pairs import link, motion, named, placed, run
+from encoder_pairs import SCALES, links, motion, placed, run
 
 from snarelab.identification.diagnosis import ChannelFit, Estimate, Finding, Location, Misfit, Step
 from snarelab.identification.fitting.experiment import Experiment
 from snarelab.identification.links import answer
-from snarelab.identification.links.diagnose import Offset, Proof
-from snarelab.identification.links.pair import PairFit
+from snarelab.identification.links.diagnose import Compared
+from snarelab.identification.links.source import Links
+from snarelab.identification.sources.source import At, Linear
 
-GAIN, DRIFT = placed("sensor_gain", "q_link.joint1"), placed("sensor_drift", "q_link.joint1")
 NONE = cast(Any, None)
 
 
@@ -25,15 +25,8 @@ def channel(name, before, after, unit="N*m"):
 
 
 def finding(name, at="q_link.joint1", value=0.5):
-    return Finding(name, at, 0.9, 0.8, {"first": Estimate(value, 0.1, ""), "second": Estimate(99, 0.1, "")}, "", ())
-
-
-def fit(*effects, theta=(), residual=(1.0,)):
-    return PairFit(effects, np.array(theta, float), np.array(residual, float), np.zeros((len(residual), len(theta))))
-
-
-def proof(effect):
-    return Proof(named(effect), 2.0, 1.0)
+    first = Estimate(value, 0.1, "s" if name == "sensor_delay" else "")
+    return Finding(name, at, 0.9, 0.8, {"first": first, "second": Estimate(99, 0.1, "")}, "", ())
 
 
 @pytest.mark.parametrize(("before", "after", "told"), [(2, 1, 0.75), (10, 1, 0.99), (1, 2, 0.0), (3, 3, 0.0)])
@@ -41,18 +34,22 @@ def test_of_a_channel_is_told_the_share_of_its_held_out_energy(before, after, to
     assert answer._told([channel("a", before, after)]) == pytest.approx([told])
 
 
+def left(*sizes, channels=1):
+    at = At.of((), {}, 0)
+    return Linear(at, tuple(np.full((len(x), channels), np.array(x, float)[:, None]) for x in sizes), ())
+
+
 def test_a_misfit_is_relative_to_the_link_encoders_own_reading():
     """Fitted: motor 3 and -3, link 1 further out: the link reads 4 and -4. Held out: it reads 2."""
-    one = link(
-        joint="joint2",
-        kind="prismatic",
-        runs=[run(np.full(64, 3.0), np.ones(64)), run(np.full(32, -3.0), -np.ones(32))],
-        locked=[run(np.zeros(64), np.full(64, 2.0))],
-        steps=(fit(residual=[2, -2]), fit(residual=[9]), fit(residual=[1, 1])),
-        held=(fit(residual=[1, -1]), fit(residual=[9]), fit(residual=[0.5])),
+    runs = [run(np.full(64, 3.0), np.ones(64)), run(np.full(64, -3.0), -np.ones(64)), run(np.zeros(64), np.full(64, 2))]
+    one = links(*runs, kind="prismatic", n_train=2)
+    decided: Any = SimpleNamespace(
+        found=SimpleNamespace(first=left([2, -2], [2])),
+        best=SimpleNamespace(train=left([1, 1], [1]), held=left([0.5])),
+        before=left([1, -1]),
     )
-    made = answer._fit(one)
-    assert (made.channel, made.unit) == ("q_link.joint2", "m")
+    (made,) = answer._fits(Compared(one, decided, (), ()))
+    assert (made.channel, made.unit) == ("q_link.joint1", "m")
     assert made.train == Misfit(2.0, 1.0, 0.5, 0.25)
     assert made.holdout == Misfit(1.0, 0.5, 0.5, 0.25)
 
@@ -60,7 +57,6 @@ def test_a_misfit_is_relative_to_the_link_encoders_own_reading():
 @pytest.mark.parametrize(
     ("findings", "fits", "sentence"),
     [
-        ([], [], ""),
         (
             [finding("sensor_delay", value=0.0123), finding("joint_elasticity", "joint2"),
              finding("sensor_delay", "q.joint3", 0.002)],
@@ -70,16 +66,17 @@ def test_a_misfit_is_relative_to_the_link_encoders_own_reading():
             "5 mm to 4 mm.",
         ),
         (
-            [finding("sensor_bias"), finding("sensor_gain")],
+            [finding("joint_elasticity", "joint1"), finding("sensor_gain")],
             [channel("x", 2e-3, 3e-3, "rad"), channel("y", 1e-3, 1e-3, "rad")],  # none became better: the worst
-            "Link and motor encoders differ by sensor bias at q_link.joint1; sensor gain at q_link.joint1. With that "
+            "Link and motor encoders differ by joint elasticity at joint1; sensor gain at q_link.joint1. With that "
             "added, the difference left on x, on the held-out recording, falls from 2 mrad to 3 mrad.",
         ),
         ([finding("sensor_bias")], [], "Link and motor encoders differ by sensor bias at q_link.joint1."),
     ],
 )  # fmt: skip
 def test_the_encoders_sentence_names_effects_with_their_places(findings, fits, sentence):
-    assert answer._sentence(findings, fits) == sentence
+    moving = [f for f in findings if f.name != "sensor_bias"]
+    assert answer._sentence(moving, [f for f in findings if f not in moving], fits) == sentence
 
 
 TORQUES = replace(
@@ -93,18 +90,22 @@ TORQUES = replace(
 """Three quarters of what joint1 left are told."""
 
 
-def answered(monkeypatch, torques, found=(), told=(1, 1), nameless=()):
+def answered(monkeypatch, torques, found=(), told=(1, 1), nameless=""):
     """The answer where the encoders gave these findings, and their one channel's residual fell so."""
-    for name, mark in (("candidates_of", "c"), ("traces_of", "t"), ("limits_of", "l"), ("notes_of", "n")):
-        monkeypatch.setattr(answer, name, lambda one, mark=mark: [mark + one])
+    monkeypatch.setattr(answer, "candidates", lambda _: ["c"])
+    monkeypatch.setattr(answer, "limits", lambda *_: ["l"])
+    for name, mark in (("traces_of", "t"), ("notes_of", "n")):
+        monkeypatch.setattr(answer, name, lambda _, mark=mark: [mark])
     monkeypatch.setattr(answer, "findings_of", lambda _: tuple(found))
-    monkeypatch.setattr(answer, "nameless", lambda one: dict(nameless).get(one, ""))
-    monkeypatch.setattr(answer, "_fit", lambda one: channel(one, *told))
+    monkeypatch.setattr(answer, "nameless", lambda _: nameless)
+    monkeypatch.setattr(answer, "_fits", lambda _: (channel("A", *told),))
     monkeypatch.setattr(answer, "_steps", lambda _: [Step("encoders", 0.5, 0.5)])
     monkeypatch.setattr(answer, "_location", lambda *_: ("places",))
-    monkeypatch.setattr(answer, "_model", lambda model, links: (model, links))
-    links: Any = ["A", "B"]
-    return answer.with_links(torques, cast(Any, "model"), links, [])
+    monkeypatch.setattr(answer, "with_found", lambda model, at: (model, at))
+    names = [SimpleNamespace(placed=placed(f.name, f.at)) for f in found]
+    decided: Any = SimpleNamespace(best=SimpleNamespace(names=names, train=SimpleNamespace(at="values")))
+    source: Any = SimpleNamespace(still=lambda p: p.effect.name == "sensor_bias")
+    return answer.with_links(torques, cast(Any, "model"), Compared(source, decided, (), ()))
 
 
 def test_where_the_encoders_find_nothing_the_torques_answer_stands(monkeypatch):
@@ -112,13 +113,13 @@ def test_where_the_encoders_find_nothing_the_torques_answer_stands(monkeypatch):
     assert (made.verdict, made.sentence, made.description) == ("missing_physics", "Torques say.", "")
     assert made.effects == TORQUES.effects
     assert made.location == TORQUES.location
-    assert [f.channel for f in made.fit] == ["tau.joint1", "tau.joint2", "A", "B"]
+    assert [f.channel for f in made.fit] == ["tau.joint1", "tau.joint2", "A"]
     assert [s.label for s in made.steps] == ["x", "x", "encoders"]
-    assert made.candidates[-2:] == ("cA", "cB")
-    assert made.traces[-2:] == ("tA", "tB")
-    assert made.limits[-2:] == ("lA", "lB")
-    assert made.notes == ("x", "nA", "nB")
-    assert model == ("model", ["A", "B"])
+    assert made.candidates[-1:] == ("c",)
+    assert made.traces[-1:] == ("t",)
+    assert made.limits[-1:] == ("l",)
+    assert made.notes == ("x", "n")
+    assert model == ("model", "values")
 
 
 @pytest.mark.parametrize(("told", "first"), [((2, 1), True), ((2, 1.01), False), ((4, 1), True)])
@@ -131,7 +132,7 @@ def test_the_kind_of_channel_that_is_told_more_of_goes_first(monkeypatch, told, 
     assert made.sentence.startswith("Link and motor" if first else "Torques say. Link and motor")
     assert made.sentence.endswith("Torques say.") is first
     assert [f.channel for f in made.fit] == (
-        ["A", "B", "tau.joint1", "tau.joint2"] if first else ["tau.joint1", "tau.joint2", "A", "B"]
+        ["A", "tau.joint1", "tau.joint2"] if first else ["tau.joint1", "tau.joint2", "A"]
     )
     assert (made.steps[0].label == "encoders") is first
     assert made.foremost == ("A" if first else TORQUES.foremost)
@@ -168,7 +169,7 @@ def test_what_both_kinds_of_channels_name_at_one_place_is_told_by_the_encoders(m
 )
 def test_what_has_no_name_on_the_encoders_makes_an_unknown_effect(monkeypatch, verdict, description, found, wanted):
     said = replace(TORQUES, verdict=verdict, description=description)
-    made, _ = answered(monkeypatch, said, nameless=(("B", found),))
+    made, _ = answered(monkeypatch, said, nameless=found)
     assert (made.verdict, made.description) == wanted
     told = f"Something is missing that no effect of the vocabulary explains: {wanted[1]}."
     assert made.sentence == (told if wanted[0] == "unknown_effect" else "Torques say.")
@@ -186,13 +187,15 @@ def test_places_stand_by_the_share_that_is_told_of_each_channel(monkeypatch):
     names = ("joint1", "joint2")
     motions = [motion(np.zeros((n, 2)), np.ones((n, 2)), joints=names) for n in (3, 2)]
     runs = [replace(run(m.q, m.tau, joint=1, joints=names), load=np.arange(len(m.time)) + 5.0) for m in motions]
-    steps = (fit(residual=[1, 2, 3, 4, 5]), fit(residual=[9] * 5), fit(residual=[1, 1, 1, 1, 1]))
-    links = [link(), link(joint="joint2", runs=runs, steps=steps, proofs=(proof(GAIN),))]
+    rows: Any = [[None, r] for r in runs]
+    source: Any = SimpleNamespace(rows=rows, channels=("q_link.joint1", "q_link.joint2"))
+    best = SimpleNamespace(names=[SimpleNamespace(channels=(1,))], train=left([1, 1, 1], [1, 1], channels=2))
+    decided: Any = SimpleNamespace(found=SimpleNamespace(first=left([1, 2, 3], [4, 5], channels=2)), best=best)
+    train = tuple(Experiment(m, NONE) for m in motions)
     places = tuple(Location(f"tau.joint{k}", 0.5, (), "") for k in (2, 1, 3))
     said = replace(TORQUES, location=places)
-    train = [Experiment(m, NONE) for m in motions]
     fits = [channel("q_link.joint1", 4, 1), channel("q_link.joint2", 5, 1)]
-    one, two = answer._location(said, links, fits, train)
+    one, two = answer._location(said, Compared(source, decided, (), train), fits)
     assert [t.tolist() for t in seen["tau"]] == [[[0, 5], [0, 6], [0, 7]], [[0, 5], [0, 6]]]
     assert [c.tolist() for c in seen["changes"]] == [[[0, 0], [0, 1], [0, 2]], [[0, 3], [0, 4]]]
     assert (one.channel, one.where, two.channel) == ("q_link.joint2", "fast", "tau.joint1")
@@ -200,67 +203,16 @@ def test_places_stand_by_the_share_that_is_told_of_each_channel(monkeypatch):
     assert one.share + two.share < 1
 
 
-def test_steps_add_each_effect_at_all_its_joints_at_once():
-    """Two joints that read 4 over 4 samples, 2 held out; each line's misfit is the root of their mean energies' share.
+def test_a_steps_error_is_the_root_of_the_mean_share_of_every_joints_reading():
+    """Two joints that read 4 and 8; left over of the first 2, of the second 4, then 1 and 4."""
+    rows = [[run(np.zeros(4), np.full(4, x)) for x in (4.0, 8.0)] for _ in range(2)]
+    source = Links(["joint1", "joint2"], ["revolute"] * 2, [SCALES] * 2, rows, 1)
 
-    Energies of joint1: 16, 4, 1; of joint2: 36, 9; over 64 each. Held out half as much RMS, over 16.
-    """
-    given: dict[str, Any] = {"runs": [run(np.zeros(4), np.full(4, 4.0))], "locked": [run(np.full(4, 1.0), np.ones(4))]}
-    sizes = {"joint1": (2, 1, 0.5), "joint2": (3, 1.5)}
-    delays = {j: placed("sensor_delay", f"q_link.{j}") for j in sizes}
-    proofs = {"joint1": (proof(GAIN), proof(delays["joint1"])), "joint2": (proof(delays["joint2"]),)}
-    links = [
-        link(joint=j, proofs=proofs[j], **given, steps=[fit(residual=np.full(4, x)) for x in rms],
-             held=[fit(residual=np.full(4, x / 2)) for x in rms])
-        for j, rms in sizes.items()
-    ]  # fmt: skip
-    lines = answer._steps(links)
-    assert [x.label for x in lines] == [
-        "link encoders as given",
-        "+ sensor_gain at q_link.joint1",
-        "+ sensor_delay at q_link.joint2",
-        "+ sensor_delay at q_link.joint1",
-    ]
-    energies = np.array([[16, 36], [4, 36], [4, 9], [1, 9]])
-    np.testing.assert_allclose([x.train for x in lines], np.sqrt(np.mean(energies / 64, axis=1)))
-    np.testing.assert_allclose([x.holdout for x in lines], np.sqrt(np.mean(energies / 4 / 16, axis=1)))
+    def both(a, b):
+        return Linear(At.of((), {}, 0), (np.tile([a, b], (4, 1)),), ())
 
-
-def test_an_effect_at_two_joints_in_one_depth_is_one_step():
-    given: dict[str, Any] = {"runs": [run(np.zeros(4), np.full(4, 4.0))], "locked": [run(np.zeros(4), np.ones(4))]}
-    both = [
-        link(joint=j, proofs=(proof(placed("sensor_gain", f"q_link.{j}")),), **given,
-             steps=(fit(), fit()), held=(fit(), fit()))
-        for j in ("joint1", "joint2")
-    ]  # fmt: skip
-    assert [x.label for x in answer._steps(both)][1:] == ["+ sensor_gain at q_link.joint1, q_link.joint2"]
-
-
-def test_the_model_gets_what_the_last_step_has_and_the_shared_zero():
-    """What it had elsewhere stays; what it had of an effect named anew is replaced."""
-    old = placed("coulomb_friction", "joint1")
-    spring = placed("joint_elasticity", "joint2")
-    model: Any = SimpleNamespace(effects=(old, DRIFT), values={"sensor_drift.q_link.joint1.rate": 9.0, "kept": 1.0})
-    steps = (fit(GAIN, theta=(8.0, 0.0)), fit(DRIFT, GAIN, theta=(0.25, 0.5, 3.0)))
-    links = [
-        link(steps=steps, offset=Offset(0.125, 0.1, 1.0, 1.0)),
-        link(joint="joint2", steps=(fit(spring, theta=(100.0, 7.0, 0.0)),)),
-    ]
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(answer, "replace", lambda _, **changes: changes)
-        made = cast(Any, answer._model(model, links))
-    assert [p.key for p in made["effects"]] == [
-        old.key,
-        DRIFT.key,
-        GAIN.key,
-        "sensor_bias.q_link.joint1",
-        "joint_elasticity.joint2",
-    ]
-    assert made["values"] == {
-        "sensor_drift.q_link.joint1.rate": 0.25,
-        "kept": 1.0,
-        "sensor_gain.q_link.joint1.error": 0.5,
-        "sensor_bias.q_link.joint1.offset": 0.125,
-        "joint_elasticity.joint2.stiffness": 100.0,
-        "joint_elasticity.joint2.damping": 7.0,
-    }
+    stages = (("as given", both(2.0, 4.0), both(4.0, 8.0)), ("+ more", both(1.0, 4.0), both(0.0, 4.0)))
+    lines = answer._steps(Compared(source, NONE, stages, ()))
+    assert [x.label for x in lines] == ["as given", "+ more"]
+    assert [x.train for x in lines] == pytest.approx([0.5, np.sqrt((1 / 16 + 1 / 4) / 2)])
+    assert [x.holdout for x in lines] == pytest.approx([1.0, np.sqrt(1 / 8)])

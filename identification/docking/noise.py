@@ -1,0 +1,78 @@
+"""What the noise of a docking's channels hangs on: balls that touch and slide, a carriage that stands."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..deciding import LEAST_LEVEL, STICKS
+from ..nuisance.noise import Run
+from ..sources.source import Linear
+from .recording import EVERY, KNOTS, Record
+
+Array = NDArray[np.float64]
+
+ABOUT = 3
+"""Windows either way over which what nothing explains is averaged: 0.3 s, a touch and its rebound."""
+
+
+def touching(record: Record, seen: Array) -> NDArray[np.bool_]:
+    """Windows (n,) in which balls touch and slide, and those about them: the load on the target changes fast."""
+    change = _change(seen)
+    loads = [c for c, name in enumerate(record.channels) if name.startswith(("force.", "torque."))]
+    fast = change[:, loads or range(len(record.channels))].max(axis=1) > STICKS[0][0]
+    return np.logical_or.reduce([np.roll(fast, k) for k in (-1, 0, 1)])
+
+
+def standing(record: Record) -> NDArray[np.bool_]:
+    """Windows (n,) in which the carriage stands, and takes any force up to its friction."""
+    rate = record.motion.rate[::KNOTS]
+    slowest = np.minimum(np.abs(rate[1:]), np.abs(rate[:-1]))
+    return (slowest < STICKS[0][0] * np.abs(rate).max()) | (rate[1:] * rate[:-1] < 0)
+
+
+def hangs(records: Sequence[Record], linear: Linear, could: Sequence[Sequence[Array]], scale: Array) -> list[list[Run]]:
+    """What the noise of every channel hangs on.
+
+    While balls touch and slide no law of contact tells the load to the window: a channel may then be off, as a joint
+    near rest may hold any torque, by what nothing explains there, in the RMS over `ABOUT` windows either way, and by
+    `LEAST_LEVEL` of its size at least, a vector's of the largest of its axes. A motor whose carriage stands may hold
+    anything up to its friction. Where a channel changes fast it may be off by more, which the noise learns.
+
+    Parameters
+    ----------
+    records : sequence of Record
+    linear : Linear
+        Their residuals.
+    could : sequence of sequence of array (n, k)
+        What could explain each channel's of each.
+    scale : array (c,)
+    """
+    seen = [np.nan_to_num(r.measured) - left for r, left in zip(records, linear.residuals, strict=True)]
+    kinds = [name.rpartition(".")[0] for name in records[0].channels]
+    least = [LEAST_LEVEL * max(x for x, other in zip(scale, kinds, strict=True) if other == kind) for kind in kinds]
+    loose = [touching(r, x) for r, x in zip(records, seen, strict=True)]
+    found: list[list[Run]] = [[] for _ in records]
+    for c, name in enumerate(records[0].channels):
+        driven = name.startswith(("tau.", "tension."))
+        rows = [(standing(r) & (name == "tau.carriage")) if driven else k for r, k in zip(records, loose, strict=True)]
+        left = np.concatenate([r[k, c] for r, k in zip(linear.residuals, rows, strict=True)])
+        columns = np.concatenate([x[k] for x, k in zip(could[c], rows, strict=True)])
+        if len(left) > 2 * columns.shape[1]:
+            left = left - columns @ np.linalg.lstsq(columns, left, rcond=1e-6)[0]
+            left *= np.sqrt(len(left) / (len(left) - columns.shape[1]))
+        ends = np.cumsum([k.sum() for k in rows])[:-1]
+        for own, part, k, x in zip(found, np.split(left, ends), rows, seen, strict=True):
+            energy, count = np.zeros(len(k)), np.convolve(k, np.ones(2 * ABOUT + 1), "same")
+            energy[k] = part**2
+            energy = np.convolve(energy, np.ones(2 * ABOUT + 1), "same") / np.maximum(count, 1)
+            sticks = np.where(k, np.maximum(np.sqrt(energy), least[c]), 0.0)
+            n = len(k)
+            own.append(Run(EVERY, (slice(0, n),), np.zeros(n), (sticks,), _change(x)[:, c], 1.0))
+    return found
+
+
+def _change(seen: Array) -> Array:
+    """How fast each channel changes (n, c), as a share of its fastest."""
+    rates = np.abs(np.gradient(seen, axis=0))
+    return rates / np.maximum(rates.max(axis=0), 1e-300)

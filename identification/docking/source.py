@@ -1,0 +1,122 @@
+"""Docking tests behind the one interface: a simulation that answers to values, with slopes by differences.
+
+The shifts are numbers of the set-up, machining and the pose's registration (`SHIFTS`), the same in all recordings.
+"""
+
+from collections.abc import Mapping, Sequence
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...models.docking.bench_setup import DockingTree, docking_effects
+from ...models.effect import Parameter
+from ...models.effects import get_effect
+from ...models.model import Model, Placed
+from ..deciding import BLOCK
+from ..nuisance.noise import Run
+from ..sources.fit import differences, shift_differences
+from ..sources.source import At, Linear, Variant
+from .noise import hangs
+from .recording import EVERY, load_records
+from .runs import SHIFTS, Runs
+
+Array = NDArray[np.float64]
+
+
+class Dockings(Runs):
+    """Docking tests of a model, the training recordings first."""
+
+    n_shifts, anew, steps = len(SHIFTS), False, 4
+
+    def __init__(self, model: Model, train: Sequence[str | Path], held: Sequence[str | Path] = ()) -> None:
+        """Read the recordings; raises InputError for whatever is wrong with one."""
+        assert isinstance(model.tree, DockingTree)
+        if not train:
+            raise InputError("recordings: none is given; give one or more")
+        super().__init__(model.tree.setup, load_records(model, [*train, *held]))
+        self.train, self.held = range(len(train)), range(len(train), len(self.records))
+        self.channels = self.records[0].channels
+
+    def measured(self, i: int) -> Array:
+        return self.records[i].measured
+
+    def predicted(self, i: int, at: At) -> Array | None:
+        return self(i, at.all_values, at.shifts)
+
+    def refused(self, i: int) -> InputError:
+        return InputError(
+            f"{self.records[i].path}: the docking cannot be simulated from where the recording starts; check "
+            "[docking] against the test's set-up"
+        )
+
+    def slopes(self, i: int, at: At, here: Array) -> Array:
+        return differences(self, i, at, here)
+
+    def shift_slopes(self, i: int, at: At, here: Array) -> Array:
+        return shift_differences(self, i, at, here)
+
+    def settled(self, at: At, numbers: Sequence[int]) -> At:
+        return at
+
+    def scale(self) -> Array:
+        return self.sizes(self.train)
+
+    def sizes(self, numbers: Sequence[int]) -> Array:
+        """RMS of each channel (c,) since the start, in some recordings."""
+        every = np.concatenate([self.records[i].measured - self.records[i].measured[0] for i in numbers])
+        return np.maximum(np.sqrt(np.nanmean(every**2, axis=0)), 1e-12)
+
+    def bounds(self, p: Placed, x: Parameter) -> tuple[float, float]:
+        return x.low, x.high
+
+    def size(self, p: Placed, x: Parameter) -> float:
+        return min(abs(g) for g in x.grid)
+
+    def unit(self, p: Placed, x: Parameter) -> str:
+        return x.unit
+
+    def library(self, placed: Sequence[Placed]) -> list[Placed]:
+        have = {p.key for p in placed}
+        every = [Placed(get_effect(name), at) for name, places in docking_effects().items() for at in places]
+        return [p for p in every if p.key not in have]
+
+    def variants(self, p: Placed) -> list[Variant]:
+        """A parameter that is zero where there is no effect is an amplitude."""
+        amplitudes = [x for x in p.effect.parameters if x.zero == 0]
+        shapes = [x for x in p.effect.parameters if x.zero != 0]
+        found = []
+        for shape in product(*(x.grid for x in shapes)):
+            for k in range(max(len(x.grid) for x in amplitudes)):
+                values = {f"{p.key}.{x.name}": v for x, v in zip(shapes, shape, strict=True)}
+                values |= {f"{p.key}.{x.name}": x.grid[k % len(x.grid)] for x in amplitudes}
+                found.append(Variant(p, values, tuple(f"{p.key}.{x.name}" for x in amplitudes)))
+        return found
+
+    def columns(self, i: int, at: At, v: Variant) -> Array:
+        """What the simulation changes by for each amplitude, from there being none of it."""
+        shape = {k: x for k, x in v.values.items() if k not in v.amplitudes}
+        none, own = self.predicted(i, at), []
+        assert none is not None
+        for key in v.amplitudes:
+            seen = self(i, {**at.all_values, **shape, key: v.values[key]}, at.shifts)
+            own.append((np.full_like(none, np.nan) if seen is None else seen - none) / v.values[key])
+        return np.stack(own, axis=2)
+
+    def curves(self, numbers: Sequence[int]) -> Mapping[tuple[int, str], list[Array]]:
+        return {}
+
+    def hangs(self, numbers: Sequence[int], linear: Linear, could: Sequence[Sequence[Array]]) -> list[list[Run]]:
+        return hangs([self.records[i] for i in numbers], linear, could, self.scale())
+
+    def blocks(self, i: int, x: Array) -> Array:
+        count = max(round(BLOCK / EVERY), 1)
+        return np.array([b.sum() for b in np.array_split(x, max(len(x) // count, 4))])
+
+
+def start(model: Model) -> At:
+    """The model as given; a parameter without a value starts at what hardware usually has."""
+    usual = {f"{p.key}.{x.name}": x.grid[0] for p in model.effects for x in p.effect.parameters}
+    return At.of(model.effects, usual | {k: v for k, v in model.values.items() if k in usual}, len(SHIFTS))

@@ -1,0 +1,44 @@
+"""The whole decision: search, confirm, search again where something was not confirmed, and what is left."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from ..deciding import SECOND_CHOICES
+from ..evidence.found import Remainder
+from .confirm import Confirmed, confirm, remainders
+from .fit import residuals
+from .search import Found, Name, search
+from .source import At, Linear, Source
+
+
+@dataclass(frozen=True)
+class Decided:
+    """What recordings say: the search, what was confirmed and was not, nameless curves, and the held-out recordings
+    under the model as given."""
+
+    given: At
+    found: Found
+    best: Confirmed
+    rejected: tuple[Name, ...]
+    left: tuple[Remainder, ...]
+    before: Linear
+
+
+def decide(source: Source, given: At, progress: Callable[[str], None] = lambda _: None) -> Decided:
+    """Name what a model leaves out of some recordings."""
+    found = search(source, given, progress=progress)
+    best = last = confirm(source, given, found, progress)
+    rejected = {n.placed.key: n for n in last.rejected}
+    for _ in range(SECOND_CHOICES):
+        if not last.rejected:
+            break
+        progress("looking for what else could explain what the held-out recordings did not confirm")
+        again = search(source, given, barred=rejected, progress=progress)
+        last = confirm(source, given, again, progress)
+        rejected |= {n.placed.key: n for n in last.rejected}
+        if last.density > best.density:
+            found, best = again, last
+    left = remainders(source, given, best, rejected)
+    at = source.settled(found.first.at, source.held)
+    before = Linear(at, residuals(source, source.held, at), ())
+    return Decided(given, found, best, tuple(rejected.values()), left, before)

@@ -1,0 +1,210 @@
+"""Recordings under a fit, as the evidence sees them: channels with their noise, and every hypothesis."""
+
+import functools
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...models.model import Placed
+from ..deciding import DISCREPANCY, LAW_ERROR
+from ..evidence.arm import Weighed, principal
+from ..evidence.beside import Beside
+from ..evidence.evidence import Channel, Evidence, Projected
+from ..evidence.hypotheses import pool
+from ..evidence.pool import Columns, Item
+from ..evidence.search import Search
+from ..nuisance.curve import SMALL
+from ..nuisance.noise import Noise, learn
+from .fit import Covariances, fit, priors, shift_columns
+from .source import At, Linear, Source, Variant
+
+Array = NDArray[np.float64]
+
+STRONGEST = 10
+"""Directions of what could explain a residual beside which its noise is learnt."""
+
+
+def covariances(weighed: Weighed) -> Covariances:
+    """Of every recording and channel."""
+    return [[channel.covariance for channel in row] for row in weighed.evidence.channels]
+
+
+def weigh(
+    source: Source,
+    numbers: Sequence[int],
+    given: At,
+    linear: Linear,
+    known: Weighed | None = None,
+    *,
+    search: bool,
+    alone: Mapping[str, Variant] | None = None,
+) -> Weighed:
+    """Recordings under a fit.
+
+    Parameters
+    ----------
+    source : Source
+    numbers : sequence of int
+        Recordings, those for training first.
+    given : At
+        The model as given.
+    linear : Linear
+        The fit on these recordings.
+    known : Weighed, optional
+        Has the noise, which is learnt without it.
+    search : bool
+        False leaves out all hypotheses: only the evidence of the fit itself is wanted.
+    alone : mapping of str to Variant, optional
+        Laws that were fitted by themselves, by their key: a point more of their grid.
+    """
+    columns, scale = Columns([len(r) for r in linear.residuals]), source.scale()
+    named = _named(source, numbers, linear.at, columns, alone or {}) if search else {}
+    spread = np.concatenate([_spread(source, given, linear.at), np.ones(len(linear.at.shifts))])
+    curves = {k: x for k, x in source.curves(numbers).items() if search or k[1] in SMALL}
+    sizes = {k: _rms_of_curve(x[: len(source.train)]) for k, x in curves.items()}
+    small = {k: [x / sizes[k] for x in own] for k, own in curves.items() if k[1] in SMALL}
+    laws = [[columns.some(i, c, columns.of(i, c)[0]) for i in range(len(numbers))] for c in range(len(scale))]
+
+    def could(c: int, named: bool) -> list[Array]:
+        parts = []
+        for i, x in enumerate(linear.columns):
+            own = [x[:, c] * spread, *(curve[i] for (at, _), curve in small.items() if at == c)]
+            parts.append(np.concatenate([*own, laws[c][i]] if named else own, axis=1))
+        return principal(parts, STRONGEST)
+
+    beside_laws = [could(c, True) for c in range(len(scale))] if known is None else []
+    runs = source.hangs(numbers, linear, beside_laws) if known is None else known.runs
+
+    def noise(c: int, beside: Sequence[Array]) -> Noise:
+        n = len(source.train)
+        return learn([r[:, c] for r in linear.residuals[:n]], beside[:n], [row[c] for row in runs[:n]])
+
+    noises = [noise(c, x) for c, x in enumerate(beside_laws)] if known is None else known.noises
+    by_words = {}
+    for (c, words), x in curves.items() if search else ():
+        k = x[0].shape[1]
+        by_words[c, words] = Item(columns.add({c: x}), np.full(k, scale[c] / sizes[c, words]), np.zeros(k, bool),
+                                  label=(c, words))  # fmt: skip
+    count = linear.columns[0].shape[2]
+    placed = slice(len(linear.at.values), count)
+    known_shifts = np.concatenate([np.zeros(len(linear.at.values)), linear.at.shifts])
+    wrong = [_wrong(source, linear, c) for c in range(len(scale))]
+    beside: list[list[tuple[NDArray[np.int_], Array]]] = []
+    total = count + sum(x[0].shape[1] for x in small.values())
+    for i, x in enumerate(linear.columns):
+        row, start = [], count
+        for c in range(len(scale)):
+            index, parts = [np.arange(count)], [x[:, c] * spread]
+            for (at, _), curve in small.items():
+                if at == c:
+                    index.append(start + np.arange(curve[i].shape[1]))
+                    parts.append(curve[i] * wrong[c] * scale[c])
+                    start += curve[i].shape[1]
+            row.append((np.concatenate(index), np.concatenate(parts, axis=1)))
+        beside.append(row)
+    channels = [
+        [
+            # The shifts' prior is about what the set-up is said to be, not about where they now are.
+            Channel(r[:, c] + x[:, c] @ known_shifts, noises[c].covariance(row_of[c]), *row[c])
+            for c in range(len(scale))
+        ]
+        for r, x, row_of, row in zip(linear.residuals, linear.columns, runs, beside, strict=True)
+    ]
+    hypotheses = tuple(pool(named, by_words, ())) if named or by_words else ()
+    items = [item for h in hypotheses for item in h.items]
+    evidence = Evidence(channels, columns, items, total)
+    tolerant = slice(placed.start, placed.stop if source.anew else placed.start)
+    others = Beside([], total, tolerant, [], (1.0,))
+    bare = functools.cache(lambda c: noise(c, could(c, False)))
+    return Weighed(evidence, hypotheses, tuple(noises), others, scale, len(source.train), runs, bare)
+
+
+def by_themselves(source: Source, given: At, linear: Linear, weighed: Weighed) -> dict[str, Variant]:
+    """Every law without amplitudes fitted by itself from the best point of its grid: between two of them it explains
+    much less."""
+    on, found = Projected(weighed.evidence, range(len(source.train))), {}
+    best, shifted = Search(on, weighed.pool).scan([]).item, shift_columns(linear)
+    for h, x in enumerate(weighed.pool):
+        if x.named and x.items[0].whole:
+            v: Variant = weighed.evidence.items[best[h]].label
+            at = linear.at.with_effects([v.placed], v.values)
+            fitted = fit(source, given, at, covariances(weighed)[: len(source.train)], shifted)
+            found[x.key] = replace(v, values={k: fitted.at.all_values[k] for k in v.values})
+    return found
+
+
+def _named(
+    source: Source, numbers: Sequence[int], at: At, columns: Columns, alone: Mapping[str, Variant]
+) -> dict[str, tuple[Placed, list[Item]]]:
+    """Every effect that is not there, with its columns at each point of its grid."""
+    found: dict[str, tuple[Placed, list[Item]]] = {}
+    for p in source.library(at.placed):
+        items = [_item(source, numbers, at, columns, v) for v in source.variants(p)]
+        if p.key in alone:
+            items.append(_fitted(source, numbers, at, columns, alone[p.key]))
+        some = [x for x in items if x is not None]
+        if some:
+            found[p.key] = (p, some)
+    return found
+
+
+def _item(source: Source, numbers: Sequence[int], at: At, columns: Columns, v: Variant) -> Item | None:
+    parts = [source.columns(i, at, v) for i in numbers]
+    size = _size(source, parts)
+    if not np.all(np.isfinite(size)) or np.any(size <= 0):
+        return None
+    index = _added(columns, parts)
+    if not v.amplitudes:
+        return Item(index, np.ones(1), np.ones(1, bool), True, replace(v, size=float(size[0])))
+    named = {x.name: x for x in v.placed.effect.parameters}
+    positive = np.array([named[k.rpartition(".")[2]].low >= 0 for k in v.amplitudes])
+    return Item(index, np.full(len(size), v.size) if v.size else 1 / size, positive, label=v)
+
+
+def _fitted(source: Source, numbers: Sequence[int], at: At, columns: Columns, v: Variant) -> Item | None:
+    """A law where it was fitted by itself, and what each parameter's own size more would add: no more than the law."""
+    there = at.with_effects([v.placed], v.values)
+    parts, n = [], len(at.values)
+    for i in numbers:
+        here = source.predicted(i, there)
+        if here is None:
+            return None
+        slopes = source.slopes(i, there, here)[:, :, n:] * there.values[n:]
+        parts.append(np.concatenate([source.columns(i, at, v), slopes], axis=2))
+    size = _size(source, parts)
+    if not np.all(np.isfinite(size)) or size[0] <= 0:
+        return None
+    index = _added(columns, parts)
+    return Item(index, 1 / np.maximum(size, size[0]), np.arange(len(index)) == 0, label=v)
+
+
+def _size(source: Source, parts: Sequence[Array]) -> Array:
+    """RMS of each column over the training recordings, as a share of the channel that it shows most on (k,)."""
+    whole = np.concatenate(parts[: len(source.train)])
+    return np.max(np.sqrt(np.mean(whole**2, axis=0)) / source.scale()[:, None], axis=0)
+
+
+def _added(columns: Columns, parts: Sequence[Array]) -> NDArray[np.int_]:
+    """Columns entered on every channel that they reach."""
+    reached = np.any([np.any(x, axis=(0, 2)) for x in parts], axis=0)
+    return columns.add({int(c): [x[:, c] for x in parts] for c in np.flatnonzero(reached)})
+
+
+def _spread(source: Source, given: At, at: At) -> Array:
+    """Prior deviation of the free parameters (P,)."""
+    _, own = priors(source, given, at)
+    return np.where(np.isfinite(own), own, np.maximum(np.abs(at.values), 1e-12))
+
+
+def _rms_of_curve(parts: Sequence[Array]) -> float:
+    return float(np.sqrt(np.mean(np.concatenate([np.sum(x**2, axis=1) for x in parts])))) or 1.0
+
+
+def _wrong(source: Source, linear: Linear, c: int) -> float:
+    """How large the small curves are beside every explanation [share of the channel]: no law of the model is exact."""
+    n = len(linear.at.values)
+    laws = [x[:, c, :n] @ linear.at.values for x in linear.columns[: len(source.train)]]
+    share = float(np.sqrt(np.mean(np.concatenate([x - x.mean() for x in laws]) ** 2))) / source.scale()[c]
+    return float(np.hypot(DISCREPANCY, LAW_ERROR * share))
