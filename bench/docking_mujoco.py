@@ -205,8 +205,8 @@ def harden(model: Any, truth: Truth) -> None:
         model.geom_solimp[g] = [IMPEDANCE, IMPEDANCE, 1e-3, 0.5, 2]
 
 
-def mjcf(truth: Truth, place: Array, turn: Rotation, travel: float, step: float) -> str:
-    """The test as MuJoCo reads it."""
+def mjcf(truth: Truth, place: Array, turn: Rotation, travel: float, step: float, paired: str = "") -> str:
+    """The test as MuJoCo reads it; ``paired`` are contacts with values of their own."""
     t, lines = truth, []
     s, c, r = np.sin(t.flank), np.cos(t.flank), t.edge
     for i in range(3):
@@ -264,6 +264,7 @@ def mjcf(truth: Truth, place: Array, turn: Rotation, travel: float, step: float)
  frictionloss="{t.dry}" solimpfriction="0.9999 0.9999 0.001 0.5 2" damping="{t.viscous}"/>
 <inertial pos="0 0 0" mass="{t.carriage_mass}" diaginertia="0.001 0.001 0.001"/>
 <site name="ring" pos="{-t.ring} 0 0"/>{bumpers}</body></body></worldbody>
+<contact>{paired}</contact>
 <tendon><spatial name="cable" springlength="0 {t.slack}"><site site="knob"/><site site="ring"/></spatial>
 {latches}</tendon>
 <actuator><position joint="carriage" kp="{LOOP[0]}" kv="{LOOP[1]}"/>{preloads}</actuator>

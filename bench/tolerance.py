@@ -165,7 +165,7 @@ def main() -> int:
     parser.add_argument("--cases", type=int, default=32, help="ground captures for the workers")
     options = parser.parse_args()
 
-    study = replace(load_study(GROUND), box={}, envelope=False)
+    study = replace(load_study(GROUND), box={}, envelope=None)
     ground = replace(study, sampling="sobol", cases=options.cases, batch=options.cases)
     nominal = ground.values(ground.scaled(np.full((1, len(ground.ranges)), 0.5))[0])
     load = os.getloadavg()[0]

@@ -73,11 +73,12 @@ def docked_of(whole: WholeRun) -> Docked:
 
     touching = np.flatnonzero(column(table, "snare.touching") > 0)
     times = table["time"].to_numpy()
-    joints = range(1, 8)
+    names = [str(key).partition(" ")[0] for key in table.variables]
+    joints = [name.removeprefix("q.") for name in names if name.startswith("q.")]
     capture = Capture(
         times, frames("carriage"), frames("pin"), frames("base"),
-        np.column_stack([column(table, f"q.joint{i}") for i in joints]),
-        np.column_stack([column(table, f"qd.joint{i}") for i in joints]),
+        np.column_stack([column(table, f"q.{joint}") for joint in joints]),
+        np.column_stack([column(table, f"qd.{joint}") for joint in joints]),
         columns(table, "snare.impulse.effector"), columns(table, "snare.angular_impulse.effector"),
         float(times[touching[0]]) if len(touching) else None,
     )  # fmt: skip
@@ -181,6 +182,7 @@ def energies(d: Docked) -> dict[str, Array]:
         "cables' motion and contacts": snare("kinetic") + snare("overlap"),
         "bodies' motion": own("kinetic"),
         "docking's contacts": own("stored"),
+        "suspension and weight": own("suspension"),
         "latches": own("latches"),
         "brake and stops": own("brake"),
         "lost in screw and carriage": own("carriage_lost"),

@@ -77,14 +77,17 @@ class Setting:
         Of the joints [rad/s].
     drift : array (6,)
         Twist of the base, in the world [m/s, rad/s].
+    pose : array (J,)
+        Of the joints [rad].
     """
 
-    case: CaseName
+    case: CaseName | Literal["ground"]
     arm: FloatingArm
     effector: Pose
     target: Target
     rates: Array
     drift: Array
+    pose: ArrayLike = CAPTURE_POSE
 
 
 def arrival(case: CaseName, foot: ArrayLike, turn: Rotation, speed: float = 0.0) -> Setting:

@@ -4,7 +4,7 @@ Three participants. The snare follows carriage and pin; arm, carriage, docking, 
 equation, which gets the cables' impulses; the control program reads sensors and commands, 100 times a second.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -14,7 +14,7 @@ import numpy as np
 from ..models.docking.arm import drive_with_carriage
 from ..models.docking.parameters import DockingParameters
 from ..models.floating.dynamics import momentum
-from ..models.floating.space_arm import CAPTURE_POSE, space_arm_drive
+from ..models.floating.space_arm import space_arm_drive
 from ..models.inertia import Array
 from ..models.snare.model import Accuracy
 from ..models.snare.parameters import SnareParameters
@@ -34,8 +34,9 @@ _FRAME = [
     for kind, axes in (("pos", "xyz"), ("quat", "wxyz"), ("vel", "xyz"), ("omega", "xyz"))
     for axis in axes
 ]
-SIZES = dict.fromkeys(("CLOSE", "PULL", "SEAT", "BACK_OFF", "UNLOAD"), 2.5e-3)
-"""Macro steps by the program's state [s], where bodies meet or part; `USUAL` in all others."""
+SIZES = dict.fromkeys(("PULL", "SEAT", "BACK_OFF", "UNLOAD"), 2.5e-3) | dict.fromkeys(("SETTLE", "SNUG", "SLIDE"), 1e-2)
+"""Macro steps by the program's state [s]: short where bodies meet or part, long where slack cables slide; `USUAL`
+in all others."""
 USUAL = 5e-3
 AFTER = 1.0
 """How long a run goes on in its last state [s]."""
@@ -69,8 +70,8 @@ def whole_system(
 ) -> System:  # fmt: skip
     """Snare, arm with docking, and program, connected."""
     arm = start.arm
-    total = momentum(arm, np.array([CAPTURE_POSE]), start.drift[None], start.rates[None])[0]  # base at the origin
-    drive = drive_with_carriage(space_arm_drive(arm))
+    total = momentum(arm, np.array([start.pose]), start.drift[None], start.rates[None])[0]  # base at the origin
+    drive = drive_with_carriage(space_arm_drive(arm, pose=start.pose))
     values = {
         f"makkar_friction.{joint.name}.{key}": value
         for joint in arm.tree.joints
@@ -82,7 +83,7 @@ def whole_system(
         "snare": CommandedSnareParticipant(
             snare, moved, Accuracy(own_step, 10, 5e-4, snare.cable_radius), start.effector
         ),
-        "effector": EndEffectorParticipant(arm, t, drive, CAPTURE_POSE, start.rates, total, docking, snare, values),
+        "effector": EndEffectorParticipant(arm, t, drive, start.pose, start.rates, total, docking, snare, values),
         "program": ControlProgram(table),
     }
     return System(participants, connections(), name=start.case)
@@ -119,11 +120,16 @@ def co_simulate_whole(
     own_step: float = 2e-3,
     frames: list[tuple[float, Array]] | None = None,
     disturb: Callable[[float, "Master"], None] | None = None,
+    until: Collection[str] = (),
+    sizes: Mapping[str, float] | None = None,
 ) -> WholeRun:
     """Run until `AFTER` past the program's last transition into a state that nothing leaves, ``longest`` [s] at most.
 
-    Macro steps are `SIZES` times ``scale``; ``own_step`` [s] is that inside the snare while cables touch. ``frames`` is
-    filled as by `co_simulate`; ``disturb`` is called each period of the program with the time and the master.
+    It ends, too, where the program comes to a state of ``until``.
+
+    Macro steps are `SIZES`, or ``sizes`` where that has the state, times ``scale``; ``own_step`` [s] is that inside the
+    snare while cables touch. ``frames`` is filled as by `co_simulate`; ``disturb`` is called each period of the program
+    with the time and the master.
     """
     coupled = whole_system(start, passive or Passive(), snare or SNARE, docking or DockingParameters(), table, own_step)
     program: Any = coupled.participants["program"]
@@ -133,12 +139,12 @@ def co_simulate_whole(
         if frames is not None and time >= len(frames) / 15:
             frames.append((time, model.cables()))
 
-    fault = ""
+    fault, steps = "", SIZES | dict(sizes or {})
     with Master(coupled, USUAL, scheme="gauss_seidel", hold="quadratic") as master:
         film(0.0)
         ended = None
         while master.time < longest - 1e-9 and (ended is None or master.time < ended + AFTER - 1e-9):
-            master.set_step(scale * SIZES.get(program.state, USUAL))
+            master.set_step(scale * steps.get(program.state, USUAL))
             if disturb:
                 disturb(master.time, master)
             try:
@@ -147,6 +153,8 @@ def co_simulate_whole(
                 fault = str(error)
                 break
             here = program.table.states[program.state]
+            if program.state in until:
+                break
             if ended is None and not here.leave and not here.timeout:
                 ended = master.time
         return WholeRun(master.result(), program.table.names, program.state, fault)

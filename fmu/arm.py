@@ -24,7 +24,7 @@ import casadi as ca
 from ..errors import InputError
 from ..models.empirical import TableLaw
 from ..models.floating.arm import FloatingArm
-from ..models.floating.tree import FloatingTree, floating_tree, n_carriers
+from ..models.floating.tree import FloatingTree, floating_tree
 from ..models.model import Model, Placed
 from ..models.rig.rig import Rig
 from .accelerations import Joints, accelerations_of
@@ -82,7 +82,7 @@ class _Writer:
 
     def __init__(self, model: Model, arm: FloatingArm) -> None:
         self.model, self.arm, self.ledger = model, arm, Ledger()
-        self.joints, self.n = model.joints[n_carriers(model.tree) :], arm.n_joints
+        self.joints, self.n = model.joints[model.tree.carriers :], arm.n_joints
         self.units = ["m" if j.kind == "prismatic" else "rad" for j in arm.tree.joints]
         self.torque_units = ["N" if unit == "m" else "N*m" for unit in self.units]
 

@@ -16,7 +16,6 @@ import numpy as np
 
 from ..models.axes import Place
 from ..models.empirical import TableLaw
-from ..models.floating.tree import n_carriers
 from ..models.hidden_state import ros2
 from ..models.model import Model, Placed
 from ..models.rig.rig import Rig
@@ -49,7 +48,7 @@ class _Follower:
     """Writes one model into a ledger."""
 
     def __init__(self, model: Model) -> None:
-        self.model, self.ledger, self.first = model, Ledger(), n_carriers(model.tree)
+        self.model, self.ledger, self.first = model, Ledger(), model.tree.carriers
         self.joints, joints = model.joints[self.first :], model.tree.joints[self.first :]
         self.n = len(joints)
         self.units = [("m", "N") if j.kind == "prismatic" else ("rad", "N*m") for j in joints]

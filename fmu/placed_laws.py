@@ -8,10 +8,10 @@ import numpy as np
 
 from ..models.axes import Place, place
 from ..models.effect import Parameter, written_unit
-from ..models.floating.tree import n_carriers
 from ..models.hidden_state import reads
 from ..models.model import Model, Placed
-from ..models.rig.kinematics import far_end, sling_of
+from ..models.rig.kinematics import sling_of
+from ..models.rig.points import far_end
 from ..models.rig.rig import Rig
 from .equations import Ledger
 from .symbolic import root
@@ -39,7 +39,7 @@ class PlacedLaws:
     def __init__(self, model: Model, ledger: Ledger) -> None:
         """Register every parameter of the model's effects."""
         self._model, self._ledger = model, ledger
-        self._joints = model.tree.joints[n_carriers(model.tree) :]
+        self._joints = model.tree.joints[model.tree.carriers :]
         self._parameters: dict[str, dict[str, ca.SX]] = {}
         self._scales: dict[str, ca.SX] = {}
         self._temperatures: dict[int, ca.SX] = {}
@@ -67,13 +67,13 @@ class PlacedLaws:
             assert isinstance(self._model.tree, Rig)
             return sling_of(self._model.tree, p.at).link
         if p.effect.at in ("link", "boom", "base"):
-            return self._link_of(p) - n_carriers(self._model.tree)
+            return self._link_of(p) - self._model.tree.carriers
         return int(self.place_of(p).channels[0])
 
     def place_of(self, p: Placed) -> Place:
         """The joint or axis, among the arm's joints, that an effect acts at or whose channel it reads."""
         found = place(self._model.tree, p.at.removeprefix("tau.").removeprefix("q.").removeprefix("q_link."))
-        first = n_carriers(self._model.tree)
+        first = self._model.tree.carriers
         return replace(found, along=found.along[first:], back=found.back[first:])
 
     def _link_of(self, p: Placed) -> int:

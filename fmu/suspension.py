@@ -8,7 +8,8 @@ import numpy as np
 
 from ..models.inertia import Array
 from ..models.model import Placed
-from ..models.rig.kinematics import far_end, sling_of, symbolic_point
+from ..models.rig.kinematics import sling_of
+from ..models.rig.points import far_end, symbolic_point
 from ..models.rig.rig import Rig
 
 PLACES = ("sling", "slide", "boom")

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..models.floating.tree import channel, n_carriers
+from ..models.floating.tree import channel
 from ..models.model import Model
 from .diagnosis import Candidate, ChannelFit, Diagnosis, Estimate, Finding, Limit, Misfit, Moved, Rival, Step, Trace
 from .evidence.diagnose import Decided
@@ -209,7 +209,7 @@ def _noise_floor(experiments: Sequence[Experiment], final: Fit) -> Array:
         top = frequency > min(2 * e.motion.band, 0.4 / e.motion.period)
         # The median of a periodogram is ln 2 of its mean, and is not moved by single lines.
         floors.append(np.sqrt(np.median(density[top], axis=0) / np.log(2) * e.motion.band))
-        carriers = n_carriers(e.body.tree)
+        carriers = e.body.tree.carriers
         if carriers:
             floors[-1][:carriers] = momentum_floor(e)
     return np.min(floors, axis=0)

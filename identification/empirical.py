@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, cholesky, eigh
 
 from ..models.empirical import NAME, placed_tables, read_along, tables_of
-from ..models.floating.tree import n_carriers
 from ..models.model import Placed
 from ..models.table import MOST, Table, read_words
 from .deciding import GATE
@@ -61,7 +60,7 @@ def empirical_laws(
     decided: Decided, final: Fit, train: Sequence[Experiment], held: Sequence[Experiment]
 ) -> tuple[Fit, tuple[EmpiricalLaw, ...]]:
     """The fit with a table for each nameless curve that can be one and that the held-out recordings confirm."""
-    carriers, joints = n_carriers(final.assembly.tree), final.assembly.tree.joints
+    carriers, joints = final.assembly.tree.carriers, final.assembly.tree.joints
     found: list[EmpiricalLaw] = []
     for c in sorted({r.channel for r in decided.left.curves if r.channel >= carriers}):
         curves = [r for r in decided.left.curves if r.channel == c]

@@ -18,7 +18,7 @@ from ..models.floating.carried_base import CarriedBase, Followed, JointPath
 from ..models.floating.tree import CARRIERS, FloatingTree, arm_on
 from ..models.hidden_state import evaluate_law
 from ..models.model import Model
-from ..models.rig.kinematics import far_end
+from ..models.rig.points import far_end
 from ..models.rigid_body import RigidBody
 from ..recordings.condition import Motion, condition
 from .fitting.assembly import Assembly

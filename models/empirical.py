@@ -18,7 +18,6 @@ from ..errors import InputError
 from .axes import neighbours
 from .effect import Effect, Parameter, Symbols
 from .effects._direction import direction
-from .floating.tree import n_carriers
 from .model import Placed
 from .table import FEWEST, MOST, OTHERS, OWN, TIMES, Table, cardinal, is_coordinate
 from .tree import Tree
@@ -160,8 +159,8 @@ def read_empirical(
         raise InputError(f"{path}: {NAME} = {entries!r}; allowed are tables headed [[{NAME}]]")
     if entries and system not in ("arm", "zero_g_rig", "free_floating_arm"):
         raise InputError(f"{path}: [[{NAME}]] belongs to a system with joints, not to {system!r}; take it out")
-    joints = [joint.name for joint in tree.joints[n_carriers(tree) :]]
-    axes = [axis.name for axis in (*tree.axes, *neighbours(tree, n_carriers(tree)))]
+    joints = [joint.name for joint in tree.joints[tree.carriers :]]
+    axes = [axis.name for axis in (*tree.axes, *neighbours(tree, tree.carriers))]
     found: dict[str, list[Table]] = {}
     values: dict[str, float] = {}
     for number, entry in enumerate(entries, 1):

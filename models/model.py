@@ -10,7 +10,6 @@ from ..recordings.signals import Signal
 from .axes import neighbours
 from .docking.bench_setup import DockingTree, docking_places
 from .effect import Effect
-from .floating.tree import n_carriers
 from .hidden_state import rows
 from .holding import Holding
 from .rig.kinematics import booms, reached_joints, slides
@@ -114,7 +113,7 @@ def places(effect: Effect, tree: Tree) -> tuple[str, ...]:
         return snare_places(effect.name, tree)
     if isinstance(tree, DockingTree):
         return docking_places(effect.at)
-    carriers = n_carriers(tree)
+    carriers = tree.carriers
     if effect.neighbours == "only":
         return tuple(axis.name for axis in neighbours(tree, carriers))
     if effect.at == "joint":
@@ -136,7 +135,7 @@ def all_places(effect: Effect, tree: Tree) -> tuple[str, ...]:
     own = places(effect, tree)
     if effect.at != "joint" or effect.acts_on != "torque" or isinstance(tree, SnareTree | DockingTree):
         return own
-    unasked = neighbours(tree, n_carriers(tree)) if effect.neighbours == "too" else ()
+    unasked = neighbours(tree, tree.carriers) if effect.neighbours == "too" else ()
     stated = [axis for axis in tree.axes if len(axis.along) > 1]
     same = [axis.along for axis in stated]
     return (*own, *(axis.name for axis in (*stated, *(axis for axis in unasked if axis.along not in same))))

@@ -19,7 +19,7 @@ from .axes import neighbours, read_axes
 from .docking.bench_setup import read_bench
 from .effects import get_effect
 from .empirical import read_empirical
-from .floating.tree import UNNAMED, n_carriers, read_floating
+from .floating.tree import UNNAMED, read_floating
 from .holding import Holding, read_holding
 from .model import Model, Placed, places
 from .published_inertia import Fix
@@ -250,14 +250,14 @@ def _placed(path: Path, entries: Any, tree: Tree) -> tuple[Placed, ...]:
         if extra:
             raise InputError(f"{path}: effects: {name} has {sorted(extra)[0]!r}; allowed are name, at, hold")
         at = entry.get("at") if isinstance(entry, dict) else None
-        allowed, encoded = everywhere, tree.joints[n_carriers(tree) :]
+        allowed, encoded = everywhere, tree.joints[tree.carriers :]
         if effect.at == "sensor" and effect.states:
             # A late position shows as an early torque; what else an encoder does would be read as torque.
             allowed += tuple(f"q.{j.name}" for j in encoded)
         if effect.at == "sensor":
             allowed += tuple(f"q_link.{j.name}" for j in encoded)
         if effect.at == "joint" and effect.acts_on == "torque":
-            allowed += tuple(axis.name for axis in (*tree.axes, *neighbours(tree, n_carriers(tree))))
+            allowed += tuple(axis.name for axis in (*tree.axes, *neighbours(tree, tree.carriers)))
         if at is not None and at not in allowed:
             raise InputError(f"{path}: {name} at {at!r}; this model has {', '.join(allowed)}")
         hold = entry.get("hold", []) if isinstance(entry, dict) else []

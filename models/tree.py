@@ -4,14 +4,18 @@ Frames: joint i's frame sits at a fixed pose on the parent link; the link behind
 at zero, turned about (revolute) or moved along (prismatic) ``axis`` otherwise. The base is the world frame.
 """
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from ..errors import InputError
 from .axes import Axis
 from .inertia import Array
+
+if TYPE_CHECKING:
+    from .rigid_body import RigidBody
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +127,36 @@ class Tree:
     def sticks(self, joint: int) -> bool:
         """Whether dry friction can hold a joint where it is."""
         return self.stands
+
+    @property
+    def carriers(self) -> int:
+        """Number of leading joints that are no joints of the arm: 6 where they carry a floating base."""
+        return 0
+
+    @property
+    def balanced(self) -> bool:
+        """Whether its weight is taken wherever it stands, by what moves with it."""
+        return False
+
+    @property
+    def tensions(self) -> tuple[str, ...]:
+        """Names of what holds it up, whose tension a recording may have as ``tension.<name>``."""
+        return ()
+
+    def link_at(self, kind: str, name: str) -> int | None:
+        """Index of the link that a place of a kind belongs to, by the place's name; None for a joint or an axis."""
+        if kind not in ("link", "boom", "base"):
+            return None
+        return [link.name for link in self.links].index(name)
+
+    def carried(
+        self, body: "RigidBody", q: Array, regressor: Callable[[], Array], tension: Mapping[str, Array]
+    ) -> Array:
+        """Torque that something else than the joints' drives supplies (n, J) [N·m or N].
+
+        ``q`` (n, J), what gives the ``regressor`` (n, J, 10 L) at the motion, measured ``tension`` (n,) [N] by name.
+        """
+        return np.zeros_like(q)
 
     @property
     def bodies(self) -> tuple[tuple[Joint, int, float, float], ...]:

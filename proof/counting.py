@@ -119,8 +119,8 @@ def of_effects(effects: Sequence[Mapping[str, Any]], right: Sequence[bool], gene
                 f"{effect['name']} at {effect['at']} was kept without gain, margin and explained; diagnose it again"
             )
         if effect["gain"] is not None:
-            numbers = [float(effect[x]) for x in ("gain", "margin", "explained")]
-            found.append(Row(*numbers, bool(is_right), generator))
+            gain, held, share = (float(effect[x]) for x in ("gain", "margin", "explained"))
+            found.append(Row(gain, held, share, bool(is_right), generator))
     return found
 
 

@@ -25,6 +25,7 @@ from .outcome import FOLDER, Quantity, table, write_result
 STUDIES = {
     "ground": "ground_",
     "inspection": "",
+    "latched_ground": "latched.ground_",
     "latched_inspection": "latched.",
     "latched_hover": "latched.hover_",
 }

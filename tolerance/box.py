@@ -5,7 +5,7 @@ from collections import Counter
 import numpy as np
 import pandas as pd
 
-from .gallery import kind_of_miss
+from .gallery import Case, kind_of_miss
 from .rays import Ray
 from .study import Study
 from .summary import Interval, nominal_point
@@ -69,8 +69,8 @@ def why_the_box_fails(study: Study, box: pd.DataFrame) -> str:
     fails = np.array([not row["margin"] > 0 for row in rows], bool)
     if not fails.any():
         return f"All {len(rows)} cases of the box succeed."
-    kinds = Counter(kind_of_miss(study, row) or "without a result" for row in rows if not row["margin"] > 0)
-    off = [1e3 * row["radial_error"] for row in rows if kind_of_miss(study, row) == "off the axis"]
+    kinds = Counter(_kind(study, row) or "without a result" for row in rows if not row["margin"] > 0)
+    off = [1e3 * row["radial_error"] for row in rows if _kind(study, row) == "off the axis"]
     allowed = 1e3 * study.success.radial_error
     words = [
         f"{count} {kind}"
@@ -80,6 +80,13 @@ def why_the_box_fails(study: Study, box: pd.DataFrame) -> str:
     return (
         f"Of {len(rows)} cases of the box {fails.sum()} do not succeed: {', '.join(words)}.{_side(study, box, fails)}"
     )
+
+
+def _kind(study: Study, row: Case) -> str:
+    """What went wrong; of a study of the latch, where the program gave up."""
+    if not study.success.latched or row["reason"]:
+        return kind_of_miss(study, row)
+    return "latched outside its bars" if row["state"] == "LATCHED" else f"given up in {row['state']}"
 
 
 def _side(study: Study, box: pd.DataFrame, fails: np.ndarray) -> str:

@@ -121,6 +121,7 @@ def run_case(capture: Capture, values: Mapping[str, float]) -> Outcome:
 
 BUILT_IN = {name: f"snarelab.tolerance.{name}:CAPTURE" for name in ("ground", "inspection")} | {
     "hover": "snarelab.tolerance.inspection:HOVER",
+    "latched-ground": "snarelab.tolerance.latched_ground:CAPTURE",
     "latched-inspection": "snarelab.tolerance.latched:INSPECTION",
     "latched-hover": "snarelab.tolerance.latched:HOVER",
 }

@@ -1,9 +1,10 @@
 """The numbers of captures that a change in physics must not move unseen, and how they are found again.
 
 They stand in one file, ``tests/tolerances.toml``, each with how far it may move: ``[ground]``, the paper's ground test;
-``[envelope]``, how far single axes of that test may go; ``[arrival]``, the paper's inspection capture; and the share of
-captures that succeed from 20 mm and 2 degrees in other directions, whatever the friction. After a change that was meant
-to move them, ``python -m snarelab.tolerance.renew`` writes them anew.
+``[envelope]``, how far single axes of that test may go; ``[arrival]``, the paper's inspection capture, and the share of
+captures that succeed from 20 mm and 2 degrees in other directions, whatever the friction; and ``[latched]``, the
+paper's hover capture on to the latch. After a change that was meant to move them,
+``python -m snarelab.tolerance.renew`` writes them anew.
 
 An end of the envelope is found by halving, from the nominal case outwards along one axis. To check it, two captures
 are enough: one that is nearer by what is allowed must succeed, one that is farther by it must not.
@@ -18,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
-from . import ground, inspection
+from . import ground, inspection, latched
 from .capture import Capture, Outcome, run_case
 from .run import box_points
 from .study import Success, load_study
@@ -92,6 +93,12 @@ def arrival_numbers() -> dict[str, float]:
     others = [run_case(study.capture, study.values(point)) for point in box_points(study)[:DIRECTIONS]]
     share = float(np.mean([SUCCESS.margin(outcome) > 0 for outcome in others]))
     return {**_numbers(_run(inspection.CAPTURE, ARRIVAL)), "share_of_successes": share}
+
+
+def latched_numbers() -> dict[str, float]:
+    """Of the paper's hover capture to the latch, its margin of that among them; one capture."""
+    outcome = _run(latched.HOVER, ARRIVAL)
+    return {name: getattr(outcome, name) for name in ("first_contact", "radial_error", "peak_force", "latched")}
 
 
 def succeeds(axis: str, value: float) -> bool:

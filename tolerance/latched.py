@@ -1,8 +1,9 @@
-"""Captures in orbit that go on to the latch: does it latch, and in which state does it end if it does not?
+"""Captures that go on to the latch: does it latch, and in which state does the program give up if it does not?
 
-As `inspection`, with the whole end effector (`snarelab.cosim.whole_capture`). Success is the program's LATCHED with all
-three balls in their seats, little left of the misalignment, a preload inside the published window and no cable over its
-strength. The soft capture's own numbers, at the paper's 10 s, stand beside it: they are the proxy.
+As `inspection`, with the whole end effector (`snarelab.cosim.whole_capture`). Success is the program's
+LATCHED with all three balls in their seats, little left of the misalignment, a preload inside the published window and
+no cable over its strength. The soft capture's own numbers, at the paper's 10 s, stand beside it: they are the proxy.
+A case ends where the program gives up: the way out from each state has its own tests.
 """
 
 from collections.abc import Mapping
@@ -12,9 +13,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..cosim.docked import docked_of, margin
-from ..cosim.orbit_capture import SNARE, CaseName, arrival, column, resistance
-from ..cosim.whole_capture import co_simulate_whole
+from ..cosim.orbit_capture import SNARE, CaseName, Passive, Setting, arrival, column, resistance
+from ..cosim.state_table import StateTable
+from ..cosim.whole_capture import WholeRun, co_simulate_whole
 from ..models.docking.parameters import DockingParameters
+from ..models.snare.parameters import SnareParameters
 from .capture import Axis, Capture, Outcome, source_version
 from .inspection import AHEAD
 from .inspection import AXES as ARRIVAL
@@ -22,19 +25,41 @@ from .inspection import SOURCES as ARRIVAL_SOURCES
 
 END = 10.0
 """Of the soft capture, by the paper [s]."""
-AXES = (
-    *(a for a in ARRIVAL if a.name not in ("joint_stiffness", "wait")),
-    Axis("docking_friction", "1", "Coulomb's, between ball and groove", 0.15, 0.0, 0.4),
-)
+SCALE = 1.5
+"""Of the orbit studies' macro steps, which are for their energies: two thirds of the processor time."""
+WAY_OUT = ("OPEN", "UNLOAD")
+"""States with which the program gives up."""
+SEAT = Axis("docking_friction", "1", "Coulomb's, between ball and groove", 0.15, 0.0, 0.4)
+AXES = (*(a for a in ARRIVAL if a.name not in ("joint_stiffness", "wait")), SEAT)
 
 
-def run(values: Mapping[str, float], case: CaseName) -> Outcome:
-    """One case, to its end; raises InputError for a pin that starts inside a cable."""
-    turn = Rotation.from_euler("xyz", [values["roll"], values["pitch"], values["yaw"]])
-    start = arrival(case, [AHEAD + values["axial"], values["radial_y"], values["radial_z"]], turn, values["speed"])
+def in_orbit(values: Mapping[str, float], case: CaseName) -> Outcome:
+    """One case in orbit, to its end; raises InputError for a pin that starts inside a cable."""
+    start = arrival(
+        case, [AHEAD + values["axial"], values["radial_y"], values["radial_z"]], turned(values), values["speed"]
+    )
+    return outcome(start, SNARE, values, passive=resistance(values["joint_friction"]))
+
+
+def turned(values: Mapping[str, float]) -> Rotation:
+    """The target's axes in the end effector's."""
+    return Rotation.from_euler("xyz", [values["roll"], values["pitch"], values["yaw"]])
+
+
+def outcome(
+    start: Setting,
+    snare: SnareParameters,
+    values: Mapping[str, float],
+    *,
+    passive: Passive | None = None,
+    table: StateTable | None = None,
+    scale: float = SCALE,
+    sizes: Mapping[str, float] | None = None,
+) -> Outcome:
+    """One case from where everything stands; the rest as of `co_simulate_whole`."""
     docking = DockingParameters(friction=values["docking_friction"])
-    snare = SNARE.with_values(friction=values["friction"])
-    whole = co_simulate_whole(start, resistance(values["joint_friction"]), snare, docking)
+    rubbing = snare.with_values(friction=values["friction"])
+    whole = co_simulate_whole(start, passive, rubbing, docking, table, scale=scale, sizes=sizes, until=WAY_OUT)
     if whole.fault and whole.final == "CLOSE":
         return Outcome.failed(whole.fault)
     d = docked_of(whole)
@@ -48,8 +73,14 @@ def run(values: Mapping[str, float], case: CaseName) -> Outcome:
         peak_force=float(np.linalg.norm(forces, axis=1).max()),
         peak_tension=float(d.tension[soft].max()),
         latched=margin(d, docking),
-        state=whole.final,
+        state=ended_in(whole),
     )
+
+
+def ended_in(whole: WholeRun) -> str:
+    """The program's last state; where it gave up, that in which it did."""
+    path = [state for state, _, _ in whole.phases] + [whole.final]
+    return next(state for state in reversed(path) if state not in WAY_OUT)
 
 
 SOURCES = (
@@ -57,7 +88,7 @@ SOURCES = (
     "cosim/docked.py",
     "cosim/whole_capture.py",
     "cosim/state_table.py",
-    "cosim/programs/*.toml",
+    "cosim/programs/end_effector.toml",
     "cosim/participants/end_effector.py",
     "cosim/participants/control_program.py",
     "models/docking/*.py",
@@ -65,5 +96,5 @@ SOURCES = (
 )
 """What the outcome of a case follows from."""
 
-INSPECTION = Capture("latched-inspection", AXES, partial(run, case="inspection"), source_version(*SOURCES))
-HOVER = Capture("latched-hover", AXES, partial(run, case="hover"), source_version(*SOURCES))
+INSPECTION = Capture("latched-inspection", AXES, partial(in_orbit, case="inspection"), source_version(*SOURCES))
+HOVER = Capture("latched-hover", AXES, partial(in_orbit, case="hover"), source_version(*SOURCES))

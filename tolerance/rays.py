@@ -2,7 +2,8 @@
 
 From the nominal case outwards in eight equal steps to the range's limit, until one fails; that step is then halved
 three times. An end is thus known to lie between a success and a failure that are a 64th of the way apart. It is the
-first end that steps of an eighth see; behind it captures may succeed again.
+first end that steps of an eighth see; behind it captures may succeed again. A study may ask for fewer axes, longer
+steps and ends that are less exact (`Ways`); cases keep their numbers, so that it may ask for more later on.
 """
 
 from collections.abc import Mapping
@@ -13,11 +14,12 @@ import pandas as pd
 
 from .study import Study
 from .summary import Interval, nominal_point
+from .ways import Ways
 
 RADIAL = ("radial_y", "radial_z")
 ANGLES = ("roll", "pitch", "yaw")
-COARSE, FINE = 8, 64
-"""A step outwards, and the whole way, in the smallest steps."""
+FINE = 64
+"""The whole way in the smallest steps."""
 STAGE = "ray"
 
 
@@ -41,14 +43,16 @@ class Ray:
 
 
 def rays(study: Study) -> list[Ray]:
-    """Both ways along each varied axis, and along the diagonals of the two offsets where both vary.
+    """Both ways along each axis that the study asks for, and along the diagonals of the two offsets where both do.
 
     Ways without length, of an axis whose nominal value is a limit of its range, are left out.
     """
     names, centre = list(study.ranges), nominal_point(study)
     low, high = np.array(list(study.ranges.values())).T
-    directions = [sign * row for row in np.eye(len(names)) for sign in (-1.0, 1.0)]
-    if set(RADIAL) <= set(names):
+    wanted = (study.envelope or Ways()).axes or names
+    directions = [sign * np.eye(len(names))[names.index(axis)] for axis in names for sign in (-1.0, 1.0)]
+    directions = [d for d in directions if names[int(np.flatnonzero(d)[0])] in wanted]
+    if set(RADIAL) <= set(wanted):
         y, z = (np.eye(len(names))[names.index(axis)] for axis in RADIAL)
         directions += [a * y + b * z for a in (-1.0, 1.0) for b in (-1.0, 1.0)]
     found = []
@@ -61,12 +65,18 @@ def rays(study: Study) -> list[Ray]:
     return found
 
 
-def next_step(won: Mapping[int, bool]) -> int | None:
+def next_step(won: Mapping[int, bool], ways: Ways) -> int | None:
     """Which step of a ray is to be tried next, from those that were; None where its end is known."""
     low, high = last_and_first(won)
     if high is None:
-        return low + COARSE if low < FINE else None
-    return (low + high) // 2 if high - low > 1 else None
+        return min(low + FINE // ways.steps, FINE) if low < FINE else None
+    return (low + high) // 2 if high - low > FINE // ways.exact else None
+
+
+def most_cases(study: Study) -> int:
+    """How many cases all rays take at most."""
+    ways = study.envelope
+    return 0 if ways is None else 1 + len(rays(study)) * (ways.steps + int(np.log2(ways.exact / ways.steps)))
 
 
 def last_and_first(won: Mapping[int, bool]) -> tuple[int, int | None]:
@@ -93,7 +103,7 @@ def next_cases(study: Study, table: pd.DataFrame) -> dict[int, np.ndarray]:
         return {0: centre}
     if not won[0][0]:
         return {}
-    steps = {ray: next_step(w) for ray, w in enumerate(won)}
+    steps = {ray: next_step(w, study.envelope or Ways()) for ray, w in enumerate(won)}
     return {
         FINE * ray + step: centre + step / FINE * (ways[ray].tip - centre)
         for ray, step in steps.items()
@@ -119,10 +129,13 @@ def _end(ray: Ray, won: Mapping[int, bool]) -> Interval:
 
 
 def envelope(study: Study, found: list[tuple[Ray, Interval]]) -> dict[str, tuple[Interval, Interval]]:
-    """Between which values each varied axis may be, the others at nominal: nominal itself where that is its limit."""
+    """Between which values each axis that was tried may be, the others at nominal: nominal where that is its limit."""
     ways = {(ray.axes[0], ray.length > 0): end for ray, end in found if len(ray.axes) == 1}
     limits = {}
+    tried = {axis for ray, _ in found for axis in ray.axes}
     for name, nominal in zip(study.ranges, nominal_point(study), strict=True):
+        if name not in tried:
+            continue
         down, up = (ways.get((name, upwards), Interval(0.0, 0.0, 0.0)) for upwards in (False, True))
         limits[name] = tuple(Interval(*(float(nominal + x) for x in vars(end).values())) for end in (down, up))
     return limits

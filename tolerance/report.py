@@ -89,7 +89,9 @@ def _sentence(study: Study, content: dict[str, Any]) -> str:
             words.append("failures end in " + ", ".join(f"{state} ({n})" for state, n in p["ends"].items()))
     first, *others = sorted(content["sensitivity"], key=lambda s: -s["total"])
     most = [first["axis"], *(s["axis"] for s in others if s["total_high"] > first["total_low"])]
-    words.append(f"{', '.join(most)} matter{'s' if len(most) == 1 else ''} most")
+    sure = content["width"] <= study.width
+    doubt = "" if sure else f", by a boundary that leaves {100 * content['width']:.0f} % of the ranges undecided"
+    words.append(f"{', '.join(most)} matter{'s' if len(most) == 1 else ''} most{doubt}")
     return "; ".join(words) + "."
 
 
@@ -162,6 +164,8 @@ def _page(
         sections.insert(0, ("envelope", "Envelope", drawn + numbers))
     if misses:
         sections.insert(-1, ("misses", "Typical misses", _gallery(misses)))
+    if study.success.latched:
+        sections.insert(1 if limits else 0, ("proxy", "What the proxy is worth", _proxy(study, content["proxy"])))
     if study.box:
         sections.insert(1 if limits else 0, ("box", "The box", paragraph(content["box"])))
     return page(
@@ -170,6 +174,31 @@ def _page(
         sections,
         f"Written by snarelab {__version__}.",
     )
+
+
+def _proxy(study: Study, found: dict[str, Any]) -> str:
+    """The soft capture's radial error against the latch, and the states in which the program gave up."""
+    total, latched, failed = found["cases"], found["latched"], found["cases"] - found["latched"]
+    both, neither = latched - found["latched_against"], failed - found["failed_against"]
+    limit = f"{1e3 * study.success.radial_error:g} mm"
+    counts = table(
+        f"Of {total} captures with a result: what the radial error after the soft capture says, and what came of it.",
+        ["", "latched", "did not"],
+        [
+            [f"within {limit}", str(both), str(found["failed_against"])],
+            [f"beyond {limit}", str(found["latched_against"]), str(neither)],
+        ],
+        numeric=(1, 2),
+    )
+    if not found["ends"]:
+        return counts
+    ends = table(
+        "State in which the program gave up, or LATCHED where a limit of the latch was missed.",
+        ["state", "captures"],
+        [[state, str(count)] for state, count in found["ends"].items()],
+        numeric=(1,),
+    )
+    return counts + ends
 
 
 def _between(low: float, high: float) -> str:

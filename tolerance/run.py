@@ -14,7 +14,7 @@ from scipy.stats import qmc
 from ..errors import InputError
 from .boundary import Boundary, fit_boundary
 from .capture import Outcome, run_case
-from .rays import COARSE, STAGE, next_cases, rays
+from .rays import STAGE, most_cases, next_cases
 from .results import Results
 from .study import LARGEST, Study
 from .summary import nominal_point, to_unit
@@ -87,7 +87,7 @@ class _Runner:
     def __init__(self, study: Study, results: Results, client: Any, say: Say) -> None:
         self._study, self._results, self._client, self._say = study, results, client, say
         self._begun, self._ran = time.monotonic(), 0
-        self._most_on_rays = 1 + len(rays(study)) * (COARSE + int(np.log2(COARSE))) if study.envelope else 0
+        self._most_on_rays = most_cases(study)
 
     def stage(self, stage: str, points: np.ndarray, count: int, first: int = 0) -> None:
         """Run cases ``first`` to ``first + count`` of a stage; points of the varied axes, shape (count, n_ranges)."""

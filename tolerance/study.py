@@ -1,8 +1,7 @@
 """The study file (TOML): what is varied over which ranges, what success means, and how cases are chosen."""
 
-import difflib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +10,8 @@ import numpy as np
 from ..errors import InputError
 from ..files import toml_table
 from .capture import Capture, Outcome, find_capture
+from .given import count, flag, known, number, positive, table, text
+from .ways import Ways, read_ways
 
 SAMPLINGS = ("adaptive", "sobol", "latin_hypercube")
 LARGEST = 1000
@@ -97,8 +98,8 @@ class Study:
         Cases that are run for it.
     box_ends : bool
         Each axis of the box stands at one of its two ends, by chance; else they are drawn evenly between.
-    envelope : bool
-        Captures along single axes are run, too; see `rays`.
+    envelope : Ways or None
+        Captures along single axes that are run, too.
     """
 
     path: Path
@@ -115,7 +116,7 @@ class Study:
     box: Mapping[str, tuple[float, float]]
     box_cases: int
     box_ends: bool = False
-    envelope: bool = True
+    envelope: Ways | None = field(default_factory=Ways)
 
     def scaled(self, unit: np.ndarray) -> np.ndarray:
         """Points of the unit cube, shape (n, n_ranges), as values of the varied axes."""
@@ -149,15 +150,15 @@ def load_study(path: str | Path) -> Study:
     """Read a study file; raises InputError with what is wrong, the value, what is allowed and the mend."""
     path = Path(path)
     raw = toml_table(path)
-    _known(path, "", raw, _KEYS)
+    known(path, "", raw, _KEYS)
     try:
-        capture = find_capture(_text(path, raw, "capture", ""))
+        capture = find_capture(text(path, raw, "capture", ""))
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    sampling = _text(path, raw, "sampling", "adaptive")
+    sampling = text(path, raw, "sampling", "adaptive")
     if sampling not in SAMPLINGS:
         raise InputError(f"{path}: sampling = {sampling!r}; allowed are {', '.join(SAMPLINGS)}")
-    cases = _count(path, raw.get("cases", 512), "cases", 1)
+    cases = count(path, raw.get("cases", 512), "cases", 1)
     if sampling == "adaptive" and cases > LARGEST:
         raise InputError(
             f"{path}: cases = {cases}; adaptive sampling takes at most {LARGEST}; give that, or sampling = 'sobol'"
@@ -165,60 +166,60 @@ def load_study(path: str | Path) -> Study:
     ranges = _ranges(path, raw, "ranges", capture)
     if not ranges:
         raise InputError(f"{path}: [ranges] is empty; name at least one of {_names(capture)}")
-    fixed = _table(path, raw, "fixed")
-    _known(path, "fixed", fixed, [a.name for a in capture.axes])
+    fixed = table(path, raw, "fixed")
+    known(path, "fixed", fixed, [a.name for a in capture.axes])
     for name, value in fixed.items():
-        axis, number = capture.axis(name), _number(path, f"[fixed] {name}", value)
+        axis, given = capture.axis(name), number(path, f"[fixed] {name}", value)
         if name in ranges:
             raise InputError(f"{path}: {name} stands in [ranges] and in [fixed]; keep one")
-        if not axis.low <= number <= axis.high:
+        if not axis.low <= given <= axis.high:
             raise InputError(f"{path}: [fixed] {name} = {value}; allowed is {axis.low:g} to {axis.high:g} {axis.unit}")
-    box_table = dict(_table(path, raw, "box"))
-    box_cases = _count(path, box_table.pop("cases", 60), "[box] cases", 1)
-    box_ends = _flag(path, box_table.pop("ends", False), "[box] ends")
+    box_table = dict(table(path, raw, "box"))
+    box_cases = count(path, box_table.pop("cases", 60), "[box] cases", 1)
+    box_ends = flag(path, box_table.pop("ends", False), "[box] ends")
     box = _ranges(path, {"box": box_table}, "box", capture)
     for name, (low, high) in box.items():
         if name not in ranges or low < ranges[name][0] or high > ranges[name][1]:
             raise InputError(f"{path}: [box] {name} = [{low:g}, {high:g}] is not within [ranges]; widen the range")
     return Study(
         path,
-        _text(path, raw, "name", path.stem),
+        text(path, raw, "name", path.stem),
         capture,
-        _count(path, raw.get("seed", 1), "seed", 0),
+        count(path, raw.get("seed", 1), "seed", 0),
         sampling,
-        _count(path, raw.get("batch", 32), "batch", 1),
+        count(path, raw.get("batch", 32), "batch", 1),
         cases,
-        _positive(path, "width", raw.get("width", 0.05)),
+        positive(path, "width", raw.get("width", 0.05)),
         ranges,
         {k: float(v) for k, v in fixed.items()},
         _success(path, raw),
         box,
         box_cases,
         box_ends,
-        _flag(path, raw.get("envelope", True), "envelope"),
+        read_ways(path, raw, ranges),
     )
 
 
 def _success(path: Path, raw: Mapping[str, Any]) -> Success:
-    table = _table(path, raw, "success")
-    _known(path, "success", table, _SUCCESS)
-    numbers = {k: _positive(path, f"[success] {k}", table[k]) for k in _SUCCESS[:2] if k in table}
+    own = table(path, raw, "success")
+    known(path, "success", own, _SUCCESS)
+    numbers = {k: positive(path, f"[success] {k}", own[k]) for k in _SUCCESS[:2] if k in own}
     for key in _SUCCESS[:2]:
         if key not in numbers:
             raise InputError(f"{path}: [success] {key} is missing; say when a capture counts as one")
-    return Success(**numbers, latched=_flag(path, table.get("latched", False), "[success] latched"))
+    return Success(**numbers, latched=flag(path, own.get("latched", False), "[success] latched"))
 
 
 def _ranges(path: Path, raw: Mapping[str, Any], key: str, capture: Capture) -> dict[str, tuple[float, float]]:
-    table, found = _table(path, raw, key), {}
-    _known(path, key, table, [a.name for a in capture.axes])
-    for name, value in table.items():
+    own, found = table(path, raw, key), {}
+    known(path, key, own, [a.name for a in capture.axes])
+    for name, value in own.items():
         axis = capture.axis(name)
         point = key == "box" and not isinstance(value, list)  # one value for all its cases
         pair = [value, value] if point else value
         if not (isinstance(pair, list) and len(pair) == 2):
             raise InputError(f"{path}: [{key}] {name} = {value!r}; allowed is [low, high] in {axis.unit}")
-        low, high = (_number(path, f"[{key}] {name}", v) for v in pair)
+        low, high = (number(path, f"[{key}] {name}", v) for v in pair)
         if not low < high and not point:
             raise InputError(f"{path}: [{key}] {name} = [{low:g}, {high:g}] is empty; low must be below high")
         if low < axis.low or high > axis.high:
@@ -226,53 +227,6 @@ def _ranges(path: Path, raw: Mapping[str, Any], key: str, capture: Capture) -> d
             raise InputError(f"{path}: [{key}] {name} = [{low:g}, {high:g}]; the model holds for {allowed}")
         found[name] = (low, high)
     return found
-
-
-def _known(path: Path, table: str, given: Mapping[str, Any], allowed: Any) -> None:
-    for key in given:
-        if key not in allowed:
-            near = difflib.get_close_matches(key, list(allowed), 1)
-            where = f"[{table}] " if table else ""
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            raise InputError(f"{path}: {where}unknown key {key!r}; allowed are {', '.join(allowed)}{hint}")
-
-
-def _table(path: Path, raw: Mapping[str, Any], key: str) -> Mapping[str, Any]:
-    table = raw.get(key, {})
-    if not isinstance(table, dict):
-        raise InputError(f"{path}: {key} = {table!r}; allowed is a table [{key}]")
-    return table
-
-
-def _text(path: Path, raw: Mapping[str, Any], key: str, default: str) -> str:
-    value = raw.get(key, default)
-    if not isinstance(value, str):
-        raise InputError(f"{path}: {key} = {value!r}; allowed is text in quotes")
-    return value
-
-
-def _number(path: Path, what: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
-        raise InputError(f"{path}: {what} = {value!r}; allowed is a finite number")
-    return float(value)
-
-
-def _positive(path: Path, what: str, value: Any) -> float:
-    if not _number(path, what, value) > 0:
-        raise InputError(f"{path}: {what} = {value!r}; no case could ever meet it; give a number above zero")
-    return float(value)
-
-
-def _count(path: Path, value: Any, what: str, least: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or value < least:
-        raise InputError(f"{path}: {what} = {value!r}; allowed is a whole number from {least}")
-    return value
-
-
-def _flag(path: Path, value: Any, what: str) -> bool:
-    if not isinstance(value, bool):
-        raise InputError(f"{path}: {what} = {value!r}; allowed is true or false")
-    return value
 
 
 def _names(capture: Capture) -> str:

@@ -36,8 +36,8 @@ def success_probability(table: pd.DataFrame, confidence: float = 0.95) -> Interv
 def proxy_beside(study: Study, table: pd.DataFrame) -> dict[str, Any]:
     """Of a study whose success is the latch: how often the radial error at the soft capture's end says otherwise.
 
-    Keys: ``cases`` with a result, ``disagree`` of them, ``latched_against`` (it latched, and the proxy said no) and
-    ``failed_against``, and ``ends``, the states in which the failures ended with their numbers.
+    Keys: ``cases`` with a result, those that ``latched``, ``disagree`` of them, ``latched_against`` (it latched, and
+    the proxy said no) and ``failed_against``, and ``ends``, the states in which failures ended with their numbers.
     """
     known = pd.DataFrame(table[table["reason"] == ""])
     near = known["radial_error"].to_numpy(float) < study.success.radial_error
@@ -46,6 +46,7 @@ def proxy_beside(study: Study, table: pd.DataFrame) -> dict[str, Any]:
     ends = pd.Series(known["state"].to_numpy()[~latched], dtype=object).value_counts()
     return {
         "cases": len(known),
+        "latched": int(np.sum(latched)),
         "disagree": int(np.sum(latched != fine)),
         "latched_against": int(np.sum(latched & ~fine)),
         "failed_against": int(np.sum(~latched & fine)),

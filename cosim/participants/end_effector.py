@@ -42,6 +42,7 @@ _SHOWN = (
     ("touching", "1", "contacts of balls and bumpers"),
 )
 
+_STATIC = ("kinetic", "stored", "suspension")
 _COUNTS = ("switches", "closed", "enclosed", "touching")
 
 
@@ -209,7 +210,7 @@ class EndEffectorParticipant(Participant):
         for what, text in (("docking", "of the docking on the end effector"), ("wrist", "of docking and cables")):
             shown += [(f"force.{what}.{a}", "N", f"{text}, its axes") for a in _AXES]
             shown += [(f"torque.{what}.{a}", "N*m", f"{text}, about the tip, its axes") for a in _AXES]
-        shown += [(f"energy.{name}", "J", name.replace("_", " ")) for name in ("kinetic", "stored", *ENERGIES)]
+        shown += [(f"energy.{name}", "J", name.replace("_", " ")) for name in (*_STATIC, *ENERGIES)]
         return shown
 
     def outputs(self) -> np.ndarray:
@@ -229,7 +230,8 @@ class EndEffectorParticipant(Participant):
                 *(o[body] for body in _BODIES), q[:-1], qd[:-1], o["momentum"], o["target_momentum"],
                 [q[-1], qd[-1], o["motor_force"][0], -off[:, 0].min(), seated.sum(), closed,
                  self._enclosed(o), touching],
-                o["normal"], o["off"], o["docking"], o["wrist"], o["kinetic"], o["stored"], state[m.where["energies"]],
+                o["normal"], o["off"], o["docking"], o["wrist"], *(o[name] for name in _STATIC),
+                state[m.where["energies"]],
             ]
         )  # fmt: skip
 

@@ -21,8 +21,6 @@ from ...errors import InputError
 from ...models.axes import Place, place
 from ...models.effect import Parameter, written_unit
 from ...models.model import Placed
-from ...models.rig.kinematics import sling_of
-from ...models.rig.rig import Rig
 from ...models.tree import Tree
 from .base_parameters import INERTIAL, BaseParameters
 from .effect_terms import contributions
@@ -108,7 +106,6 @@ class Assembly:
         placed = tuple(p for p in placed if not p.at.startswith("q_link."))
         self.tree, self.placed, self.base, self.scales = tree, placed, base, scales
         self._joints = [j.name for j in tree.joints]
-        self._links = [link.name for link in tree.links]
         self._speeds = {at: values.get(f"speed_scale.{at}", s.speed) for at, s in scales.items()}
         self.phi = np.array(
             [
@@ -155,11 +152,8 @@ class Assembly:
 
     def joint_of(self, p: Placed) -> int:
         """Index of the joint that an effect's place belongs to; of an axis, the first of its joints."""
-        if isinstance(self.tree, Rig) and p.effect.at == "sling":
-            return sling_of(self.tree, p.at).link
-        if p.effect.at in ("link", "boom", "base"):
-            return self._links.index(p.at)
-        return int(self.place_of(p).channels[0])
+        link = self.tree.link_at(p.effect.at, p.at)
+        return int(self.place_of(p).channels[0]) if link is None else link
 
     def place_of(self, p: Placed) -> Place:
         """The joint, or the axis, that an effect acts at, or whose channel it reads."""

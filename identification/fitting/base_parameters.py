@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.floating.tree import n_carriers
 from ...models.inertia import Array
 from ...models.rigid_body import RigidBody
 from ...models.tree import Tree
@@ -101,7 +100,7 @@ def _regressor(body: RigidBody, length: float, rng: np.random.Generator) -> Arra
     q = rng.uniform(-reach, reach, shape)
     qd = rng.normal(size=shape) * unit * np.sqrt(rate_squared)
     qdd = rng.normal(size=shape) * unit * rate_squared
-    carriers = n_carriers(body.tree)
+    carriers = body.tree.carriers
     q[:, :carriers] = 0.0
     regressor = body.regressor(q, qd, qdd) * (length / unit)[:, None]
     regressor[:, :, : 10 * max(carriers - 1, 0)] = 0.0  # a floating base's carriers have no bodies

@@ -1,6 +1,7 @@
 """One effect's law along recorded motion: value, derivative by its parameters, and what it does to what it acts on."""
 
 from collections.abc import Callable
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,7 @@ from ...models.axes import Place, place
 from ...models.effect import Effect
 from ...models.hidden_state import evaluate_law, rows
 from ...models.model import Placed
-from ...models.rig.kinematics import far_end
+from ...models.rig.points import far_end
 from ...models.rig.rig import Rig
 from ...models.tree import Tree
 from .experiment import Experiment
@@ -70,10 +71,10 @@ def contributions(
         change, by_parameter = _link_change(effect, tree, joint, parameters)
         columns = experiment.regressor[:, :, own]
         return [(c, columns[:, c] @ change, columns[:, c] @ by_parameter) for c in range(columns.shape[1])], None, None
-    if isinstance(tree, Rig) and effect.at in ("sling", "boom"):
-        read = rig_signals(experiment, tree, effect, placed.at)
+    if effect.at in ("sling", "boom"):
+        read = rig_signals(experiment, cast(Rig, tree), effect, placed.at)
         values, by_parameter, _ = _by_segment(experiment, effect, read, parameters, bare)
-        return rig_terms(experiment, tree, effect, placed.at, values, by_parameter), None, None
+        return rig_terms(experiment, cast(Rig, tree), effect, placed.at, values, by_parameter), None, None
     if effect.at == "base":
         values, by_parameter, _ = _by_segment(experiment, effect, base_signals(experiment), parameters, bare)
         # What the effect gives to the base, nothing else has to supply.
@@ -117,8 +118,8 @@ def contributions(
     if effect.states:
         signals["inertia"] = here.inertia(experiment.mass_matrix)
     values, by_parameter, by_load = _by_segment(experiment, effect, signals, parameters, bare)
-    if isinstance(tree, Rig) and effect.at == "slide":
-        return rig_terms(experiment, tree, effect, placed.at, values, by_parameter), None, None
+    if effect.at == "slide":
+        return rig_terms(experiment, cast(Rig, tree), effect, placed.at, values, by_parameter), None, None
     if effect.acts_on == "torque":
         return _felt(here, values[:, 0], by_parameter[:, 0]), None if by_load is None else by_load[:, 0, 0], None
     return _along(experiment, joint, values, by_parameter), None, None

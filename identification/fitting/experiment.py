@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import xarray as xr
@@ -12,10 +12,8 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...models.axes import place
-from ...models.floating.tree import CARRIERS, FloatingTree, channel, n_carriers
+from ...models.floating.tree import FloatingTree, channel
 from ...models.model import Model
-from ...models.rig.kinematics import sling_map
-from ...models.rig.rig import Rig
 from ...models.rigid_body import RigidBody
 from ...recordings.condition import Motion, condition
 from .floating_terms import as_carriers, twist_noise, wheel_impulse, with_base, with_twist
@@ -103,32 +101,13 @@ class Experiment:
     @cached_property
     def tangent(self) -> tuple[Array, Array]:
         """Derivative of the nominal torque by position and by rate, each (n, J, J); slings move with the arm."""
-        gravity = np.zeros(3) if isinstance(self.body.tree, Rig) else None
+        gravity = np.zeros(3) if self.body.tree.balanced else None
         return self.body.tangent(self.motion.q, self.motion.qd, self.motion.qdd, gravity=gravity)
 
     @cached_property
     def carried(self) -> Array:
-        """Torque that a rig's slings take off the joints (n, J) [N·m or N]; zero on an arm without slings.
-
-        On a floating base: the force and moment that its own momentum asks for, which its channels have as measured.
-
-        In balance that is the weight of the arm as the model gives it, so that all which differs from the model's
-        masses shows under gravity. A measured tension adds what it exceeds the balance by.
-        """
-        rig, q = self.body.tree, self.motion.q
-        if isinstance(rig, FloatingTree):
-            own = np.zeros_like(q)
-            columns = slice(10 * (CARRIERS - 1), 10 * CARRIERS)
-            own[:, :CARRIERS] = self.regressor[:, :CARRIERS, columns] @ rig.links[CARRIERS - 1].phi
-            return own
-        if not isinstance(rig, Rig):
-            return np.zeros_like(q)
-        total = self.body.torque(q, np.zeros_like(q), np.zeros_like(q))
-        for sling in rig.slings:
-            if sling.name in self.tension:
-                excess = self.tension[sling.name] - sling.tension
-                total -= sling_map(rig, sling, q)[:, :, 2] * excess[:, None]
-        return total
+        """Torque that something else than the drives supplies (n, J) [N·m or N]: a rig's slings, a base's momentum."""
+        return self.body.tree.carried(self.body, self.motion.q, lambda: self.regressor, self.tension)
 
     @cached_property
     def modelled(self) -> Array:
@@ -204,8 +183,9 @@ def load_experiments(
         datasets = [without_torque(read_motion(model, path), model) for path in paths]
     measured = [_tensions(d, model) for d in datasets]
     tree = model.tree
-    if isinstance(tree, FloatingTree):
-        datasets = [with_twist(with_base(d, tree), tree) for d in datasets]
+    base = cast(FloatingTree, tree) if tree.carriers else None
+    if base is not None:
+        datasets = [with_twist(with_base(d, base), base) for d in datasets]
     datasets = [_without_gaps_in(t, d) for t, d in zip(measured, datasets, strict=True)]
     wanted = band or model.bandwidth
     motions = [condition(d, model.joints, wanted, fitted=torque) for d in datasets]
@@ -215,11 +195,11 @@ def load_experiments(
     narrowest = min(m.band for m in motions)
     if any(m.band > 1.01 * narrowest for m in motions):
         motions = [condition(d, model.joints, narrowest, fitted=torque) for d in datasets]
-    if isinstance(tree, FloatingTree):
+    if base is not None:
         return [
             _balanced(
                 Experiment(
-                    as_carriers(m), body, impulse=wheel_impulse(d, m), store={"twist_noise": twist_noise(d, tree)}
+                    as_carriers(m), body, impulse=wheel_impulse(d, m), store={"twist_noise": twist_noise(d, base)}
                 )
             )
             for m, d in zip(motions, datasets, strict=True)
@@ -245,8 +225,7 @@ def _balanced(experiment: Experiment) -> Experiment:
 
 def _tensions(dataset: xr.Dataset, model: Model) -> dict[str, Array]:
     """Recorded tension of the model's slings, by the sling's name, each (all rows,) [N]."""
-    slings = model.tree.slings if isinstance(model.tree, Rig) else ()
-    names = [s.name for s in slings if f"tension.{s.name}" in dataset]
+    names = [name for name in model.tree.tensions if f"tension.{name}" in dataset]
     return {name: np.asarray(dataset[f"tension.{name}"].values, float) for name in names}
 
 
@@ -277,7 +256,7 @@ def with_silence(experiments: Sequence[Experiment]) -> list[Experiment]:
         silent = np.flatnonzero((peak <= NOTHING * np.max(peak)) & ~known)
         if len(silent):
             modelled = np.max(np.abs(e.body.torque(e.motion.q, e.motion.qd, e.motion.qdd) - e.carried), axis=0)
-            for c in silent[silent >= n_carriers(e.body.tree)]:
+            for c in silent[silent >= e.body.tree.carriers]:
                 if not peak.any() or modelled[c] > FLOOR * np.max(peak):
                     raise InputError(
                         f"{e.motion.path}: 'tau.{e.motion.joints[c]}' is zero in every row; record the torque, or map "

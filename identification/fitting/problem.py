@@ -7,6 +7,7 @@ each at its own pace, and none waits for, or is evaluated for, the slowest.
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -128,8 +129,8 @@ def gather(blocks: Sequence[Block], channel: int) -> tuple[Index, Array]:
 def reached(assembly: Assembly, p: Placed) -> tuple[int, ...]:
     """Channels that a placed effect can change."""
     tree = assembly.tree
-    if isinstance(tree, Rig) and p.effect.at in PLACES:
-        return reached_joints(tree, p.effect.at, p.at, rows(p.effect))
+    if p.effect.at in PLACES:
+        return reached_joints(cast(Rig, tree), p.effect.at, p.at, rows(p.effect))
     if p.effect.at == "base":
         return rows(p.effect)
     everywhere = p.effect.at == "link" or p.effect.acts_on == "position"

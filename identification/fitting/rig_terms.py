@@ -5,7 +5,8 @@ from numpy.typing import NDArray
 
 from ...models.effect import Effect
 from ...models.hidden_state import rows
-from ...models.rig.kinematics import boom_map, place_map, point_motion, reached_joints, sling_of
+from ...models.rig.kinematics import boom_map, place_map, reached_joints, sling_of
+from ...models.rig.points import point_motion
 from ...models.rig.rig import Rig
 from .experiment import Experiment
 

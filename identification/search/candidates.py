@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from ...models.effect import Parameter
 from ...models.effects import effects
-from ...models.floating.tree import n_carriers
 from ...models.model import Model, Placed, all_places
 from ..fitting.assembly import Assembly, Evaluation
 from ..fitting.effect_terms import contributions
@@ -78,7 +77,7 @@ def library(model: Model) -> list[Placed]:
         spots = all_places(effect, model.tree)
         if effect.name == "sensor_delay":
             # A torque channel is late or, where the encoder is late, early: one of the two.
-            arm = model.joints[n_carriers(model.tree) :]
+            arm = model.joints[model.tree.carriers :]
             other = {f"tau.{j}": f"q.{j}" for j in arm} | {f"q.{j}": f"tau.{j}" for j in arm}
             spots = tuple(at for at in other if f"{effect.name}.{other[at]}" not in have)
         found += [Placed(effect, at) for at in spots if f"{effect.name}.{at}" not in have]

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt, welch
 
-from ...models.floating.tree import n_carriers
 from ..fitting.experiment import Experiment
 from ..fitting.fit import Fit
 from ..fitting.problem import gather
@@ -84,7 +83,7 @@ def _bands(found: Fit, experiments: Sequence[Experiment], share: float) -> Array
         acceleration, speed = e.motion.to_band(e.motion.qdd)[longest], e.motion.to_band(e.motion.qd)[longest]
         length = min(len(acceleration), max(int(8 * rate), SHORTEST))
         # Nothing is asked of a floating base: what disturbs it is its motion.
-        for c in range(n_carriers(assembly.tree), n_joints):
+        for c in range(assembly.tree.carriers, n_joints):
             index, own = gather(blocks, c)
             fitted = [own] if len(index) else []
             columns = np.concatenate([*fitted, *smooth_columns([e], [state], c), _directed(e, c)], axis=1)

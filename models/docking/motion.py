@@ -17,6 +17,7 @@ from ..dormand_prince import DormandPrince, Steps
 from ..floating import symbols
 from ..floating.arm import FloatingArm
 from ..floating.joint_drive import Drive
+from ..hung import hung
 from ..inertia import Array
 from ..rotation import quaternion_of, quaternion_rate, rotation_of
 from ..snare.target import Target
@@ -63,7 +64,7 @@ class DockingMotion:
     arm : FloatingArm
         Without the carriage; with a mount where the target is fixed to the base.
     target : Target
-        ``free`` or, on the arm's mount, ``moved``.
+        ``free``, hung from a ``spring`` or, on the arm's mount, ``moved``.
     drive : Drive
         Of the arm's joints, for `with_carriage`'s tree.
     parameters : DockingParameters
@@ -78,7 +79,7 @@ class DockingMotion:
         self.parameters, self.target = parameters, target
         self.arm = with_carriage(arm, parameters)
         self.bare = arm
-        self.n_joints, self.floats = self.arm.n_joints, target.support == "free"
+        self.n_joints, self.floats = self.arm.n_joints, target.support != "moved"
         self._law = drive.law(self.arm)
         self._names = list(constants(parameters))
         n = self.n_joints
@@ -158,6 +159,7 @@ class DockingMotion:
     def _equations(self, time: ca.SX, x: ca.SX, u: ca.SX) -> tuple[ca.SX, dict[str, ca.SX]]:
         arm, n = self.arm, self.n_joints
         part = {name: x[where] for name, where in self.where.items()}
+        suspended, cradled = ca.SX(0), ca.SX(0)
         q, qd = part["q"], part["qd"]
         on_carriage, on_pin = u[:6], u[6:12]
         command = dict(zip(COMMANDS, ca.vertsplit(u[12 : 12 + len(COMMANDS)]), strict=True))
@@ -220,6 +222,9 @@ class DockingMotion:
         on_foot = -ca.vertcat(on_tip[:3], on_tip[3:] + ca.cross(gone, on_tip[:3])) + on_pin
         on_foot -= ca.vertcat(bumps[:3], bumps[3:] + ca.cross(carriage_place - foot, bumps[:3]))
         cables, on_carriage = on_carriage, on_carriage + bumps
+        if self.target.hangs:
+            held, suspended, cradled = hung(self.target, foot, turn, spin)
+            on_foot += held
 
         drawn = carriage(
             q[n - 1], qd[n - 1], part["wanted"], command["speed"], command["motor"], command["brake"], braked, p
@@ -257,7 +262,7 @@ class DockingMotion:
             ]
         work = ca.dot(cables, carriage_twist) + ca.dot(on_pin, ca.vertcat(speed, spin))
         energies = [
-            drawn.put_in, drawn.lost, drawn.held, found.damped + found.rubbed + bump_damped, found.latched,
+            drawn.put_in, drawn.lost, drawn.held, found.damped + found.rubbed + bump_damped + cradled, found.latched,
             -ca.dot(taken.torque, qd), work,
         ]  # fmt: skip
         rates += [
@@ -290,6 +295,7 @@ class DockingMotion:
             "kinetic": 0.5 * ca.dot(moving, whole @ moving) + rotors + target_energy,
             "bumper": -bump[0],
             "stored": found.stored + bump_stored,
+            "suspension": suspended,
             "balls": ca.vec(ca.horzcat(*_ball_places(turn.T @ gone, turn.T @ tip_turn, p))),
         }
         return ca.densify(ca.vertcat(*rates)), {name: ca.densify(ca.SX(value)) for name, value in seen.items()}

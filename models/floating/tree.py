@@ -1,7 +1,9 @@
 """A free-floating arm as a tree that recordings can be fitted to: six carriers of the base, then the arm's joints."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,6 +12,9 @@ from ..tree import Link, Tree
 from ..urdf import load_urdf
 from .arm import FloatingArm, load_arm
 from .ets_vii import ets_vii
+
+if TYPE_CHECKING:
+    from ..rigid_body import RigidBody
 
 CARRIERS = 6
 """Leading joints that carry the base; their torques are the force and the moment on it, in its own axes."""
@@ -35,6 +40,19 @@ class FloatingTree(Tree):
     def sticks(self, joint: int) -> bool:
         """Nothing holds the base."""
         return joint >= CARRIERS
+
+    @property
+    def carriers(self) -> int:
+        """Those of the base."""
+        return CARRIERS
+
+    def carried(
+        self, body: "RigidBody", q: Array, regressor: Callable[[], Array], tension: Mapping[str, Array]
+    ) -> Array:
+        """Force and moment that the base's own momentum asks for, which its channels have as measured."""
+        own, columns = np.zeros_like(q), slice(10 * (CARRIERS - 1), 10 * CARRIERS)
+        own[:, :CARRIERS] = regressor()[:, :CARRIERS, columns] @ self.links[CARRIERS - 1].phi
+        return own
 
 
 def floating_tree(arm: FloatingArm, body: str = UNNAMED) -> FloatingTree:
@@ -72,11 +90,6 @@ def read_floating(urdf: Path | None, gravity: tuple[float, ...], body: str) -> F
     else:
         arm = load_arm(urdf, load_urdf(urdf, gravity).links[-1].name, gravity=gravity)
     return floating_tree(arm, body)
-
-
-def n_carriers(tree: Tree) -> int:
-    """Number of leading joints of a tree that are no joints of the arm: 6 for a floating base, else 0."""
-    return CARRIERS if isinstance(tree, FloatingTree) else 0
 
 
 def channel(tree: Tree, index: int) -> str:

@@ -6,8 +6,9 @@ the arm moves as if there were no gravity. What the arm's mass properties or the
 balance shows under gravity.
 """
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +16,10 @@ from numpy.typing import ArrayLike
 from ...errors import InputError
 from ..inertia import Array, from_central, to_central
 from ..tree import Joint, Link, Tree
+from .points import point_motion
+
+if TYPE_CHECKING:
+    from ..rigid_body import RigidBody
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +103,34 @@ class Rig(Tree):
     def stands(self) -> bool:
         """Slings never hang quite still: friction lets go of what it holds, and every joint moves what they carry."""
         return False
+
+    @property
+    def balanced(self) -> bool:
+        """The slings take it."""
+        return True
+
+    @property
+    def tensions(self) -> tuple[str, ...]:
+        """The slings'."""
+        return tuple(s.name for s in self.slings)
+
+    def link_at(self, kind: str, name: str) -> int | None:
+        """A sling's is the link that it holds."""
+        if kind != "sling":
+            return super().link_at(kind, name)
+        return next(s.link for s in self.slings if s.name == name)
+
+    def carried(
+        self, body: "RigidBody", q: Array, regressor: Callable[[], Array], tension: Mapping[str, Array]
+    ) -> Array:
+        """In balance the weight of the arm as the model gives it, so that all which differs from the model's masses
+        shows under gravity. A measured tension adds what it exceeds the balance by."""
+        total = body.torque(q, np.zeros_like(q), np.zeros_like(q))
+        for sling in self.slings:
+            if sling.name in tension:
+                held = point_motion(self, sling.link, sling.point, q, np.zeros_like(q))
+                total += held.jacobian[:, 2] * (tension[sling.name] - sling.tension)[:, None]
+        return total
 
     def tangent_of(self, sling: Sling, contact: Array) -> Array:
         """Unit vector (3,) in the link's frame along which a contact slides as the link's joint moves forward."""

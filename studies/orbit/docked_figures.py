@@ -108,11 +108,14 @@ def _ledger(d: Docked) -> Picture:
         "#999933",
         "#882255",
         "#44AA99",
+        "#66CCEE",
         "#CC1111",
     )
     with drawing():
         figure, axes = plain(3.6)
         for (name, values), colour in zip(ledger.items(), colours, strict=True):
+            if not np.any(values):  # the suspension's, in orbit
+                continue
             line(axes, d.times, values, colour, 2.0 if name == "motors" else 1.1, name)
         axes.set(xlabel="time [s]", ylabel="energy [J]")
         axes.legend(ncols=2, loc="center left", fontsize=7.0)

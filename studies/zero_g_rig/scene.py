@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.geometry import Box, Cylinder, Sphere
 
-from ...models.rig.kinematics import far_end, point_motion
+from ...models.rig.points import far_end, point_motion
 from ...models.rig.rig import Rig
 from ...report.playback import Playback
 from .suspension import Suspension

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bench.docking_mujoco import IMPEDANCE, Truth
+from bench.docking_mujoco import Truth
 from bench.docking_seats import AFTER, FORCE, INERTIA, MASS, SPEED, P, Pushed, damping_ratio, flight, push, start
 from snarelab.models.docking.body import DockingBody
 
@@ -29,10 +29,10 @@ def test_a_touch_in_flight_is_alike_and_hangs_on_the_flanks_angle():
     assert np.linalg.norm(other - theirs) > 0.05 * np.linalg.norm(ours)
 
 
-@pytest.mark.parametrize("restitution", [0.25, 0.3, 0.8])
+@pytest.mark.parametrize("restitution", [0.25, 0.3, 0.9])
 def test_a_linear_contact_keeps_what_it_is_told_to(restitution):
     """m x'' = -k x - c x', until it would pull; by small steps."""
-    ratio, x, v, h = damping_ratio(restitution) * np.sqrt(IMPEDANCE), 0.0, 1.0, 1e-5
+    ratio, x, v, h = damping_ratio(restitution), 0.0, 1.0, 1e-5
     while (push := -x - 2 * ratio * v) < 0 or x == 0.0:
         v += h * push
         x += h * v
@@ -44,3 +44,10 @@ def test_an_impulse_counts_from_the_first_touch():
     impulse = np.outer(np.where(time > 0.35, time, 0.0), [1.0, 0.0, 0.0])
     pushed = Pushed(time, np.zeros((10, 3)), np.zeros((10, 4)), impulse, np.zeros(10))
     np.testing.assert_allclose(pushed.impulse_after(0.3), [0.7, 0, 0])
+
+
+def test_what_still_moves_does_not_rest():
+    time = np.linspace(0.0, 2.0, 2001)
+    for speed, rests in ((1e-6, True), (1e-3, False)):
+        place = np.outer(time, [0.0, speed, 0.0])
+        assert Pushed(time, place, np.zeros((2001, 4)), place, np.zeros(2001)).rests == rests

@@ -8,9 +8,10 @@ import pinocchio as pin
 from scipy.integrate import solve_ivp
 from scipy.optimize import root
 
-from snarelab.models.floating.tree import CARRIERS, n_carriers
+from snarelab.models.floating.tree import CARRIERS
 from snarelab.models.hidden_state import SIGNALS, reads
-from snarelab.models.rig.kinematics import boom_map, far_end, place_map, point_motion, sling_of
+from snarelab.models.rig.kinematics import boom_map, place_map, sling_of
+from snarelab.models.rig.points import far_end, point_motion
 from snarelab.models.rig.rig import Rig
 
 ENGINE: Any = pin  # its stubs lack most names
@@ -27,7 +28,7 @@ def body(phi):
 
 def engine_of(tree, phi):
     """pinocchio's model of a tree; a floating one's carriers are a free flyer."""
-    model, carriers = ENGINE.Model(), n_carriers(tree)
+    model, carriers = ENGINE.Model(), tree.carriers
     ids = {-1: 0}
     if carriers:
         ids[CARRIERS - 1] = model.addJoint(0, ENGINE.JointModelFreeFlyer(), ENGINE.SE3.Identity(), "base")
@@ -74,7 +75,7 @@ class Native:
     def __init__(self, model, active, tau, wheels=(0.0, 0.0, 0.0)):
         tree = self.tree = model.tree
         self.tau, self.wheels, self.values = np.asarray(tau, float), np.asarray(wheels, float), model.values
-        self.n, self.base = len(self.tau), n_carriers(tree)
+        self.n, self.base = len(self.tau), tree.carriers
         self.names = [joint.name for joint in tree.joints[self.base :]]
         self.laws = [Law(p, model.values) for p in model.effects if p.effect.name in active]
         phi, links = [link.phi.copy() for link in tree.links], [link.name for link in tree.links]

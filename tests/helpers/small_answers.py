@@ -12,6 +12,7 @@ from snarelab.identification.fitting.experiment import Experiment
 NAMES = ("joint1", "joint2", "joint3")
 
 TREE: Any = SimpleNamespace(
+    carriers=0,
     joints=[SimpleNamespace(name=n, kind=k) for n, k in zip(NAMES, ("revolute", "prismatic", "revolute"), strict=True)],
     n_joints=3,
 )

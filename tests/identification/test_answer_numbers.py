@@ -74,9 +74,10 @@ def test_a_noise_floor_is_what_the_model_leaves_from_twice_the_band_on():
 
 
 def test_a_floating_bases_noise_floor_is_its_momentums(monkeypatch):
-    monkeypatch.setattr(answer, "n_carriers", lambda _: 2)
     monkeypatch.setattr(answer, "momentum_floor", lambda _: np.array([7.0, 8.0]))
-    floors = answer._noise_floor([noisy([1.0, 1.0, 1.0])] * 2, fit([0, 0, 0]))
+    floating: Any = SimpleNamespace(tree=SimpleNamespace(carriers=2))
+    one = replace(noisy([1.0, 1.0, 1.0]), body=floating)
+    floors = answer._noise_floor([one] * 2, fit([0, 0, 0]))
     assert floors[:2].tolist() == [7.0, 8.0]
     assert floors[2] == pytest.approx(np.sqrt(4 / 32), rel=0.07)
 

@@ -19,6 +19,7 @@ from snarelab.tolerance.guard import (
     envelope_end,
     ground_numbers,
     halved,
+    latched_numbers,
     load,
     moved,
 )
@@ -50,6 +51,11 @@ def test_envelope_of_an_axis(axis):
 @pytest.mark.slow
 def test_the_papers_arrival_in_orbit():
     check("arrival", arrival_numbers())
+
+
+@pytest.mark.slow
+def test_the_papers_hover_capture_to_the_latch():
+    check("latched", latched_numbers())
 
 
 def test_a_number_that_moved_is_told_with_before_after_and_allowed():
@@ -88,6 +94,7 @@ def test_renewing_says_what_moved_and_writes_it(tmp_path, monkeypatch, capsys):
         '[ground]\nfirst_contact = { value = 2.6, allowed = 0.01, unit = "s" } # seen\n'
         '[envelope]\nradial_y = { value = 0.014, allowed = 0.004, unit = "m" }\n'
         '[arrival]\nfirst_contact = { value = 7.0, allowed = 0.03, unit = "s" }\n'
+        '[latched]\nlatched = { value = 0.48, allowed = 0.05, unit = "1" }\n'
     )
     (tmp_path / "t.toml").write_text(text)
     exact = []
@@ -95,9 +102,12 @@ def test_renewing_says_what_moved_and_writes_it(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(renew, "envelope_end", lambda axis, to: exact.append((axis, to)) or 0.015)
     monkeypatch.setattr(renew, "ground_numbers", lambda: {"first_contact": 2.625})
     monkeypatch.setattr(renew, "arrival_numbers", lambda: {"first_contact": 7.1})
+    monkeypatch.setattr(renew, "latched_numbers", lambda: {"latched": 0.47})
     assert renew.main([str(tmp_path / "t.toml")]) == 0
     assert exact == [("radial_y", 0.001)]
-    changed = text.replace("2.6,", "2.625,").replace("0.014,", "0.015,").replace("7.0,", "7.1,")
+    changed = (
+        text.replace("2.6,", "2.625,").replace("0.014,", "0.015,").replace("7.0,", "7.1,").replace("0.48,", "0.47,")
+    )
     assert (tmp_path / "t.toml").read_text() == changed
     assert [file.name for file in tmp_path.iterdir()] == ["t.toml"]
     said = capsys.readouterr().out.splitlines()

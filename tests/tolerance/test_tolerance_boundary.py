@@ -93,7 +93,7 @@ def test_clopper_pearson_against_the_beta_quantiles(won, total):
 @pytest.mark.parametrize("error", [0.0, 1.0])
 def test_a_study_in_which_all_succeed_or_all_fail_has_a_summary(tmp_path, error):
     capture = Capture("all", make_study(tmp_path).capture.axes, lambda values: Outcome(True, error, 2.6, 5.0, 100.0))
-    study = replace(make_study(tmp_path), capture=capture, sampling="sobol", cases=32, envelope=False)
+    study = replace(make_study(tmp_path), capture=capture, sampling="sobol", cases=32, envelope=None)
     results = Results(tmp_path / "out", study)
     for number, point in enumerate(study.scaled(np.random.default_rng(0).random((32, 3)))):
         results.add("space", number, study.values(point), run_case(capture, study.values(point)))

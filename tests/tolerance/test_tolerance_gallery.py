@@ -51,7 +51,7 @@ def test_misses_are_linked_and_played_once(study, results, monkeypatch):
 
 def test_a_study_without_its_envelope_has_a_page(study, results, monkeypatch):
     monkeypatch.setattr(report, "sensitivities", partial(sensitivities, samples=64))
-    content = report.summarise(replace(study, envelope=False), results)
+    content = report.summarise(replace(study, envelope=None), results)
     assert content["envelope"] == {}
     assert "envelope_radial" not in content
     page = (results.folder / "report.html").read_text(encoding="utf-8")

@@ -85,7 +85,7 @@ def test_a_good_study(write):
             "cases = 2000\ncapture =",
             "cases = 2000; adaptive sampling takes at most 1000; give that",
         ),
-        ("capture =", "envelope = 1\ncapture =", "envelope = 1; allowed is true or false"),
+        ("capture =", "envelope = 1\ncapture =", "envelope = 1; allowed is true or false or a table"),
         ("cases = 10", "ends = 1", r"\[box\] ends = 1; allowed is true or false"),
         ("radial_y = [-0.02, 0.02]", "radial_y = 0.2", r"\[box\] radial_y = \[0.2, 0.2\] is not within \[ranges\]"),
         ("radial_y = [-0.1, 0.1]", "radial_y = 0.1", r"\[ranges\] radial_y = 0.1; allowed is \[low, high\] in m"),
@@ -157,7 +157,8 @@ def test_success_may_be_the_latch_and_the_proxy_stands_beside_it():
     table = pd.DataFrame([{**vars(case), "margin": m} for case, m in zip(cases, margins, strict=True)])
     found = proxy_beside(study, table)
     assert found == {
-        "cases": 4, "disagree": 2, "latched_against": 1, "failed_against": 1, "ends": {"ABORTED": 1, "STUCK": 1},
+        "cases": 4, "latched": 2, "disagree": 2, "latched_against": 1, "failed_against": 1,
+        "ends": {"ABORTED": 1, "STUCK": 1},
     }  # fmt: skip
     assert study.identity()["success"]["latched"] is True
     assert "docking_friction" in study.ranges

@@ -219,7 +219,7 @@ def test_no_model_is_evaluated_twice_at_the_same_parameters(arm, experiment, mon
     for _ in range(3):
         torques = [model.torque(experiment, model.start + 1.0) for model in models]
     assert counted == models
-    assert not np.allclose(*torques)
+    assert not np.allclose(torques[0], torques[1])
     models[0].phi = 2 * models[0].phi
     again = models[0].torque(experiment, models[0].start + 1.0)
     assert counted == [*models, models[0]]

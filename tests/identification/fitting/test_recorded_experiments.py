@@ -1,6 +1,7 @@
 """A recording beside its rigid body: bridges, what counts, scales, silence, tensions, and copies of a holdout."""
 
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace as Made
 from typing import Any
 
@@ -23,6 +24,9 @@ from snarelab.identification.fitting.experiment import (
 )
 from snarelab.identification.fitting.held_out import demand_apart
 from snarelab.identification.fitting.recorded import motion_signals
+from snarelab.models.floating.tree import FloatingTree
+from snarelab.models.rig.rig import Rig
+from snarelab.models.tree import Tree
 
 N = 6
 
@@ -58,16 +62,13 @@ def test_a_bridge_of_several_samples_goes_a_part_of_the_way_at_each():
     np.testing.assert_allclose(bridge(x[:, None, None] * np.ones((2, 3)))[:, 1, 2], [1, 6, 11, 16])
 
 
-def test_a_floating_bases_own_momentum_stands_on_the_measured_side(monkeypatch):
+def test_a_floating_bases_own_momentum_stands_on_the_measured_side():
     """The base is the sixth link, and the first six channels are its own: 2 there for a unit of each parameter."""
-
-    class Floating:
-        links = (*(5 * [None]), Made(phi=np.arange(1.0, 11.0)), None)
-
-    monkeypatch.setattr(module, "FloatingTree", Floating)
+    tree: Any = Made(links=(*(5 * [None]), Made(phi=np.arange(1.0, 11.0)), None))
+    tree.carried = partial(FloatingTree.carried, tree)
     regressor = np.zeros((N, 7, 70))
     regressor[:, :, 50:60], regressor[:, :, 60:] = 2.0, 99.0
-    e = run(np.full((N, 7), 1000.0), body=Made(tree=Floating()))
+    e = run(np.full((N, 7), 1000.0), body=Made(tree=tree))
     e.__dict__["regressor"] = regressor
     np.testing.assert_allclose(e.carried, np.tile([*(6 * [110.0]), 0.0], (N, 1)))
     np.testing.assert_allclose(module._balanced(e).motion.tau, 1000.0 - e.carried)
@@ -76,21 +77,21 @@ def test_a_floating_bases_own_momentum_stands_on_the_measured_side(monkeypatch):
 @pytest.mark.parametrize(("measured", "excess"), [({}, 0.0), ({"left": np.full(N, 450.0)}, 50.0)])
 def test_slings_carry_the_weight_and_what_more_they_were_measured_to_pull(monkeypatch, measured, excess):
     """Weight asks 3 and 4; a newton of the left sling, in balance at 400, takes 0.5 off the first joint."""
+    left = Made(name="left", tension=400.0, link=1, point=(0.0, 0.0, 0.1))
+    tree: Any = Made(slings=(left, Made(name="right", tension=300.0, link=0, point=(0.0, 0.0, 0.2))))
+    tree.carried = partial(Rig.carried, tree)
 
-    class Suspended:
-        slings = (Made(name="left", tension=400.0), Made(name="right", tension=300.0))
+    def moved(_rig, link, point, q, qd):
+        assert (link, point) == (left.link, left.point)
+        return Made(jacobian=-np.tile(np.array([[9.0, 9.0], [9.0, 9.0], [0.5, 0.0]]), (len(q), 1, 1)))
 
-    def force(_rig, sling, q):
-        assert sling.name == "left"
-        return np.tile(np.array([[9.0, 9.0, 0.5], [9.0, 9.0, 0.0]]), (len(q), 1, 1))
-
-    monkeypatch.setattr(module, "Rig", Suspended)
-    monkeypatch.setattr(module, "sling_map", force)
-    weight: Any = Made(tree=Suspended(), torque=lambda q, qd, qdd: np.tile([3.0, 4.0], (len(q), 1)) + 7 * (qd + qdd))
+    monkeypatch.setattr("snarelab.models.rig.rig.point_motion", moved)
+    weight: Any = Made(tree=tree, torque=lambda q, qd, qdd: np.tile([3.0, 4.0], (len(q), 1)) + 7 * (qd + qdd))
     e = replace(run(np.ones((N, 2)), q=np.ones((N, 2)), qd=np.ones((N, 2)), body=weight), tension=measured)
     np.testing.assert_allclose(e.carried, np.tile([3.0 - 0.5 * excess, 4.0], (N, 1)))
-    plain = run(np.ones((N, 2)), body=Made(tree=Made()))
-    assert not plain.carried.any()
+    plain: Any = Made()
+    plain.carried = partial(Tree.carried, plain)
+    assert not run(np.ones((N, 2)), body=Made(tree=plain)).carried.any()
 
 
 def test_bridges_and_samples_that_count_are_each_channels_own():
@@ -124,15 +125,15 @@ def test_scales_are_peaks_over_all_recordings_and_never_zero():
     assert [Scales(4.0, 5.0, 8.0).of(word) for word in words] == [1.0, 4.0, 5.0, 8.0, 1.6]
 
 
-def arm(modelled, n_joints=2) -> Any:
+def arm(modelled, n_joints=2, carriers=0) -> Any:
     """A body whose torque is the same at all times."""
     torque = np.tile(np.array(modelled, float), (N, 1))
     joints = tuple(Made(name=f"joint{k + 1}") for k in range(n_joints))
-    return Made(tree=Made(joints=joints), torque=lambda *_: torque)
+    return Made(tree=Made(joints=joints, carriers=carriers), torque=lambda *_: torque)
 
 
-def silenced(torque, modelled, carried=0.0):
-    e = run(np.tile(np.array(torque, float), (N, 1)), body=arm(modelled))
+def silenced(torque, modelled, carried=0.0, carriers=0):
+    e = run(np.tile(np.array(torque, float), (N, 1)), body=arm(modelled, carriers=carriers))
     e.__dict__["carried"] = np.full(e.motion.tau.shape, carried)
     (found,) = with_silence([e])
     return e, found
@@ -177,12 +178,11 @@ def test_a_torque_that_reads_anything_is_left_alone():
     assert found is e
 
 
-def test_a_base_that_floats_in_a_plane_may_have_no_force(monkeypatch):
-    monkeypatch.setattr(module, "n_carriers", lambda _: 1)
-    _, found = silenced([0.0, 10.0], [5.0, 10.0])
+def test_a_base_that_floats_in_a_plane_may_have_no_force():
+    _, found = silenced([0.0, 10.0], [5.0, 10.0], carriers=1)
     assert found.motion.silent == (0,)
     with pytest.raises(InputError, match=r"'tau\.joint2' is zero"):
-        silenced([10.0, 0.0], [5.0, 10.0])
+        silenced([10.0, 0.0], [5.0, 10.0], carriers=1)
 
 
 def test_a_holdout_must_not_be_among_what_is_fitted(tmp_path):
@@ -212,12 +212,8 @@ def test_a_motion_that_is_only_followed_needs_no_torque():
         np.testing.assert_array_equal(found[name].values, 1.0)
 
 
-def test_a_sample_without_its_tension_is_left_out(monkeypatch):
-    class Suspended:
-        slings = (Made(name="left"), Made(name="right"), Made(name="none"))
-
-    monkeypatch.setattr(module, "Rig", Suspended)
-    model: Any = Made(tree=Suspended())
+def test_a_sample_without_its_tension_is_left_out():
+    model: Any = Made(tree=Made(tensions=("left", "right", "none")))
     run_of = data(q__joint1=[1, 2, 3], tau__joint1=[4, 5, 6], tension__left=[7, np.nan, 8], tension__right=[9, 9, 9])
     tensions = module._tensions(run_of, model)
     assert list(tensions) == ["left", "right"]
@@ -247,7 +243,7 @@ def test_all_recordings_get_the_narrowest_band_of_them(monkeypatch, bands, again
 
     monkeypatch.setattr(module, "condition", conditioned)
     monkeypatch.setattr(recorded, "read_recording", read)
-    tree = Made(joints=(Made(name="joint1", kind="prismatic"),))
+    tree = Made(joints=(Made(name="joint1", kind="prismatic"),), carriers=0, tensions=())
     model: Any = Made(tree=tree, signals={}, joints=("joint1",), bandwidth=None, cuts=lambda read: read)
     model.servo, model.transmission = {}, None
     body: Any = Made()

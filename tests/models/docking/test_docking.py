@@ -98,6 +98,42 @@ def test_it_seats_below_the_limit_of_jamming_and_jams_above(body, friction, seat
     assert np.linalg.norm(run.velocity[-1]) < 1e-3
 
 
+@pytest.mark.parametrize(("friction", "slides"), [(0.56, True), (0.60, False)])
+def test_one_flank_blocks_from_where_friction_bears_the_whole_push(body, friction, slides):
+    """Rolled, every ball stands on one flank at 60 degrees to the axis: nothing slides from tan 30 deg = 0.577 on.
+
+    Damped well, as a contact that rattles lets go of its friction at every bounce.
+    """
+    own = P.with_values(friction=friction, flank=np.deg2rad(60), restitution=0.05, restitution_speed=1e-4)
+    aside, turn = 5e-3, Rotation.from_rotvec([5e-3 / P.radius, 0, 0])
+    place = [-P.seat - aside / np.tan(own.flank), 0, 0]
+    run = body.run(own, 4.0, place, turn.as_quat(scalar_first=True), wrench=[20.0, 0, 0, 0, 0, 0], longest=2e-3)
+    assert (flank_ratio(own.flank, friction) > 0) == slides
+    if slides:
+        assert np.abs(run.off[-1]).max() < 0.4 * aside
+        return
+    assert np.abs(run.off[-1]).max() > 0.9 * aside
+    assert np.abs(run.velocity[-1]).max() < 1e-5
+    # A third of the push each, as a normal force and the friction that makes it axial.
+    np.testing.assert_allclose(run.normal[-1].max(), 20 / 3 * np.sin(own.flank), rtol=5e-3)
+
+
+@pytest.mark.parametrize(("friction", "stays"), [(0.34, False), (0.38, True)])
+def test_a_steep_wedge_locks_itself(body, friction, stays):
+    """At 20 degrees to the axis flanks hold a ball by themselves from tan 20 deg = 0.364 on: 20 N pull at it.
+
+    The presliding is short against what the preload compresses, which else lets go before friction turns round.
+    """
+    own, state, run = P.with_values(friction=friction, flank=np.deg2rad(20), breakaway=2e-6), None, None
+    for push in (3000.0, 1000.0, 300.0, 100.0, 0.0, -20.0):
+        run = settled(body, own, about_balls([push, 0, 0]), state, 1.0)
+        state = body.last
+    assert run is not None
+    assert (own.flank < np.arctan(friction)) == stays
+    gone = np.abs(run.off[-1]).max()
+    assert gone < 5e-4 if stays else gone > 0.05
+
+
 @pytest.mark.parametrize("speed", [0.005, 0.01, 0.03])
 def test_a_bounce_is_hunts_and_crossleys(body, speed):
     """All six flanks at once: k and D of the axial motion are 6 k sin² and D sin of one flank's."""

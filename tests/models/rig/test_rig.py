@@ -16,7 +16,8 @@ from snarelab.identification.fitting.experiment import Experiment, scales
 from snarelab.models.effects import get_effect
 from snarelab.models.inertia import to_central
 from snarelab.models.model import Placed, places
-from snarelab.models.rig.kinematics import point_motion, slides, sling_map
+from snarelab.models.rig.kinematics import slides, sling_map
+from snarelab.models.rig.points import point_motion
 from snarelab.models.rig.rig import Rig, Sling, built_in_rig, hang_unit_loads
 from snarelab.models.rigid_body import RigidBody
 from snarelab.models.urdf import load_urdf
