@@ -261,7 +261,7 @@ def columns(recording: xr.Dataset, stem: str, axes: str = "xyz") -> Array:
     return np.column_stack([column(recording, f"{stem}.{axis}") for axis in axes])
 
 
-def capture_of(run: Run, case: CaseName) -> Capture:
+def capture_of(run: Run, case: CaseName | Literal["ground"]) -> Capture:
     """Read a run's recording."""
     table = run.recording
 

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import logsumexp
 
 from ..deciding import DISCREPANCY, GATE, TOLERANCES
 from ..evidence.arm import Weighed
@@ -106,7 +105,7 @@ def _foretold(source: Source, given: At, here: Linear, there: Linear, known: Wei
     both = np.array(priors) + [on.null for on in ons]
     always = ons[int(np.argmax(both))].beside([])
     parts = [source.blocks(i, evidence.left(i, always, [])) for i in every]
-    return float(logsumexp(both) - logsumexp(priors)), np.concatenate(parts)
+    return float(np.logaddexp.reduce(both) - np.logaddexp.reduce(priors)), np.concatenate(parts)
 
 
 def _joined(here: Linear, there: Linear) -> Linear:

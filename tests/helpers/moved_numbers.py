@@ -43,7 +43,7 @@ def planted(size: float) -> Explained:
     (x,) = made.columns.parts[0, 0]
     x[:] = np.linalg.qr(x)[0] * np.sqrt(len(x))
     own = made.pieces[0][0]
-    made.pieces[0][0] = Channel(size * x[:, 0], own.covariance, own.index, own.columns)
+    made.pieces[0][0] = Channel(size * x[:, 0].astype(float), own.covariance, own.index, own.columns)
     return made
 
 

@@ -74,7 +74,9 @@ def test_a_payload_is_named_beyond_what_masses_are_known_to(monkeypatch):
         (x,) = made.columns.parts[0, 0]
         x *= 1000
         own = made.pieces[0][0]
-        made.pieces[0][0] = Channel(size * x[:, 0], own.covariance, np.zeros(1, int), x[:, :1])
+        made.pieces[0][0] = Channel(
+            size * x[:, 0].astype(float), own.covariance, np.zeros(1, int), x[:, :1].astype(float)
+        )
         made = Explained(made.pieces, made.columns, made.items[:1], 1)
         payload = Hypothesis("payload", True, (made.items[0],), -6.0)
         masses = Beside([], 1, slice(0, 1), [])

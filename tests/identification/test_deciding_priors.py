@@ -117,7 +117,7 @@ def shaped(monkeypatch, off: float, bent: float, curve: bool) -> float:
     Between shapes the law changes by one of ten columns, and it is bent by another, over which there may be a curve.
     """
     made = planted(1.0)
-    (x,) = made.columns.parts[0, 0]
+    x = made.columns.parts[0, 0][0].astype(float)
     placed = Placed(get_effect("stribeck_friction"), "joint1")
     grid = [Variant(placed, np.array([1.0, s]), np.zeros(1, int), np.zeros(1), np.ones(1)) for s in (1.0, 2.0, 3.0)]
     laws = {v.parameters[1]: x[:, [0]] + (v.parameters[1] - 2) * x[:, [1]] for v in grid}

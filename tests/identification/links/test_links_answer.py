@@ -206,7 +206,7 @@ def test_places_stand_by_the_share_that_is_told_of_each_channel(monkeypatch):
 def test_a_steps_error_is_the_root_of_the_mean_share_of_every_joints_reading():
     """Two joints that read 4 and 8; left over of the first 2, of the second 4, then 1 and 4."""
     rows = [[run(np.zeros(4), np.full(4, x)) for x in (4.0, 8.0)] for _ in range(2)]
-    source = Links(["joint1", "joint2"], ["revolute"] * 2, [SCALES] * 2, rows, 1)
+    source = Links(["joint1", "joint2"], ("revolute", "revolute"), [SCALES] * 2, rows, 1)
 
     def both(a, b):
         return Linear(At.of((), {}, 0), (np.tile([a, b], (4, 1)),), ())

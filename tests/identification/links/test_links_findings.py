@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from encoder_pairs import RATE, links, placed, run
 
+from snarelab.identification.diagnosis import Estimate
 from snarelab.identification.links import findings
 from snarelab.identification.links.diagnose import Compared
 from snarelab.identification.sources import answer
@@ -30,7 +31,7 @@ def _right(monkeypatch):
         "estimates",
         lambda source, given, here, _: {
             p.key: {
-                x.name: answer.Estimate(float(v), 0.0, "")
+                x.name: Estimate(float(v), 0.0, "")
                 for x, v in zip(p.effect.parameters, here.at.of_effect(p), strict=True)
             }
             for p in here.at.placed
