@@ -178,7 +178,7 @@ def test_joints_with_a_second_encoder_that_moves_in_every_recording_are_compared
     monkeypatch.setattr(module, "read_motion", lambda _, path: files[path])
     monkeypatch.setattr(module, "condition", lambda dataset, joints, band: (dataset, joints, band))
     names = ("joint1", "joint2", "joint3")
-    tree = SimpleNamespace(joints=[SimpleNamespace(name=n, kind="revolute") for n in names])
+    tree = SimpleNamespace(joints=[SimpleNamespace(name=n, kind="revolute") for n in names], carriers=0)
     model: Any = SimpleNamespace(tree=tree, joints=names, signals={})
     body: Any = object()
     joints, made = load_links(model, ["a", "b"], body, 20.0)
