@@ -9,7 +9,7 @@ ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
 BENCHES := torque friction_fit diagnosis joints fast floating cosim fmu snare ecos_inspection tolerance
 
-.PHONY: help demo test test-slow check studies bench accuracy fuzz kills hostile mutants proof ledger fmus docs clean $(STUDIES:%=study-%)
+.PHONY: help demo test test-slow check studies bench accuracy fuzz kills first-hour hostile mutants proof ledger fmus docs clean $(STUDIES:%=study-%)
 
 help:            ## what can be made
 	@sed -n -e 's/^\$$(filter-out.*## /  make study-NAME\t/p' -e 's/^\([a-z-]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
@@ -50,6 +50,10 @@ kills: .venv/installed ## runs, importers of FMUs and `snarelab cosim`, two hund
 	$(BIN)/python bench/kills.py
 	$(BIN)/python bench/importer_kills.py c python
 	$(BIN)/python bench/importer_kills.py cosim
+
+IMAGES ?= docker.io/library/python:3.11-slim docker.io/library/python:3.13-slim
+first-hour: .venv/installed ## from the wheel to a verdict in bare containers of IMAGES, and `make demo` twice, timed and weighed
+	$(BIN)/python bench/first_hour.py $(IMAGES:%=--image %) --demo
 
 hostile: .venv/installed ## forty FMUs that crash, hang, fork and lie: each ends in one line
 	$(BIN)/python bench/hostile_fmus.py

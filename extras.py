@@ -1,7 +1,9 @@
 """What is not installed with the core: which extra brings it, said in one line at the moment it is needed."""
 
+import io
+import re
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 
 from .errors import InputError
 
@@ -19,6 +21,9 @@ EXTRA_OF = {
     "rosbags": "formats",
 }
 """The extra that brings each package that the core does without, by the name under which it is imported."""
+
+LIBRARIES = "libglib2.0-0 libsm6 libx11-6"
+"""Debian's packages that Drake's wheel asks of the system, which a bare container has not."""
 
 
 def command(extra: str) -> str:
@@ -51,3 +56,18 @@ def needed_for(purpose: str) -> Iterator[None]:
         if said is None:
             raise
         raise said from error
+
+
+def demand_drake() -> None:
+    """Load Drake; where the system lacks a library that its wheel asks for, InputError has the command for it."""
+    try:
+        with redirect_stdout(io.StringIO()):  # on which Drake prints a page of advice
+            import pydrake.common  # noqa: F401
+    except ImportError as error:
+        library = re.match(r"(\S+): cannot open shared object file", error.msg)
+        if library is None:
+            raise
+        raise InputError(
+            f"a robot is read by Drake, which needs the library {library[1]} of the system; on Debian and Ubuntu run "
+            f"apt-get install {LIBRARIES}"
+        ) from error

@@ -30,6 +30,12 @@ FLOOR = 0.015
 ROUNDS = 4
 """Reweightings; the channels' noise settles within them."""
 
+WAYS = 7
+"""Ways in which a link, and a joint with its sensors, may differ from the robot's file."""
+
+GAIN = 0.2
+"""One standard deviation of a torque channel's gain; it is the last of a joint's ways."""
+
 STILL = 0.02
 """Share of a joint's largest speed below which its direction is not known, and friction bends."""
 
@@ -186,7 +192,7 @@ def _joint_columns(samples: Samples, own: Array, inertia: Array) -> tuple[Array,
             ),
             (place / (np.sqrt(np.mean(place**2)) + 1e-300) * 0.3 * size, -np.inf),
             (np.full(n, 0.3 * size), -np.inf),
-            (own[:, j] * 0.2, -2.5),
+            (own[:, j] * GAIN, -2.5),
         ]
         every.append(columns)
     width = len(every[0])

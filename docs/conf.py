@@ -26,8 +26,21 @@ nitpicky = False
 html_theme = "furo"
 html_static_path = ["_static"]
 html_css_files = ["pages.css"]
+html_js_files = ["scrolling.js"]
 html_title = f"snarelab {version}"
 html_copy_source = False
 html_show_sphinx = False
 templates_path: list[str] = []
 html_theme_options = {"navigation_with_keys": True}
+
+
+def levelled(app, page, template, context, doctree):
+    """Captions of the menu are headings; a screen reader wants to hear of which level."""
+    for part in ("body", "furo_navigation_tree", "toctree"):
+        if isinstance(context.get(part), str):
+            context[part] = context[part].replace('role="heading">', 'role="heading" aria-level="2">')
+
+
+def setup(app):
+    """After the theme has made its menu."""
+    app.connect("html-page-context", levelled, priority=900)

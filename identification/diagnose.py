@@ -118,11 +118,13 @@ def diagnose(
     values = {**model.values, **final.assembly.values(final.theta), **inertial_values(model, inertia)}
     of_links = tuple(p for p in model.effects if p.at.startswith("q_link."))
     after = replace(model, effects=(*final.assembly.placed, *of_links), values=values)
-    compared = diagnose_links(
-        model, recordings, held, body, final.assembly, final.theta, scales(train), band, progress=progress
-    )
-    if compared is not None:
-        diagnosis, after = with_links(diagnosis, after, compared)
+    # Without a second encoder anywhere, they need not be read again.
+    if any(str(name).startswith("q_link.") for d in read for name in d.data_vars):
+        compared = diagnose_links(
+            model, recordings, held, body, final.assembly, final.theta, scales(train), band, progress=progress
+        )
+        if compared is not None:
+            diagnosis, after = with_links(diagnosis, after, compared)
     notes = (*model.tree.notes, *said, *notes_on(final), *diagnosis.notes)
     curves = tuple(friction_curves(final, train))
     return Answer(replace(diagnosis, checks=checks, notes=notes, curves=curves), settled(after))

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from ..errors import InputError, nearest
+from ..extras import demand_drake
 from ..files import content
 from . import inertia
 from .hold import hold
@@ -222,6 +223,7 @@ def _link(path: Path, link: ET.Element) -> tuple[Array, Array]:
 def parse_plant(path: Path, robot: ET.Element, root: str) -> Any:
     """Drake's plant of the bare kinematics, its root welded to the world."""
     # imported here: Drake takes a second to load, and most commands refuse bad input before they need it
+    demand_drake()
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import MultibodyPlant
 

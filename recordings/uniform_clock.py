@@ -23,8 +23,8 @@ LONG = 120
 ABOUT = 31
 """Steps whose median a step is held against: a recording may change its rate."""
 
-FAST, ENOUGH = 1500.0, 500.0
-"""[Hz] Rate from which on a recording is thinned before anything else, and the least it is thinned to: six times what
+FAST, ENOUGH = 1500.0, 300.0
+"""[Hz] Rate from which on a recording is thinned before anything else, and the least it is thinned to: three times what
 the widest band needs."""
 
 

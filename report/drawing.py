@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from .strips import Drawn, drawn, keep_whole
 from .time_axes import is_over_time, over_time, with_time_axes
 
 Array = NDArray[np.float64]
@@ -68,12 +69,12 @@ def drawing() -> Iterator[None]:
         yield
 
 
-def svg(figure: Figure) -> bytes:
+def svg(figure: Figure) -> Drawn:
     """The figure as SVG with its time axes named, without a date: the same diagnosis draws the same picture."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="svg", dpi=_DOTS_PER_INCH, metadata={"Date": None, "Creator": None})
-    drawn = buffer.getvalue().replace(b" <defs>", _DARK.encode("ascii") + b" <defs>", 1)
-    return with_time_axes(drawn, figure)
+    picture = buffer.getvalue().replace(b" <defs>", _DARK.encode("ascii") + b" <defs>", 1)
+    return drawn(with_time_axes(picture, figure), figure)
 
 
 def margins(figure: Figure, left: float, right: float, bottom: float, top: float) -> dict[str, float]:
@@ -87,7 +88,8 @@ def line(axes: Axes, time: Array, values: Array, colour: str, width: float = 0.8
 
     Its axes run over time from then on, in no recording that has a name unless `over_time` says so.
     """
-    axes.plot(*thinned(time, values), color=colour, linewidth=width, label=label, solid_joinstyle="round")
+    (shown,) = axes.plot(*thinned(time, values), color=colour, linewidth=width, label=label, solid_joinstyle="round")
+    keep_whole(shown, time, values)
     if not is_over_time(axes):
         over_time(axes)
 

@@ -33,6 +33,7 @@ _BAR = """
 .dg{display:none!important} /* Meshcat's own controls: without labels, and with an animation of their own */
 #bar{height:2.6rem;display:flex;gap:.75rem;align-items:center;padding:0 .75rem;background:#fff;color:#1c2329;
 font:14px/1 system-ui,sans-serif;box-sizing:border-box}
+@media screen and (prefers-color-scheme:dark){#bar{background:#1e242a;color:#e4e8ec;color-scheme:dark}}
 #bar button{width:4.5rem;height:1.8rem;font:inherit}
 #bar input{flex:1;min-width:4rem}
 #bar output{width:4.5rem;text-align:right;font-variant-numeric:tabular-nums}

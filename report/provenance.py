@@ -32,15 +32,18 @@ class Provenance:
         return f'<dl class="facts provenance">{items}</dl>\n'
 
 
-def provenance(command: str = "", files: Sequence[tuple[str, str | Path | None]] = ()) -> Provenance:
+def provenance(
+    command: str = "", files: Sequence[tuple[str, str | Path | None]] = (), packages: Sequence[str] = PACKAGES
+) -> Provenance:
     """Of a command and its files, each with its role; None is passed over. A folder counts with all files in it."""
     known = tuple((role, Path(path).name, _digest(part_of(path).file)) for role, path in files if path is not None)
-    return Provenance(command, known, (("snarelab", __version__), ("Python", platform.python_version()), *_versions()))
+    own = (("snarelab", __version__), ("Python", platform.python_version()))
+    return Provenance(command, known, (*own, *_versions(packages)))
 
 
-def _versions() -> list[tuple[str, str]]:
+def _versions(packages: Sequence[str]) -> list[tuple[str, str]]:
     found = []
-    for name in PACKAGES:
+    for name in packages:
         try:
             found.append((name, version(name)))
         except PackageNotFoundError:  # installed by other means than a package's

@@ -20,6 +20,11 @@ def is_over_time(axes: Axes) -> bool:
     return str(axes.get_label()).startswith(_MARK)
 
 
+def recording_of(axes: Axes) -> str:
+    """The name that `over_time` gave."""
+    return str(axes.get_label()).removeprefix(_MARK)
+
+
 def with_time_axes(svg: bytes, figure: Figure) -> bytes:
     """The drawn figure's SVG, its root with the attribute ``data-time-axes`` where any axes run over time.
 
@@ -27,7 +32,7 @@ def with_time_axes(svg: bytes, figure: Figure) -> bytes:
     ``recording``.
     """
     found = [
-        {"box": _box(axes), "limits": list(axes.get_xlim()), "recording": str(axes.get_label()).removeprefix(_MARK)}
+        {"box": _box(axes), "limits": list(axes.get_xlim()), "recording": recording_of(axes)}
         for axes in figure.axes
         if is_over_time(axes)
     ]

@@ -8,57 +8,36 @@ import base64
 import gzip
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
 from html import escape
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .drawing import thinned
-
-Array = NDArray[np.float64]
+from .strips import Strip
 
 _COLUMNS = 900
 """Stretches of a curve of which smallest and largest sample are kept: enough to zoom in by a factor of ten."""
 
 
-@dataclass(frozen=True)
-class Curve:
-    """A signal over time, (n_samples,) each [s] and [the strip's unit]; ``colour`` "ink" is the page's own."""
-
-    label: str
-    time: Array
-    values: Array
-    colour: str
-
-
-@dataclass(frozen=True)
-class Strip:
-    """Axes over time with what stands in them; ``windows`` [s] are shaded."""
-
-    title: str
-    unit: str
-    curves: Sequence[Curve]
-    windows: Sequence[tuple[float, float]] = ()
-
-
-def zoomable(strips: Sequence[Strip], recording: str, alternative: str) -> str:
+def zoomable(strips: Sequence[Strip], alternative: str) -> str:
     """What lets a page draw these strips, one below the other; goes into a figure beside its picture."""
     from bokeh.embed import json_item
     from bokeh.layouts import column
     from bokeh.models import BoxAnnotation, CrosshairTool, DataRange1d, HoverTool, Range1d, Span
     from bokeh.plotting import figure
 
-    times = [curve.time for strip in strips for curve in strip.curves]
-    start, end = float(min(t[0] for t in times)), float(max(t[-1] for t in times))
-    shared = Range1d(start=start, end=end, bounds=(start, end), tags=["time", recording])
+    shared = {}
+    for recording in dict.fromkeys(strip.recording for strip in strips):
+        times = [curve.time for strip in strips if strip.recording == recording for curve in strip.curves]
+        start, end = float(min(np.nanmin(t) for t in times)), float(max(np.nanmax(t) for t in times))
+        shared[recording] = Range1d(start=start, end=end, bounds=(start, end), tags=["time", recording])
     ruler, plots = Span(dimension="height", line_alpha=0.6), []
     for k, strip in enumerate(strips):
         plot = figure(
             height=260 if k == 0 else 180,
             sizing_mode="stretch_width",
-            x_range=shared,
+            x_range=shared[strip.recording],
             y_range=DataRange1d(only_visible=True),
             title=strip.title,
             y_axis_label=f"[{strip.unit}]" if strip.unit else None,

@@ -214,7 +214,7 @@ def sections(
             positions(held, base.values, final.values),
             "Position over time of four recordings at gain 400: measured, with Coulomb and viscous friction, and with "
             "what was named.",
-            "Gain 400, which no fit has seen. Simulated in closed loop from the first position; only goals and supply "
+            "Gain 400, which is held out. Simulated in closed loop from the first position; only goals and supply "
             "are taken from the recording.",
         ),
         Picture(
@@ -224,7 +224,7 @@ def sections(
         ),
     ]
     return [
-        Section("On the gain that was never seen", [f"Mean absolute error, {'; '.join(by_run)}."], pictures[:1]),
+        Section("On the held-out gain", [f"Mean absolute error, {'; '.join(by_run)}."], pictures[:1]),
         Section("What each law explains", words, pictures[1:]),
     ]
 

@@ -56,11 +56,15 @@ def run(machine: Machine, more: Callable[[Answer], list[Quantity]] = lambda _: [
     folder.mkdir(parents=True, exist_ok=True)
     quantities = [*_misfits(answer), *more(answer)]
     save_model(answer.model, folder / "model.toml", found.sentence)
-    files = [("Model", machine.model), *(("Training", x) for x in machine.train), ("Held-out", machine.holdout)]
+    files: list[tuple[str, str | Path]] = [
+        ("Model", machine.model),
+        *(("Training", x) for x in machine.train),
+        ("Held-out", machine.holdout),
+    ]
     write_report(found, folder / "diagnosis.html", provenance(f"make study-{machine.name}", files))
     write_json(folder / "diagnosis.json", found.to_json())
     write_result(machine.name, quantities, time.monotonic() - begun, {"steps": [vars(s) for s in found.steps]})
-    page = write_page(machine.name, machine.title, found.sentence, quantities, machine.sections(answer))
+    page = write_page(machine.name, machine.title, found.sentence, quantities, machine.sections(answer), files=files)
     print(f"{table(quantities)}\n\n{found.sentence}\nReport: {page.resolve()}")
     return answer
 

@@ -33,11 +33,13 @@ from ..models.model_write import save_model
 from ..models.rigid_body import RigidBody
 from ..progress import stages
 from ..recordings import find_recording
+from ..report.provenance import provenance
 from .kuka_figures import MDEG, differences, left_over, pattern, rms, without
 from .outcome import FOLDER, Quantity, interval, table, write_json, write_result
 from .page import Picture, Section, write_page
 
 HERE = Path(__file__).parent
+MODEL = HERE / "kuka" / "kr300.toml"
 AXES = ("axis1", "axis2", "axis3")
 
 CHECK = {"nothing": (38.1, 30.0, 30.5), "spring": (22.2, 20.3, 21.7), "skew": (2.5, 3.0, 3.1)}
@@ -57,7 +59,7 @@ def main() -> int:
         print(f"The KR 300 recordings cannot be had: {error}", file=sys.stderr)
         return 2
     answer = diagnose(
-        load_model(HERE / "kuka" / "kr300.toml"),
+        load_model(MODEL),
         recordings,
         holdout,
         progress=stages(partial(print, flush=True)),
@@ -67,10 +69,11 @@ def main() -> int:
     folder.mkdir(parents=True, exist_ok=True)
     found = answer.diagnosis
     save_model(answer.model, folder / "model.toml", found.sentence)
-    write_report(found, folder / "diagnosis.html")
+    files = [("Model", MODEL), *(("Training", x) for x in recordings), ("Held-out", holdout)]
+    write_report(found, folder / "diagnosis.html", provenance("make study-kuka", files))
     write_json(folder / "diagnosis.json", found.to_json())
     write_result("kuka", quantities, time.monotonic() - begun, {"steps": [vars(s) for s in found.steps]})
-    page = write_page("kuka", "KUKA KR 300: motor and link encoders", found.sentence, quantities, sections)
+    page = write_page("kuka", "KUKA KR 300: motor and link encoders", found.sentence, quantities, sections, files=files)
     print(f"{table(quantities)}\n\n{found.sentence}\nReport: {page.resolve()}")
     return 0
 
@@ -140,7 +143,7 @@ def compare(answer: Answer, recordings: list[Path], holdout: Path) -> tuple[list
     picture = Picture(
         differences(AXES, before, after),
         "Difference of link and motor encoder over time on run C, for three axes, as recorded and with what was named.",
-        "Run C, which no fit has seen, unfiltered. Of it only each axis' zero is taken.",
+        "Run C, which is held out, unfiltered. Of it only each axis' zero is taken.",
     )
     lead = (
         f"Root mean square on run C in the band of 0 to {band:.3g} Hz, which ends below what gears and encoders "

@@ -11,6 +11,9 @@ from pathlib import Path
 from ..files import written_whole
 from ..identification.report.words import unit_words
 from ..report.html import figure, headline, page, paragraph, table
+from ..report.provenance import PACKAGES, provenance
+from ..report.strips import Drawn
+from ..report.zoom import zoomable
 from .outcome import FOLDER, Quantity
 
 _KINDS = {
@@ -109,6 +112,7 @@ def write_page(
     playback: str | None = None,
     caption: str = "Drag to turn, scroll to come closer, right button to shift.",
     clock: Clock = Clock(),
+    files: Sequence[tuple[str, str | Path]] = (),
 ) -> Path:
     """Write ``build/studies/<study>/report.html``, whole or not at all; returns its path.
 
@@ -131,14 +135,18 @@ def write_page(
         What the playback shows.
     clock : Clock
         How the playback's time goes with that of the plots, whose cursor and it move each other.
+    files : sequence of (str, str or Path)
+        What the study was computed from, each with its role; the page ends with their hashes and all versions.
     """
     parts = [("numbers", "The paper's numbers and ours", _numbers(quantities))]
     if playback is not None:
         parts.append(("playback", "Playback in 3-D", _frame(playback, caption, clock)))
     for number, section in enumerate(sections, start=1):
         content = "".join(paragraph(text) for text in section.paragraphs)
-        content += "".join(figure(p.svg, p.alternative, p.caption) for p in section.pictures)
+        content += "".join(figure(p.svg, p.alternative, p.caption, zoom=_zoom(p)) for p in section.pictures)
         parts.append((f"part{number}", section.heading, content))
+    origin = provenance(f"make study-{study}", files, (*PACKAGES, "exudyn", "numba", "scikit-learn"))
+    parts.append(("origin", "What this stands on", origin.markup()))
     header = f'<p class="quiet">{escape(title)}</p>\n{headline(found)}'
     document = page(title, header, parts, f"Written by snarelab: make study-{study}.")
     folder = FOLDER / study
@@ -167,6 +175,11 @@ def _numbers(quantities: Sequence[Quantity]) -> str:
     kinds = "".join(f"<dt>{kind}</dt><dd>{text}</dd>" for kind, text in said.items() if kind in used)
     heads = ["quantity", "unit", "paper", "ours", "interval", "kind"]
     return table("", heads, rows, numeric=(2, 3, 4)) + f'<dl class="facts">{kinds}</dl>\n'
+
+
+def _zoom(picture: Picture) -> str:
+    strips = picture.svg.strips if isinstance(picture.svg, Drawn) else ()
+    return zoomable(strips, picture.alternative) if strips else ""
 
 
 def _said(words: str) -> str:

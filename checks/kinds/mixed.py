@@ -1,78 +1,168 @@
 """Recordings that contradict each other: one arm cannot have made both."""
 
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
 
+from ...models.inertia import to_central
 from ..case import Case
 from ..compete import ODDS, SURE
-from ..evidence import Fitted
+from ..evidence import GAIN, WAYS, Fitted
 from ..finding import Finding, Kind
 from ..reading import as_read
 
 WORSE = 1.5
 """Least ratio of relative residuals, on the channel that shows it best, of one arm and of two."""
 
-
-Best: TypeAlias = tuple[float, Fitted, str, str]
-"""Log odds but for the prior's, the fit, what differs, and where."""
+OTHER_MASS, OTHER_GAIN, OTHER_ZERO = 3.0, 1.0, 0.3
+"""One standard deviation of what may differ between recordings that contradict each other: a link's mass properties, in
+those that a robot's file may be off by; a gain, as a share; an encoder's zero [rad or m]."""
 
 Columns: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]
 """Columns (n, J, k), their widths and lower bounds (k,)."""
 
 
+@dataclass(frozen=True)
+class Apart:
+    """What may have another value in every recording.
+
+    ``what`` and ``at`` say it; ``columns`` (n, J, k) are torques, of amplitudes whose standard deviation is ``width``;
+    ``words`` puts a recording's amplitudes (k,), in units of ``width``, into numbers with their unit. Of what all
+    recordings may share, ``own`` (k,) takes the amplitudes from a fit, and the first recording has no others; None
+    where there is nothing of the kind.
+    """
+
+    what: str
+    at: str
+    columns: np.ndarray
+    width: float
+    words: Callable[[np.ndarray], str]
+    own: Callable[[Fitted], np.ndarray] | None = None
+
+    def count(self, runs: int) -> int:
+        """Recordings that have amplitudes of their own."""
+        return runs if self.own is None else runs - 1
+
+
 def find(case: Case) -> list[Finding]:
-    """Links whose mass properties, and torques whose gain, are not the same in all recordings.
+    """Links whose mass properties, torques whose gain, and encoders whose zero are not the same in all recordings.
 
     Friction and biases may differ from day to day; they are fitted for each recording in both.
     """
     runs = len(case.experiments)
     if runs < 2 or not case.comparable:
         return []
-    samples, n = case.samples, len(case.joints)
-    grounds = case.grounds
-    own = grounds.body.regressor(samples.q, samples.qd, samples.qdd)
+    samples, n, grounds = case.samples, len(case.joints), case.grounds
     rms = np.sqrt(np.mean(samples.tau**2, axis=0)) + 1e-300
     daily = _daily(samples.qd, samples.run, rms)
     same = grounds.fit(as_read(n), daily)
     if np.nanmax(same.relative) < 0.06:
         return []
-    best = None
-    inertial = own @ grounds.spread
-    for k, link in enumerate(case.tree.links):
-        columns = inertial[:, :, 7 * k : 7 * k + 7]
-        best = _better(best, case, same, daily, columns, 3.0, f"the mass properties of {link.name}", link.name)
-    for c in range(n):
-        column = np.zeros((len(samples.q), n, 1))
-        column[:, c, 0] = own[:, c] @ case.tree.phi
-        best = _better(
-            best, case, same, daily, column, 1.0, f"the gain of tau.{case.joints[c]}", f"tau.{case.joints[c]}"
-        )
-    if best is None:
-        return []
-    odds, fit, what, at = best
-    candidates = len(case.tree.links) + n
-    log_odds = odds + np.log(ODDS / candidates)
+    candidates = list(_candidates(case))
+    judged = [(_apart(case, daily, x), x) for x in candidates]
+    fit, best = max(judged, key=lambda pair: pair[0].value - _costs(pair[1], runs))
+    log_odds = fit.value - same.value - _costs(best, runs) + np.log(ODDS / len(candidates))
     ratio = same.relative / np.maximum(fit.relative, 1e-12)
     if log_odds < np.log(SURE / (1 - SURE)) or np.nanmax(ratio) < WORSE:
         return []
     worst = int(np.nanargmax(ratio))
     names = [Path(str(e.motion.path)).name for e in case.experiments]
-    sizes = _distance(fit.parameters, runs, len(fit.parameters))
-    odd = names[int(np.argmax(sizes))] if runs > 2 else f"{names[0]} and {names[1]}"
-    which = f"; {odd} is the one that differs" if runs > 2 else f": {odd}"
+    each = _each(fit, best, runs)
+    odd = int(np.argmax(_distances(each)))
+    which = "is the one that differs" if runs > 2 else "is further from the model's own"
+    values = "; ".join(f"{best.words(x)} in {name}" for x, name in zip(each, names, strict=True))
     return [
         Finding(
             "mixed",
-            at,
+            best.at,
             float(1 / (1 + np.exp(-min(log_odds, 50.0)))),
-            f"recordings contradict each other in {what}{which}; fitted for each, the error of "
-            f"tau.{case.joints[worst]} falls from {100 * same.relative[worst]:.3g} % to "
+            f"recordings contradict each other in {best.what}: {values}; {names[odd]} {which}; fitted for each, the "
+            f"error of tau.{case.joints[worst]} falls from {100 * same.relative[worst]:.3g} % to "
             f"{100 * fit.relative[worst]:.2g} %",
-            f"# leave out {odd.partition(' and ')[2] or odd}, or diagnose the recordings apart: snarelab compare",
+            f"# leave out {names[odd]}, or diagnose the recordings apart: snarelab compare",
         )
     ]
+
+
+def _candidates(case: Case) -> Iterator[Apart]:
+    """All that may differ: of links, of torques, of encoders."""
+    samples, tree, body = case.samples, case.tree, case.grounds.body
+    regressor = body.regressor(samples.q, samples.qd, samples.qdd)
+    spread = case.grounds.spread
+    inertial, modelled = regressor @ spread, regressor @ tree.phi
+    for k, link in enumerate(tree.links):
+        part, rows = slice(WAYS * k, WAYS * k + WAYS), slice(10 * k, 10 * k + 10)
+        yield Apart(
+            f"the mass properties of {link.name}",
+            link.name,
+            inertial[:, :, part],
+            OTHER_MASS,
+            lambda x, part=part, rows=rows, phi=link.phi: _masses(phi + spread[rows, part] @ (OTHER_MASS * x)),
+            lambda fit, part=part: fit.parameters[part] / OTHER_MASS,
+        )
+    slope, _ = body.tangent(samples.q, samples.qd, samples.qdd)
+    for c, joint in enumerate(case.joints):
+        column, gain = np.zeros((*samples.q.shape, 1)), WAYS * (len(tree.links) + c + 1) - 1
+        column[:, c, 0] = modelled[:, c]
+        yield Apart(
+            f"the gain of tau.{joint}",
+            f"tau.{joint}",
+            column,
+            OTHER_GAIN,
+            lambda x: f"{1 + OTHER_GAIN * x[0]:.3g}",
+            lambda fit, gain=gain: fit.parameters[[gain]] * GAIN / OTHER_GAIN,
+        )
+        unit = "m" if tree.joints[c].kind == "prismatic" else "rad"
+        yield Apart(
+            f"the zero of q.{joint}",
+            f"q.{joint}",
+            slope[:, :, [c]],
+            OTHER_ZERO,
+            # the joint is where its encoder says, and so much further
+            lambda x, unit=unit: f"{-OTHER_ZERO * x[0]:.3g} {unit}",
+        )
+
+
+def _masses(phi: np.ndarray) -> str:
+    """Mass and centre of a link, in words."""
+    mass, com, _ = to_central(phi)
+    return f"{mass:.3g} kg about ({', '.join(f'{x:.3g}' for x in com)}) m"
+
+
+def _apart(case: Case, daily: Columns, what: Apart) -> Fitted:
+    """Fit of one arm that has another value of something in every recording."""
+    run = case.samples.run
+    own = np.unique(run)[-what.count(len(case.experiments)) :]
+    apart = np.concatenate([what.columns * (run == r)[:, None, None] for r in own], axis=2)
+    every, widths, low = daily
+    k = apart.shape[2]
+    beside = (
+        np.concatenate([every, apart], axis=2),
+        np.concatenate([widths, np.full(k, what.width)]),
+        np.concatenate([low, np.full(k, -np.inf)]),
+    )
+    return case.grounds.fit(as_read(len(case.joints)), beside)
+
+
+def _costs(what: Apart, runs: int) -> float:
+    """What evidence counts against numbers that were fitted for each recording."""
+    return 0.5 * what.columns.shape[2] * what.count(runs) * float(np.log(10.0))
+
+
+def _each(fit: Fitted, what: Apart, runs: int) -> np.ndarray:
+    """Amplitudes of each recording (runs, k) as differences to the model's own."""
+    k, count = what.columns.shape[2], what.count(runs)
+    differ = fit.parameters[-k * count :].reshape(count, k)
+    return differ if what.own is None else what.own(fit) + np.vstack([np.zeros(k), differ])
+
+
+def _distances(each: np.ndarray) -> np.ndarray:
+    """How far each recording is from most of the others (runs,); of two, from the model."""
+    middle = np.median(each, axis=0) if len(each) > 2 else np.zeros(each.shape[1])
+    return np.linalg.norm(each - middle, axis=1)
 
 
 def _daily(qd: np.ndarray, run: np.ndarray, rms: np.ndarray) -> Columns:
@@ -92,32 +182,6 @@ def _daily(qd: np.ndarray, run: np.ndarray, rms: np.ndarray) -> Columns:
                 made.append(column)
     columns = np.stack(made, 2)
     return columns, np.ones(columns.shape[2]), np.full(columns.shape[2], -np.inf)
-
-
-def _better(
-    best: Best | None, case: Case, same: Fitted, daily: Columns, columns: np.ndarray, width: float, what: str, at: str
-) -> Best:
-    """The better of the best so far and one arm whose columns have other amplitudes in every recording."""
-    run = case.samples.run
-    apart = np.concatenate([columns * (run == r)[:, None, None] for r in np.unique(run)[1:]], axis=2)
-    every, widths, low = daily
-    k = apart.shape[2]
-    beside = (
-        np.concatenate([every, apart], axis=2),
-        np.concatenate([widths, np.full(k, width)]),
-        np.concatenate([low, np.full(k, -np.inf)]),
-    )
-    fit = case.grounds.fit(as_read(len(case.joints)).but(free=0), beside)
-    odds = fit.value - same.value - 0.5 * k * np.log(10.0)
-    return (odds, fit, what, at) if best is None or odds > best[0] else best
-
-
-def _distance(parameters: np.ndarray, runs: int, n: int) -> np.ndarray:
-    """How far each recording is from the first (runs,), by its own amplitudes at the end of the list."""
-    each = 7 if n >= 7 * (runs - 1) else 1
-    own = parameters[-each * (runs - 1) :].reshape(runs - 1, -1)
-    middle = np.median(np.vstack([np.zeros(own.shape[1]), own]), axis=0)
-    return np.linalg.norm(np.vstack([np.zeros(own.shape[1]), own]) - middle, axis=1)
 
 
 KIND = Kind("mixed", "recordings contradict each other", find=find)

@@ -7,7 +7,7 @@ masses, small curves. With S = K + A A' a hypothesis is H = C' S⁻¹ C and g = 
 nothing is ½ g' (H + κ⁻²)⁻¹ g - ½ log det(1 + κ² H). Letters: n samples, m columns, P parameters beside.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 
@@ -20,6 +20,9 @@ from .pool import Columns, Hypothesis, Item
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int_]
+
+AT_ONCE = 512
+"""Columns that are worked on side by side: all at once, they would take several times the memory of all of them."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +39,8 @@ class Channel:
 @dataclass(frozen=True)
 class Products:
     """What one channel of one recording says: A'K⁻¹A (p, p), A'K⁻¹r (p,), log det K, r'K⁻¹r, A'K⁻¹C (p, m), C'K⁻¹r
-    (m,), p and m the channel's own, and the columns C made white (n, m): C'K⁻¹C is wanted for few pairs of them."""
+    (m,), p and m the channel's own; and C'K⁻¹C of the columns of each item, by their positions among C. Of other pairs
+    few are wanted."""
 
     always: Array
     seen: Array
@@ -44,7 +48,7 @@ class Products:
     energy: float
     beside: Array
     score: Array
-    white: Array
+    each: Mapping[bytes, Array]
 
 
 @dataclass(frozen=True)
@@ -107,27 +111,43 @@ class Evidence:
 
     def _products(self, i: int, c: int) -> Products:
         own, pool = self.channels[i][c], self._pools[i][c]
-        always, columns = np.column_stack([own.residual, own.columns]), np.zeros((len(own.residual), 0))
-        if pool.size:
-            white = own.covariance.white(np.column_stack([always, pool]))
-            always, columns = np.split(white, [always.shape[1]], axis=1)
+        always, m = np.column_stack([own.residual, own.columns]), pool.shape[1]
+        beside, each = np.zeros((always.shape[1], m)), {}
+        if m:
+            always = own.covariance.white(always)
             gram = always.T @ always
+            columns = np.empty(pool.shape, order="F")  # made white; nothing else is as large, so that it is not kept
+            for some in (slice(k, k + AT_ONCE) for k in range(0, m, AT_ONCE)):
+                columns[:, some] = own.covariance.white(pool[:, some].astype(float))
+                beside[:, some] = always.T @ columns[:, some]
+            each = self._each(c, columns)
         else:  # few columns are divided sooner than made white
             gram = always.T @ own.covariance.solve(always)
-        beside = always.T @ columns
         return Products(
-            gram[1:, 1:], gram[1:, 0], own.covariance.log_det, float(gram[0, 0]), beside[1:], beside[0], columns
+            gram[1:, 1:], gram[1:, 0], own.covariance.log_det, float(gram[0, 0]), beside[1:], beside[0], each
         )
+
+    def _each(self, c: int, white: Array) -> dict[bytes, Array]:
+        """Products of the columns of every item that reaches a channel, by their positions there."""
+        found: dict[bytes, Array] = {}
+        for group in self.alike:
+            at = self.where[c][group.index]
+            at = np.unique(at[at[:, 0] >= 0], axis=0)
+            step = max(1, AT_ONCE // at.shape[1])
+            for some in (at[k : k + step] for k in range(0, len(at), step)):
+                own = white.T[some]
+                found |= zip((x.tobytes() for x in some), own @ own.transpose(0, 2, 1), strict=True)
+        return found
 
     def own(self, i: int, c: int) -> list[tuple[Index, Array]]:
         """Of each of `alike`, on channel c of recording i: which items have columns there, and C'K⁻¹C (., k, k)."""
         if (i, c) not in self._own:
-            white, found = self.products(i, c).white, []
+            each, found = self.products(i, c).each, []
             for group in self.alike:
                 at = self.where[c][group.index]
                 rows = np.flatnonzero(at[:, 0] >= 0)
-                each = white.T[at[rows]]
-                found.append((rows, each @ each.transpose(0, 2, 1)))
+                k = at.shape[1]
+                found.append((rows, np.array([each[x.tobytes()] for x in at[rows]]).reshape(len(rows), k, k)))
             self._own[i, c] = found
         return self._own[i, c]
 
@@ -135,8 +155,10 @@ class Evidence:
         """C_item'K⁻¹C of an item with every column of channel c of recording i (k, m)."""
         key = (i, c, number)
         if key not in self._rows:
-            white = self.products(i, c).white
-            self._rows[key] = white[:, self.where[c][self.items[number].index]].T @ white
+            pool, at = self._pools[i][c], self.where[c][self.items[number].index]
+            divided = self.channels[i][c].covariance.solve(pool[:, at].astype(float)).T
+            blocks = (pool[:, k : k + AT_ONCE].astype(float) for k in range(0, pool.shape[1], AT_ONCE))
+            self._rows[key] = np.hstack([divided @ block for block in blocks])
         return self._rows[key]
 
     def with_covariances(self, c: int, covariances: Sequence[Covariance]) -> "Evidence":

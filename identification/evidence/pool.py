@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Single = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -48,14 +49,18 @@ class Hypothesis:
 
 @dataclass
 class Columns:
-    """Columns of all hypotheses, by recording and channel, numbered through."""
+    """Columns of all hypotheses, by recording and channel, numbered through.
+
+    They are kept in single precision, 6e-8 of each value, as they are most of the memory that a diagnosis takes; what
+    is worked out of them is in double.
+    """
 
     lengths: Sequence[int]
     """Samples of each recording in the analysis band."""
     count: int = 0
-    parts: dict[tuple[int, int], list[Array]] = field(default_factory=dict)
+    parts: dict[tuple[int, int], list[Single]] = field(default_factory=dict)
     numbers: dict[int, list[NDArray[np.int_]]] = field(default_factory=dict)
-    stacked: dict[tuple[int, int], Array] = field(default_factory=dict)
+    stacked: dict[tuple[int, int], Single] = field(default_factory=dict)
     """Once asked for, side by side; ``parts`` are views of them."""
 
     def add(self, own: Mapping[int, Sequence[Array]]) -> NDArray[np.int_]:
@@ -66,13 +71,13 @@ class Columns:
         for c, parts in own.items():
             self.numbers.setdefault(c, []).append(index)
             for i, x in enumerate(parts):
-                self.parts.setdefault((i, c), []).append(x)
+                self.parts.setdefault((i, c), []).append(x.astype(np.float32))
         return index
 
-    def of(self, recording: int, channel: int) -> tuple[NDArray[np.int_], Array]:
+    def of(self, recording: int, channel: int) -> tuple[NDArray[np.int_], Single]:
         """Numbers (m,) and columns (n, m) of a channel."""
         if channel not in self.numbers:
-            return np.zeros(0, int), np.zeros((0, 0))
+            return np.zeros(0, int), np.zeros((0, 0), np.float32)
         key, numbers = (recording, channel), np.concatenate(self.numbers[channel])
         if key not in self.stacked or self.stacked[key].shape[1] < len(numbers):
             whole = self.stacked[key] = np.concatenate(self.parts[key], axis=1)
@@ -95,4 +100,4 @@ class Columns:
             return np.zeros((self.lengths[recording], 0))
         numbers = np.concatenate([a for a, _ in own])
         order = {int(a): k for k, a in enumerate(numbers)}
-        return np.concatenate([x for _, x in own], axis=1)[:, [order[int(w)] for w in wanted]]
+        return np.concatenate([x for _, x in own], axis=1)[:, [order[int(w)] for w in wanted]].astype(float)

@@ -18,7 +18,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.floating.tree import FloatingTree
 from ...models.hidden_state import evaluate_law
 from ...models.model import Model, Placed
 from ...models.rigid_body import RigidBody
@@ -89,7 +88,7 @@ def load_links(
     InputError
         Whatever is wrong with a recording.
     """
-    if isinstance(model.tree, FloatingTree):
+    if model.tree.carriers:
         return (), []
     datasets = [read_motion(model, path) for path in recordings]
     # A column that never changes while the joint moves is no encoder.

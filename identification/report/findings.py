@@ -6,7 +6,8 @@ from html import escape
 
 from ...report.drawing import BEFORE
 from ...report.html import bar, figure, flag, folded, headline, paragraph, table
-from ...report.zoom import Curve, Strip, zoomable
+from ...report.strips import Curve, Strip
+from ...report.zoom import zoomable
 from ..diagnosis import Diagnosis, Finding, FrictionCurve, Limit, Location, Rival, Trace
 from .curves import friction_over_speed, friction_words
 from .figures import residual_over_time
@@ -116,10 +117,11 @@ def _zoomable(traces: Sequence[Trace], places: Sequence[Location]) -> str:
             unit_words(trace.unit),
             [Curve("", trace.time, trace.measured - trace.before, BEFORE)],
             [window for place in places if place.channel == trace.channel for window in place.time_windows],
+            trace.recording,
         )
         for trace in traces
     ]
-    return zoomable(strips, traces[0].recording, "residual before over time")
+    return zoomable(strips, "residual before over time")
 
 
 def detection_limits(diagnosis: Diagnosis) -> str:

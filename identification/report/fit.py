@@ -7,7 +7,8 @@ import numpy as np
 
 from ...report.drawing import AFTER, BEFORE
 from ...report.html import figure, flag, folded, paragraph, table
-from ...report.zoom import Curve, Strip, zoomable
+from ...report.strips import Curve, Strip
+from ...report.zoom import zoomable
 from ..diagnosis import Array, Diagnosis, Trace
 from .curves import residual_curves
 from .figures import before_and_after, candidates, steps
@@ -37,7 +38,7 @@ def comparison(diagnosis: Diagnosis, trace: Trace) -> tuple[bool, str]:
         text,
         f"{trace.channel} in {trace.recording} ({_ROLE[trace.role]}). {_alike(diagnosis, changed)}Right: where the "
         + ("two models differ most." if changed else "model misses most."),
-        zoom=zoomable(_strips(trace, changed), trace.recording, text),
+        zoom=zoomable(_strips(trace, changed), text),
     )
 
 
@@ -167,7 +168,8 @@ def _strips(trace: Trace, changed: bool) -> list[Strip]:
     measured = Curve("measured", trace.time, trace.measured, "ink")
     lines = [Curve(label, trace.time, values, colour) for label, values, colour in models]
     left = [Curve("", trace.time, trace.measured - values, colour) for _, values, colour in models]
-    return [Strip(f"{trace.channel}, {trace.recording}", unit, [measured, *lines]), Strip("residual", unit, left)]
+    above = Strip(f"{trace.channel}, {trace.recording}", unit, [measured, *lines], recording=trace.recording)
+    return [above, Strip("residual", unit, left, recording=trace.recording)]
 
 
 def _shown(diagnosis: Diagnosis, channel: str) -> list[Trace]:

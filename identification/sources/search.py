@@ -82,7 +82,7 @@ def search(
         trials = trials or _trials(made)
         error = LAW_ERROR**2 * _taken_out(first, here, weighed)
         slots = [s for s in as_names(made, slots) if _large(made, s, error)]
-        chosen = _chosen(made, slots)
+        chosen = _chosen(made, slots) if slots else []
         if not chosen:
             break
         added, values = [], {}
@@ -149,7 +149,7 @@ def _chosen(made: Search, slots: Sequence[Slot]) -> list[tuple[Slot, Sequence[Sl
         h = max(own, key=lambda h: odds[h])
         curved = any(not made.pool[s.taken.hypothesis].named and reached(s) & reach for s in slots)
         if odds[h] > 0 and not curved:
-            single = made.slot([made.take([], h)], 0)
+            (single,) = as_names(made, [made.slot([made.take([], h)], 0)])
             found.append((single, [single]))
         else:
             found.append((slot, slots if curved else [slot]))

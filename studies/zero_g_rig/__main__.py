@@ -20,6 +20,7 @@ from ...models.model_file import load_model
 from ...models.model_write import save_model
 from ...models.rig.rig import built_in_rig
 from ...progress import stages
+from ...report.provenance import provenance
 from ..outcome import FOLDER, Quantity, table, write_json, write_result
 from ..page import Clock, Section, write_page
 from . import figures
@@ -64,7 +65,7 @@ def main() -> int:
     sentence = f"{found.sentence} {remedy(pairs, boom)}"
     save_model(answer.model, folder / "model.toml", sentence)
     write_json(folder / "diagnosis.json", found.to_json())
-    write_report(found, folder / "diagnosis.html")
+    write_report(found, folder / "diagnosis.html", provenance(f"make study-{STUDY}", [("Model", MODEL)]))
     write_page(
         STUDY,
         "Zero-gravity rig: friction, and what it does not explain",
@@ -72,7 +73,7 @@ def main() -> int:
         quantities,
         [*sections(friction, found, words, truth), *paper_sections(friction, flown)],
         rig_scene(built_in_rig(), friction.train.time, friction.train.q).html(),
-        f"The fitted recording, {FASTER:g} times as fast: arm, joints, slings and the carriages above them. Drag to "
+        f"The training recording, {FASTER:g} times as fast: arm, joints, slings and the carriages above them. Drag to "
         "turn, scroll to come closer, right button to shift.",
         Clock(float(friction.train.time[0]), FASTER),
     )
@@ -103,9 +104,9 @@ def say(text: str) -> None:
 
 
 def error_table(friction: Friction) -> str:
-    """Mean torque error of each joint: rigid, friction tip to base, friction jointly; fitted and held out."""
+    """Mean torque error of each joint: rigid, friction tip to base, friction jointly; training and held-out."""
     lines = [f"  {'mean error [N·m]':<22}" + "".join(f"{f'joint {k + 1}':>10}" for k in range(7))]
-    for role, traces in (("fitted", friction.train), ("held out", friction.holdout)):
+    for role, traces in (("training", friction.train), ("held-out", friction.holdout)):
         steps = (("rigid", traces.rigid), ("tip to base", traces.tip_to_base), ("jointly", traces.friction))
         for name, modelled in steps:
             lines.append(f"  {f'{role}, {name}':<22}" + "".join(f"{x:>10.3f}" for x in traces.error(modelled)))
@@ -211,7 +212,7 @@ def sections(friction: Friction, found: Diagnosis, words: list[str], truth: dict
                 figures.errors(
                     joints,
                     {"rigid": t.error(t.rigid), "with friction": t.error(t.friction)},
-                    "Mean torque error on the fitted recording, like the paper's figure 11.",
+                    "Mean torque error on the training recording, like the paper's figure 11.",
                 ),
             ],
         ),
@@ -234,7 +235,7 @@ def sections(friction: Friction, found: Diagnosis, words: list[str], truth: dict
                         "with friction": left[:, 0],
                         "with what was found": left[:, 1],
                     },
-                    "Mean torque error on the recording held out.",
+                    "Mean torque error on the held-out recording.",
                 )
             ],
         ),

@@ -2,7 +2,7 @@
 
 Same size, same mass, same rig; another motion, and limbs that are tubes, not cages: stiff in twist. The prediction is
 the rigid arm with the friction that was identified on the other arm. Its band is twice the RMS that this model left on
-the recording held out there: what friction does not explain on the one arm is not promised of the other.
+the held-out recording there: what friction does not explain on the one arm is not promised of the other.
 """
 
 from dataclasses import dataclass, replace

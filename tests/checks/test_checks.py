@@ -1,6 +1,7 @@
 """Checks: each mistake by name, place and mend; sound recordings raise none. The whole bank is in test_checks_bank."""
 
 import json
+import re
 
 import faulty_recordings as bank
 import numpy as np
@@ -50,6 +51,26 @@ def test_a_mistake_is_named_placed_and_mended(tmp_path, mistake):
         return
     (tmp_path / "arm.toml").write_text(mended(MODEL, found))
     assert checked(tmp_path, paths) == ()
+
+
+@pytest.mark.parametrize(
+    ("mistake", "odd", "usual", "low", "high"),
+    [(bank.zero_moved, 1, 0.0, 0.25, 0.35), (bank.gain_changed, 2, 1.0, 0.8, 1.2)],
+)
+def test_of_recordings_that_differ_it_is_said_in_what_which_and_by_how_much(tmp_path, mistake, odd, usual, low, high):
+    made = bank.machine(7)
+    runs, _, places = mistake(made, 7)
+    paths = written(tmp_path, made, runs)
+    (found,) = checked(tmp_path, paths)
+    assert found.name == "mixed"
+    assert {found.at} == places
+    assert f"run{odd}.csv is the one that differs" in found.message
+    values = [float(x) for x in re.findall(r"(-?[\d.]+(?:e-?\d+)?)(?: rad)? in run", found.message)]
+    others = [x for k, x in enumerate(values) if k != odd]
+    assert len(others) == 2
+    assert low < values[odd] - usual < high
+    assert all(abs(x - usual) < 0.1 for x in others)
+    assert checked(tmp_path, [path for k, path in enumerate(paths) if k != odd]) == ()
 
 
 def test_all_channels_of_one_mistake_are_told(tmp_path):

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from documentation import EXTRAS, IMPORTED_AS
 
-from snarelab.extras import EXTRA_OF
+from snarelab.extras import EXTRA_OF, LIBRARIES
 
 ROOT = Path(__file__).resolve().parents[2]
 BUNDLED = ROOT / "studies" / "bundled"
@@ -72,6 +72,41 @@ def test_what_is_missing_is_one_line_with_the_command(tmp_path):
     for line, (extra, _) in zip(lines, asked.values(), strict=True):
         assert line.endswith(f"which is not installed; run pip install 'snarelab[{extra}]'"), line
     assert not list(tmp_path.glob("b.*"))
+
+
+def test_a_library_that_the_system_lacks_is_one_line_with_the_command():
+    """Drake's wheel asks for some; what it prints of its own when one is missing is kept away."""
+    code = f"""
+import importlib.util, sys
+from importlib.machinery import PathFinder, SourceFileLoader
+
+class Bare(SourceFileLoader):
+    def exec_module(self, module):
+        print("a page of advice")
+        raise ImportError("libglib-2.0.so.0: cannot open shared object file: No such file or directory")
+
+class WithoutLibrary(PathFinder):
+    @classmethod
+    def find_spec(cls, name, path=None, target=None):
+        found = super().find_spec(name, path, target)
+        if name == "pydrake":
+            found = importlib.util.spec_from_file_location(name, found.origin, loader=Bare(name, found.origin))
+        return found
+
+sys.meta_path = [WithoutLibrary if finder is PathFinder else finder for finder in sys.meta_path]
+from snarelab.cli import main
+print(main(["identify", {str(BUNDLED / "arm3.toml")!r}, {str(BUNDLED / "train.csv")!r}]))
+"""
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert ran.stdout == "2\n", ran.stderr
+    (line,) = ran.stderr.splitlines()
+    assert "needs the library libglib-2.0.so.0 of the system" in line
+    assert line.endswith(f"run apt-get install {LIBRARIES}")
+
+
+@pytest.mark.parametrize("file", ["README.md", "Containerfile", "docs/own-robot.md"])
+def test_the_systems_libraries_are_named_where_one_installs(file):
+    assert LIBRARIES in (ROOT / file).read_text(encoding="utf-8")
 
 
 def test_the_map_of_extras_is_what_the_project_asks_for():

@@ -13,6 +13,8 @@ from documentation import DOCS, EXTRAS, IMPORTED_AS, ROOT, read
 
 PACKAGE = ("cosim", "fmu", "identification", "models", "recordings", "report", "studies", "tolerance")
 
+SERIOUS = ("serious", "critical")
+
 
 class Page(HTMLParser):
     """Where a page's links lead, what it loads, and its anchors."""
@@ -93,6 +95,29 @@ def test_no_table_of_effects_has_narrow_columns(site, browser):
     assert len(widths) > 100
     assert min(widths) >= 200
     window.close()
+
+
+LOOKS = [("light", 1400), ("dark", 390), ("dark", 1400), ("light", 390)]
+KINDS = ("index", "own-robot", "effects", "python", "notebook-arm", "study-emps", "search")
+"""One page of each kind, which is looked at in every way; each of the others in one."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("look", LOOKS, ids=lambda look: f"{look[0]}-{look[1]}")
+def test_axe_finds_nothing_serious(site, browser, look):
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="no axe: pip install '.[dev]'").Axe()
+    pages, folder = site
+    names = sorted(pages)
+    mine = [n for i, n in enumerate(names) if LOOKS[i % len(LOOKS)] == look or n.removesuffix(".html") in KINDS]
+    window = browser.new_page(color_scheme=look[0], viewport={"width": look[1], "height": 900})
+    for name in mine:
+        window.goto((folder / name).as_uri())
+        window.evaluate("document.querySelectorAll('details').forEach(x => x.open = true)")
+        found = axe.run(window, options={"resultTypes": ["violations"], "iframes": False}).response["violations"]
+        serious = [(x["id"], node["html"]) for x in found for node in x["nodes"] if x["impact"] in SERIOUS]
+        assert serious == [], name
+    window.close()
+    assert len(mine) > 12
 
 
 def test_nothing_is_fetched_from_elsewhere(site):

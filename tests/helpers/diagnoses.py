@@ -120,7 +120,7 @@ def missing_physics() -> Diagnosis:
     return Diagnosis(
         verdict="missing_physics",
         sentence="The model leaves out Coulomb friction at joint2 (7.01 ± 0.04 N·m), Stribeck friction at joint5 and "
-        "elasticity at joint3; with them the misfit on data never seen falls from 8.9 % to 1.6 %.",
+        "elasticity at joint3; with them the error on the held-out recording falls from 8.9 % to 1.6 %.",
         description="",
         model="arm6",
         effects=findings,
@@ -160,7 +160,7 @@ def adequate() -> Diagnosis:
     return replace(
         missing_physics(),
         verdict="adequate",
-        sentence="Nothing is left out that these recordings can show: the misfit on data never seen is 1.6 %.",
+        sentence="Nothing is left out that these recordings can show: the error on the held-out recording is 1.6 %.",
         effects=(),
         location=(),
         fit=fits(kept),

@@ -94,11 +94,19 @@ class Run:
         return columns
 
 
-def record(made, seed, seconds=SECONDS, real=None, gravity=None):
-    """One motion of a machine."""
+def record(made, seed, seconds=SECONDS, real=None, gravity=None, time=None, still=None):
+    """One motion of a machine, sampled at ``time``; a joint that is held ``still`` does not move in it."""
     rng = np.random.default_rng(seed)
-    time = np.arange(round(seconds * RATE)) / RATE
-    motion = fourier_motion(made.arm, rng, seconds)
+    time = np.arange(round(seconds * RATE)) / RATE if time is None else time
+    moving = fourier_motion(made.arm, rng, seconds)
+
+    def motion(t):
+        state = [np.array(x) for x in moving(t)]
+        if still is not None:
+            for x, value in zip(state, (0.3, 0.0, 0.0), strict=True):
+                x[:, still] = value
+        return state
+
     model = engine(made.real if real is None else real, made.gravity if gravity is None else gravity)
     data = model.createData()
 
@@ -204,6 +212,16 @@ def zero_off(made, seed):
     """Of a joint that torque tells: by a shift of its zero, some torque changes by half."""
     run = record(made, seed)
     far = 0.6 if seed % 4 < 2 else -1.2
+    told = _shifts(made, run, far)
+    able = [k for k in range(len(told)) if told[k] > 0.5]
+    k = able[seed % len(able)]
+    q = run.q.copy()
+    q[:, k] += far
+    return [replace(run, q=q)], "encoder_offset", {f"q.{run.joints[k]}"}
+
+
+def _shifts(made, run, far):
+    """By how much of itself some torque changes where each joint's zero is shifted."""
     told = []
     model = engine(made.arm)
     data, still = model.createData(), np.zeros(len(made.viscous))
@@ -214,11 +232,12 @@ def zero_off(made, seed):
         after = np.array([pin.rnea(model, data, x, still, still) for x in q])
         size = np.sqrt(np.mean(before**2, axis=0)) + 1e-3 * np.sqrt(np.mean(before**2))
         told.append(np.max(np.sqrt(np.mean((after - before) ** 2, axis=0)) / size * (size > 0.05 * size.max())))
-    able = [k for k in range(len(told)) if told[k] > 0.5]
-    k = able[seed % len(able)]
-    q = run.q.copy()
-    q[:, k] += far
-    return [replace(run, q=q)], "encoder_offset", {f"q.{run.joints[k]}"}
+    return told
+
+
+def _told(made, run, far):
+    """Joints, those whose zero torque tells best first."""
+    return [int(k) for k in np.argsort(_shifts(made, run, far))[::-1]]
 
 
 def axis_reversed(made, seed):
@@ -246,10 +265,25 @@ def bursting_clock(made, seed):
 
 
 def standing(made, seed):
-    run, k = record(made, seed), seed % len(made.viscous)
-    q = run.q.copy()
-    q[:, k] = 0.3 + 1e-6 * np.random.default_rng(seed).normal(size=len(q))
-    return [replace(run, q=q)], "excitation", {run.joints[k]}
+    k = seed % len(made.viscous)
+    run = record(made, seed, still=k)
+    return [run], "excitation", {run.joints[k]}
+
+
+def zero_moved(made, seed):
+    """An encoder lost its zero before the second of three runs; of the joint whose torque tells it best."""
+    runs = [record(made, seed + n) for n in range(3)]
+    q, k = runs[1].q.copy(), _told(made, runs[1], 0.3)[0]
+    q[:, k] += 0.3
+    return [runs[0], replace(runs[1], q=q), runs[2]], "mixed", {f"q.{runs[0].joints[k]}"}
+
+
+def gain_changed(made, seed):
+    """A torque channel was wired to another amplifier before the last of three runs; the loudest one."""
+    runs = [record(made, seed + n) for n in range(3)]
+    tau, k = runs[2].tau.copy(), int(np.argmax(np.std(runs[2].tau, axis=0)))
+    tau[:, k] *= 2.0
+    return [*runs[:2], replace(runs[2], tau=tau)], "mixed", {f"tau.{runs[0].joints[k]}"}
 
 
 MISTAKES = [
@@ -270,4 +304,51 @@ MISTAKES = [
     cut_off,
     bursting_clock,
     standing,
+    zero_moved,
+    gain_changed,
 ]
+
+SAME = {
+    degrees,
+    degrees_of_one,
+    newton_centimetres,
+    newton_centimetres_of_one,
+    milliseconds,
+    encoder_reversed,
+    torque_reversed,
+    torques_swapped,
+    positions_swapped,
+    axis_reversed,
+}
+"""Mistakes whose mend gives the very numbers of the sound recording."""
+
+
+def sound(mistake, made, seed):
+    """The recordings that a mistake was made in, as they should have been, and lines for the model file that say so."""
+    if mistake is on_the_wall:
+        return [record(made, seed, gravity=(9.81, 0.0, 0.0))], "gravity = [9.81, 0.0, 0.0]\n"
+    if mistake is load_turned:
+        return load_turned(made, seed)[0][:1], ""
+    if mistake is standing:
+        return standing(made, seed)[0], ""
+    return [record(made, seed)], ""
+
+
+def disturbed(made, seed):
+    """A sound recording as real loggers leave it: a clock that jitters, rows that are lost, in bursts too, coarse
+    encoders; which of them hangs on the seed."""
+    rng = np.random.default_rng(seed + 9000)
+    time = np.arange(round(SECONDS * RATE)) / RATE
+    if seed % 2:
+        time = np.sort(time + rng.normal(0, (0.02, 0.1)[seed % 4 // 2] / RATE, len(time)))
+    run = record(made, seed, time=time)
+    q = run.q
+    if seed % 5 == 0:
+        step = 2 * np.pi / 2**14
+        q = np.round(q / step) * step
+    kept = np.ones(len(time), bool)
+    if seed % 3 == 0:
+        kept = rng.random(len(time)) > 0.006
+        for start in rng.integers(100, len(time) - 100, 3):
+            kept[start : start + rng.integers(3, 12)] = False
+    return Run(time[kept], q[kept], run.tau[kept], run.joints)

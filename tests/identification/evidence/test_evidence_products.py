@@ -145,9 +145,10 @@ def test_columns_are_given_back_in_the_order_that_was_asked_for():
     a, b = columns.add({1: one}), columns.add({0: two, 1: two})
     assert (a.tolist(), b.tolist(), columns.count) == ([0, 1], [2, 3, 4], 5)
     wanted = np.array([4, 0, 2])
-    np.testing.assert_array_equal(columns.some(1, 1, wanted), np.stack([two[1][:, 2], one[1][:, 0], two[1][:, 0]], 1))
+    asked = np.stack([two[1][:, 2], one[1][:, 0], two[1][:, 0]], 1)
+    np.testing.assert_array_equal(columns.some(1, 1, wanted), asked.astype(np.float32))
     assert columns.some(0, 2, np.zeros(0, int)).shape == (7, 0)
     assert [columns.has(c, 1) for c in (0, 1, 2)] == [False, True, False]
     numbers, x = columns.of(0, 0)
     assert numbers.tolist() == [2, 3, 4]
-    np.testing.assert_array_equal(x, two[0])
+    np.testing.assert_array_equal(x, two[0].astype(np.float32))

@@ -1,0 +1,114 @@
+"""A kind of recording is one class: channels that are linear in two effects, searched and confirmed like any other."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+from snarelab.errors import InputError
+from snarelab.identification.nuisance.noise import Run
+from snarelab.identification.sources.answer import rms
+from snarelab.identification.sources.decide import decide
+from snarelab.identification.sources.source import At, Variant
+from snarelab.models.effects import get_effect
+from snarelab.models.model import Placed
+
+N, STEP = 400, 0.02
+TIME = STEP * np.arange(N)
+VISCOUS, COULOMB = (Placed(get_effect(name), "joint1") for name in ("viscous_friction", "coulomb_friction"))
+NONE = At.of((), {}, 1)
+
+
+@dataclass
+class Slide:
+    """A carriage whose force is friction of its speed, beside a bias of the force sensor that is known to 0.1 N."""
+
+    truths: tuple[tuple[float, float, float], ...]
+    channels: tuple[str, ...] = ("tau.joint1",)
+    n_shifts: int = 1
+    anew: bool = False
+    steps: int = 4
+    train: range = field(default_factory=lambda: range(2))
+    held: range = field(default_factory=lambda: range(2, 3))
+
+    def columns_of(self, i):
+        speed = np.sin(2.0 * TIME + i) + 0.3 * np.sin(7.1 * TIME)
+        return {VISCOUS.key: speed, COULOMB.key: np.tanh(speed / 0.01)}
+
+    def measured(self, i):
+        own, noise = self.columns_of(i), np.random.default_rng(i).standard_normal(N)
+        viscous, coulomb, bias = self.truths[i]
+        return (viscous * own[VISCOUS.key] + coulomb * own[COULOMB.key] + bias + 0.05 * noise)[:, None]
+
+    def predicted(self, i, at):
+        own = self.columns_of(i)
+        return sum((at.of_effect(p)[0] * own[p.key] for p in at.placed), np.full(N, 0.1 * at.shifts[0]))[:, None]
+
+    def refused(self, i):
+        return InputError("no")
+
+    def slopes(self, i, at, here):
+        return np.array([self.columns_of(i)[p.key] for p in at.placed]).reshape(-1, N).T[:, None]
+
+    def shift_slopes(self, i, at, here):
+        return np.full((N, 1, 1), 0.1)
+
+    def settled(self, at, numbers):
+        return at
+
+    def scale(self):
+        return np.sqrt(np.mean(np.concatenate([self.measured(i) for i in self.train]) ** 2, axis=0))
+
+    def bounds(self, p, x):
+        return x.low, x.high
+
+    def size(self, p, x):
+        return 1.0
+
+    def unit(self, p, x):
+        return x.unit
+
+    def library(self, placed):
+        return [p for p in (VISCOUS, COULOMB) if p.key not in {x.key for x in placed}]
+
+    def variants(self, p):
+        return [Variant(p, {}, (f"{p.key}.{p.effect.parameters[0].name}",))]
+
+    def columns(self, i, at, v):
+        return self.columns_of(i)[v.placed.key][:, None, None]
+
+    def curves(self, numbers):
+        return {}
+
+    def hangs(self, numbers, linear, could):
+        none = np.zeros(N)
+        return [[Run(STEP, (slice(0, N),), none, (none,), none, 0.0)] for _ in numbers]
+
+    def blocks(self, i, x):
+        return np.array([b.sum() for b in np.array_split(x, 5)])
+
+
+def named(found):
+    return sorted(n.placed.effect.name for n in found.best.names)
+
+
+@pytest.mark.parametrize("bias", [0.0, 0.15])
+def test_noise_and_a_shift_within_its_deviation_have_no_name(bias):
+    found = decide(Slide(((0.0, 0.0, bias),) * 3), NONE)
+    assert named(found) == []
+    assert 0.1 * found.best.train.at.shifts[0] == pytest.approx(bias, abs=0.02)
+
+
+def test_what_is_there_is_named_with_its_size_beside_the_shift():
+    found = decide(Slide(((2.0, 0.7, 0.1),) * 3), NONE)
+    assert named(found) == ["coulomb_friction", "viscous_friction"]
+    values = found.best.train.at.all_values
+    assert values["viscous_friction.joint1.coefficient"] == pytest.approx(2.0, rel=0.02)
+    assert values["coulomb_friction.joint1.level"] == pytest.approx(0.7, rel=0.02)
+    assert rms(found.best.held)[0] == pytest.approx(0.05, rel=0.1)
+
+
+def test_what_only_the_training_recordings_have_is_not_confirmed():
+    found = decide(Slide(((2.0, 0.7, 0.1), (2.0, 0.7, 0.1), (2.0, 0.0, 0.1))), NONE)
+    assert named(found) == ["viscous_friction"]
+    assert [n.placed.effect.name for n in found.rejected] == ["coulomb_friction"]
