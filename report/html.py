@@ -87,7 +87,7 @@ grid-template-columns:max-content 1fr max-content 1fr}
 #answer h2{margin:.4rem 0 .2rem;padding-top:.2rem;font-size:11pt}
 #answer h3{font-size:9pt}#answer figure,#answer p,#answer h3,#answer .scroll{margin:.25rem 0}
 #answer table,#answer figcaption{font-size:8.5pt}#answer th,#answer td{padding-top:.1rem;padding-bottom:.1rem}
-#answer .plot img{max-height:62mm;width:auto;max-width:100%}#answer .provenance{font-size:7pt;line-height:1.2;row-gap:0}
+#answer .plot img{max-height:55mm;width:auto;max-width:100%}#answer .provenance{font-size:7pt;line-height:1.2;row-gap:0}
 #answer .plate{padding:0}.provenance code{font-size:1em}
 .status{-webkit-print-color-adjust:exact;print-color-adjust:exact}.bar,.bar i{print-color-adjust:exact}
 details:not([open]){display:none}

@@ -95,7 +95,7 @@ def bands(*several, blocks=(), share=0.1):
     assembly = Made(
         residual=lambda e, _theta: (residuals[id(e)], list(blocks)),
         evaluate=lambda e, _theta: Made(load=np.zeros((N, 1))),
-        tree=Made(),
+        tree=Made(carriers=0),
     )
     found: Any = Made(assembly=assembly, theta=None)
     return _bands(found, [e for e, _ in several], share)
