@@ -17,10 +17,10 @@ help:            ## what can be made
 demo: study-emps ## set up the core alone, then the main job: name the physics that a viscous model of EMPS leaves out
 
 study-emps: .venv/core
-	$(BIN)/python -m snarelab.studies.emps
+	$(ONE_THREAD) $(BIN)/python -m snarelab.studies.emps
 
 $(filter-out study-emps,$(STUDIES:%=study-%)): study-%: .venv/installed ## run one study: report and numbers in build/studies/NAME
-	$(BIN)/python -m snarelab.studies.$(subst -,_,$*)
+	$(ONE_THREAD) $(BIN)/python -m snarelab.studies.$(subst -,_,$*)
 
 studies: $(filter-out study-tolerance,$(STUDIES:%=study-%)) ## every study but the tolerances, one after the other: a quarter of an hour; CI runs them
 

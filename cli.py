@@ -23,6 +23,7 @@ from .fmu.command import add_parser as add_export
 from .identification.formulate_command import add_parser as add_formulate
 from .progress import Progress, start_logging
 from .report.outputs import demand_writable, write_json
+from .threads import one_thread
 from .tolerance.command import add_parser as add_tolerance
 
 if TYPE_CHECKING:
@@ -155,6 +156,7 @@ def _complete(parser: argparse.ArgumentParser, shell: str) -> None:
 
 
 def _check(given: argparse.Namespace) -> None:
+    one_thread()
     from .checks.run import check_file
     from .identification.results import CheckResult
 
@@ -168,6 +170,7 @@ def _check(given: argparse.Namespace) -> None:
 
 
 def _identify(given: argparse.Namespace) -> None:
+    one_thread()
     from .identification.identify import identify  # engines load only for a command that needs them
     from .identification.summary import parameter_table
     from .models.model_file import load_model
@@ -188,6 +191,7 @@ def _identify(given: argparse.Namespace) -> None:
 
 
 def _diagnose(given: argparse.Namespace) -> None:
+    one_thread()
     from .identification.diagnose import diagnose
     from .identification.search.next_experiment import next_experiment
     from .identification.summary import printed
