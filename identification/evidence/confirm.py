@@ -19,8 +19,8 @@ from ..fitting.experiment import Experiment, Scales
 from ..fitting.fit import Fit, channel_rms
 from ..search.refit import without
 from .arm import weigh
-from .evidence import Projected
 from .found import Found, Name
+from .projected import Projected
 
 Array = NDArray[np.float64]
 

@@ -11,9 +11,9 @@ from ..fitting.experiment import Experiment, Scales
 from ..nuisance.bursts import Bursts, Left, bursts
 from .arm import weigh
 from .confirm import Confirmed, blocks, scatter
-from .evidence import Projected
 from .found import Found, Remainder
 from .members import Members
+from .projected import Projected
 from .rounds import share_of_residual
 from .tolerant import searched
 

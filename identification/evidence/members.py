@@ -9,7 +9,7 @@ from scipy.special import log_ndtr
 
 from .. import deciding
 from ..deciding import WHOLE
-from .evidence import Projected
+from .projected import Projected
 
 Array = NDArray[np.float64]
 

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from .evidence import Projected
 from .members import SIZES, Members
 from .pool import Hypothesis
+from .projected import Projected
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,8 @@ import numpy as np
 from ..deciding import TOLERANCES
 from ..nuisance.noise import Noise
 from .arm import Weighed
-from .evidence import Evidence, Projected
+from .evidence import Evidence
+from .projected import Projected
 from .search import Search, Slot, Taken
 
 

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from ..deciding import DISCREPANCY, GATE, TOLERANCES
 from ..evidence.arm import Weighed
 from ..evidence.confirm import scatter
-from ..evidence.evidence import Projected
 from ..evidence.found import Remainder
 from ..evidence.members import Members
+from ..evidence.projected import Projected
 from ..evidence.rounds import as_names, share_of_residual
 from ..evidence.search import Search, Slot
 from ..evidence.tolerant import searched

@@ -11,9 +11,10 @@ from ...models.model import Placed
 from ..deciding import DISCREPANCY, LAW_ERROR
 from ..evidence.arm import Weighed, principal
 from ..evidence.beside import Beside
-from ..evidence.evidence import Channel, Evidence, Projected
+from ..evidence.evidence import Channel, Evidence
 from ..evidence.hypotheses import pool
 from ..evidence.pool import Columns, Item
+from ..evidence.projected import Projected
 from ..evidence.search import Search
 from ..nuisance.curve import SMALL
 from ..nuisance.noise import Noise, learn

@@ -7,8 +7,9 @@ import numpy as np
 from explained import Explained, white
 
 from snarelab.identification import deciding
-from snarelab.identification.evidence.evidence import Channel, Projected
+from snarelab.identification.evidence.evidence import Channel
 from snarelab.identification.evidence.hypotheses import pool
+from snarelab.identification.evidence.projected import Projected
 from snarelab.identification.evidence.search import Search
 from snarelab.identification.nuisance.rest import Zone
 from snarelab.models.effects import get_effect

@@ -9,8 +9,8 @@ from moved_numbers import FACTORS, move, planted
 
 from snarelab.identification.evidence import confirm as confirming
 from snarelab.identification.evidence import rounds
-from snarelab.identification.evidence.evidence import Projected
 from snarelab.identification.evidence.pool import Hypothesis, Item
+from snarelab.identification.evidence.projected import Projected
 from snarelab.identification.evidence.search import Search
 from snarelab.models.effects import get_effect
 from snarelab.models.model import Placed

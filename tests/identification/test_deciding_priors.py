@@ -9,9 +9,10 @@ from explained import Explained, hypotheses, white
 from moved_numbers import FACTORS, move, odds_of, planted, searched, smallest
 
 from snarelab.identification.evidence import hypotheses as hypothesising
-from snarelab.identification.evidence.evidence import Channel, Evidence, Projected
+from snarelab.identification.evidence.evidence import Channel, Evidence
 from snarelab.identification.evidence.members import Members
 from snarelab.identification.evidence.pool import Columns, Item
+from snarelab.identification.evidence.projected import Projected
 from snarelab.identification.evidence.search import Search
 from snarelab.identification.search.candidates import Variant
 from snarelab.models.effects import get_effect

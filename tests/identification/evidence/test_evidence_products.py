@@ -7,9 +7,9 @@ from scipy.integrate import quad
 from scipy.stats import norm
 
 from snarelab.identification import deciding
-from snarelab.identification.evidence.evidence import Projected
 from snarelab.identification.evidence.members import SIZES, Members
 from snarelab.identification.evidence.pool import Columns
+from snarelab.identification.evidence.projected import Projected
 
 FREE = (0, 1, 2, 5)
 """Items whose amplitudes may have either sign."""

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from explained import Explained, explained, hypotheses, white
 
-from snarelab.identification.evidence.evidence import Projected
 from snarelab.identification.evidence.members import Members
 from snarelab.identification.evidence.pool import Hypothesis, Item
+from snarelab.identification.evidence.projected import Projected
 from snarelab.identification.evidence.rounds import likeness, share_of_residual
 from snarelab.identification.evidence.search import Search
 
