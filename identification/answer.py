@@ -48,7 +48,7 @@ def report_on(
     ----------
     model : Model
         Baseline.
-    decided : Decided
+    decided : ArmDecision
         Verdict, names, nameless curves, and what was not confirmed.
     final : Fit
         With the confirmed effects.

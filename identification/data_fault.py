@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..checks.finding import CheckFinding
 from ..models.model import Model
+from .checks.finding import CheckFinding
 from .diagnosis import Diagnosis
 from .fitting.experiment import Experiment
 from .report.words import words

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks.finding import CheckFinding
+from .checks.finding import CheckFinding
 
 Array = NDArray[np.float64]
 
@@ -243,7 +243,7 @@ class Diagnosis:
         Baseline first, then one line an effect added.
     candidates : tuple of Candidate
         Each effect at each place by itself on top of the model as given, best first.
-    moved : tuple of Moved
+    moved : tuple of ParameterShift
     traces : tuple of Trace
     limits : tuple of Limit
         What would have been seen, had it been there.

@@ -10,11 +10,11 @@ from typing import Any
 import pandas as pd
 
 from .. import __version__
-from ..checks.finding import CheckFinding
 from ..errors import InputError
 from ..models.model import Model
 from ..models.model_write import save_model
 from ..report.html import folded, paragraph, table
+from .checks.finding import CheckFinding
 from .data_fault import contradict
 from .diagnosis import ChannelFit, Diagnosis, Finding, Step
 from .report.figures import before_and_after

@@ -27,7 +27,7 @@ def with_links(diagnosis: Diagnosis, model: Model, one: EncoderComparison) -> tu
         Of the torques.
     model : Model
         With what the torques asked for.
-    one : Compared
+    one : EncoderComparison
 
     Returns
     -------

@@ -57,8 +57,8 @@ def report_on(
     ----------
     model : Model
         As it was.
-    found : Searched
-    train, locked : sequences of Capture
+    found : CaptureSelection
+    train, locked : sequences of CaptureRecording
     seconds, runs : float, int
         What the search took [s], and the simulations in it.
     """

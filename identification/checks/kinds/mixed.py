@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from ...models.inertia import to_central
+from ....models.inertia import to_central
 from ..case import CheckCase
 from ..compete import ODDS, SURE
 from ..evidence import GAIN, WAYS, ReadingFit
