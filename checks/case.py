@@ -12,7 +12,7 @@ from ..identification.fitting.experiment import Experiment
 from ..models.model import Model
 from ..models.tree import Tree
 from ..recordings.signals import Signal
-from .evidence import Fitted, Grounds
+from .evidence import CheckBasis, ReadingFit
 from .mend import Mends
 from .reading import Reading, Samples, as_read
 
@@ -29,7 +29,7 @@ ALL = 8
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
+class CheckCase:
     """A model and its recordings.
 
     Parameters
@@ -83,22 +83,22 @@ class Case:
         return Samples(q, qd, qdd, tau, run)
 
     @cached_property
-    def grounds(self) -> Grounds:
+    def grounds(self) -> CheckBasis:
         """What readings are compared on; each channel counts as many samples as its misfit has independent ones."""
         first = self.experiments[0]
         told = np.ones(len(self.joints))
         told[sorted({*first.motion.silent, *first.motion.undriven})] = 0.0
         told[np.std(self.samples.tau, axis=0) == 0] = 0.0
         free = self.model.inertia == "free"
-        plain = Grounds(first.body, self.samples, free, 50.0 * told)
+        plain = CheckBasis(first.body, self.samples, free, 50.0 * told)
         if not told.any():  # nothing drives any joint: there is no torque to compare readings by
             return plain
         misfit = plain.fit(as_read(len(self.joints)), bounded=False).residual
         counted = [independent(misfit[:, c], self.samples.run) if told[c] else 0.0 for c in range(len(told))]
-        return Grounds(first.body, self.samples, free, np.array(counted))
+        return CheckBasis(first.body, self.samples, free, np.array(counted))
 
     @cached_property
-    def given(self) -> Fitted:
+    def given(self) -> ReadingFit:
         """Fit of the reading that the model file has."""
         return self.grounds.fit(as_read(len(self.joints)))
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .case import ALL, Case
-from .evidence import Fitted
-from .finding import Finding
+from .case import ALL, CheckCase
+from .evidence import ReadingFit
+from .finding import CheckFinding
 from .reading import Reading
 
 ODDS = 1e-3
@@ -33,15 +33,15 @@ CLOSELY = 12
 
 
 @dataclass(frozen=True, eq=False)
-class Judged:
+class ReadingScore:
     """A reading, its fit, and its log posterior odds against the reading as given."""
 
     reading: Reading
-    fit: Fitted
+    fit: ReadingFit
     odds: float
 
 
-def compete(case: Case, readings: Sequence[Reading]) -> list[Judged]:
+def compete(case: CheckCase, readings: Sequence[Reading]) -> list[ReadingScore]:
     """Judge readings, best first; nothing where the reading as given is sound.
 
     All are fitted without bounds first, and the `CLOSELY` best with them. Odds are evidence times prior odds. The
@@ -54,7 +54,7 @@ def compete(case: Case, readings: Sequence[Reading]) -> list[Judged]:
     kinds = {r.name: sum(other.name == r.name for other in readings) for r in readings}
     prior = {r.name: np.log(ODDS / kinds[r.name]) for r in readings}
 
-    def odds(reading: Reading, fit: Fitted, base: float) -> float:
+    def odds(reading: Reading, fit: ReadingFit, base: float) -> float:
         return fit.value + limits(case, reading) - base + prior[reading.name] + reading.rarer
 
     plain = case.grounds.fit(case.reading("", (), "", ()), bounded=False)
@@ -65,17 +65,17 @@ def compete(case: Case, readings: Sequence[Reading]) -> list[Judged]:
     judged = []
     for _, reading in rough[:CLOSELY]:
         fit = case.grounds.fit(reading)
-        judged.append(Judged(reading, fit, odds(reading, fit, bound)))
+        judged.append(ReadingScore(reading, fit, odds(reading, fit, bound)))
     return sorted(judged, key=lambda j: -j.odds)
 
 
-def is_sound(case: Case) -> bool:
+def is_sound(case: CheckCase) -> bool:
     """Whether the reading as given leaves so little that no other needs to be tried."""
     bar = SOUND if len(case.joints) <= ALL else SOUND_OF_MANY
     return bool(np.nanmax(case.given.relative) <= bar)
 
 
-def findings(case: Case, judged: Sequence[Judged]) -> list[Finding]:
+def findings(case: CheckCase, judged: Sequence[ReadingScore]) -> list[CheckFinding]:
     """What the best reading says, if it is sure and plain; each of its channels is a finding.
 
     The probability of a place is that of its reading among all, the reading as given included; readings that say the
@@ -103,7 +103,7 @@ def findings(case: Case, judged: Sequence[Judged]) -> list[Finding]:
     beyond = beyond_limits(case, case.reading("", (), "", ()))
     stated = f"; as it is read, {beyond}" if beyond else ""
     return [
-        Finding(
+        CheckFinding(
             best.reading.name,
             at,
             float(share[1]) if not alike else fault,
@@ -114,18 +114,18 @@ def findings(case: Case, judged: Sequence[Judged]) -> list[Finding]:
     ]
 
 
-def limits(case: Case, reading: Reading) -> float:
+def limits(case: CheckCase, reading: Reading) -> float:
     """Log prior of where a reading puts the robot: far outside the URDF's limits is rare (to -10), inside is 0."""
     return -10.0 * min(1.0, 2 * max((share for share, _ in _beyond(case, reading)), default=0.0))
 
 
-def beyond_limits(case: Case, reading: Reading) -> str:
+def beyond_limits(case: CheckCase, reading: Reading) -> str:
     """In words, what lies far beyond the URDF's limits; empty where nothing does."""
     worst = max(_beyond(case, reading), default=(0.0, ""))
     return worst[1] if worst[0] > 0.05 else ""
 
 
-def _beyond(case: Case, reading: Reading) -> list[tuple[float, str]]:
+def _beyond(case: CheckCase, reading: Reading) -> list[tuple[float, str]]:
     """Share of samples far beyond a limit (a quarter of a joint's range, twice a speed, three efforts), and where."""
     samples = case.samples.under(reading)
     found = []

@@ -41,7 +41,7 @@ STILL = 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
+class ReadingFit:
     """A reading's fit.
 
     ``value`` is its log evidence, ``relative`` (C,) each channel's residual over its torque, ``prior`` the price of the
@@ -55,7 +55,7 @@ class Fitted:
     parameters: Array
 
 
-class Grounds:
+class CheckBasis:
     """Samples, rigid body and priors that all readings are compared on.
 
     Parameters
@@ -79,7 +79,7 @@ class Grounds:
         columns: tuple[Array, Array, Array] | None = None,
         bounded: bool = True,
         without: NDArray[np.bool_] | None = None,
-    ) -> Fitted:
+    ) -> ReadingFit:
         """Evidence of a reading.
 
         ``columns`` (n, J, k), their widths and lower bounds (k,) come beside the usual; samples ``without`` (n, J) do
@@ -116,7 +116,7 @@ class Grounds:
         relative[used] = np.sqrt(share)
         whole = np.zeros((n, len(used)))
         whole[:, used] = residual
-        return Fitted(float(value), relative, prior, whole, b)
+        return ReadingFit(float(value), relative, prior, whole, b)
 
     def design(
         self, samples: Samples, gravity: Array | None, columns: tuple[Array, Array, Array] | None

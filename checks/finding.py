@@ -5,12 +5,12 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .case import Case
+    from .case import CheckCase
     from .reading import Reading
 
 
 @dataclass(frozen=True)
-class Finding:
+class CheckFinding:
     """One thing that is not as it should be.
 
     Parameters
@@ -62,6 +62,6 @@ class Kind:
 
     name: str
     sentence: str
-    readings: "Callable[[Case], list[Reading]] | None" = None
-    find: "Callable[[Case], list[Finding]] | None" = None
+    readings: "Callable[[CheckCase], list[Reading]] | None" = None
+    find: "Callable[[CheckCase], list[CheckFinding]] | None" = None
     early: bool = False

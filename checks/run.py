@@ -14,15 +14,15 @@ from ..models.model import Model
 from ..models.model_file import load_model
 from ..models.rigid_body import RigidBody
 from ..models.snare.setup import SnareTree
-from .case import Case
+from .case import CheckCase
 from .compete import compete, findings, is_sound
-from .finding import Finding
+from .finding import CheckFinding
 from .kinds import ORDER, kinds
 
 
 def check(
     model: Model, recordings: Sequence[str | Path], *, progress: Callable[[str], None] = lambda _: None
-) -> tuple[Finding, ...]:
+) -> tuple[CheckFinding, ...]:
     """Findings on recordings that were not read yet; raises InputError for whatever is wrong with a file.
 
     A recording that cannot be conditioned is left to what can be said without.
@@ -44,19 +44,19 @@ def check(
 
 def check_file(
     model: str | Path | Model, recordings: Sequence[str | Path], *, progress: Callable[[str], None] = lambda _: None
-) -> tuple[str, tuple[Finding, ...]]:
+) -> tuple[str, tuple[CheckFinding, ...]]:
     """A model's name, and the findings; a moving body that no body can be is one of them, and mended for the others."""
     if not isinstance(model, Model):
         model = load_model(model, fix="nearest")
     return model.name, check(model, recordings, progress=progress)
 
 
-def early_checks(model: Model, datasets: Sequence[xr.Dataset]) -> tuple[Finding, ...]:
+def early_checks(model: Model, datasets: Sequence[xr.Dataset]) -> tuple[CheckFinding, ...]:
     """What is seen before any filter is applied: jumps, and clocks that are none.
 
     Where one is found, readings cannot be compared: what was recorded is no motion.
     """
-    case = Case(model, datasets, ())
+    case = CheckCase(model, datasets, ())
     return _sorted([f for kind in kinds() if kind.early and kind.find is not None for f in kind.find(case)])
 
 
@@ -64,16 +64,16 @@ def run_checks(
     model: Model,
     datasets: Sequence[xr.Dataset],
     experiments: Sequence[Experiment],
-    early: Sequence[Finding] = (),
+    early: Sequence[CheckFinding] = (),
     progress: Callable[[str], None] = lambda _: None,
-) -> tuple[Finding, ...]:
+) -> tuple[CheckFinding, ...]:
     """Findings on recordings as read and conditioned, after what was found early; those of contradiction first.
 
     Of the readings that compete the best one is told. What is cut off, and what recordings contradict each other in, is
     only asked where there is none.
     """
     progress("checking whether the recordings can belong to the model")
-    case = Case(model, datasets, experiments, progress)
+    case = CheckCase(model, datasets, experiments, progress)
     found = list(early)
     if not any(f.fault for f in found) and case.comparable and not is_sound(case):
         readings = [r for kind in kinds() if kind.readings is not None for r in kind.readings(case)]
@@ -85,6 +85,6 @@ def run_checks(
     return _sorted(found)
 
 
-def _sorted(found: Sequence[Finding]) -> tuple[Finding, ...]:
+def _sorted(found: Sequence[CheckFinding]) -> tuple[CheckFinding, ...]:
     """Contradictions first, then in the order of kinds."""
     return tuple(sorted(found, key=lambda f: (not f.fault, ORDER.index(f.name))))

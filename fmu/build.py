@@ -14,8 +14,8 @@ from ..errors import InputError
 from ..files import written_whole
 from ..models.c_library import find_compiler
 from .c_files import source_files
-from .description import About, build_description, model_description
-from .equations import Equations, Variable
+from .description import ModelInfo, build_description, model_description
+from .equations import Equations, ModelVariable
 from .page import icon, page
 
 # -O1: straight-line code gains next to nothing from more. No contraction: the same bits on every machine.
@@ -39,7 +39,7 @@ def write_fmu(equations: Equations, path: str | Path, version: int) -> Path:
         No C compiler, or a place that cannot be written.
     """
     sources, token = source_files(equations, version)
-    about = About(
+    about = ModelInfo(
         name=equations.name,
         identifier=equations.name,
         description=equations.description,
@@ -56,8 +56,8 @@ def write_fmu(equations: Equations, path: str | Path, version: int) -> Path:
 
 
 def pack(
-    about: About,
-    variables: tuple[Variable, ...],
+    about: ModelInfo,
+    variables: tuple[ModelVariable, ...],
     sources: dict[str, str],
     resources: dict[str, str],
     path: str | Path,

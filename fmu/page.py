@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import __version__
-from .equations import Variable
+from .equations import ModelVariable
 
 if TYPE_CHECKING:
-    from .description import About
+    from .description import ModelInfo
 
 STYLE = """:root{color-scheme:light dark}
 body{font:15px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem}
@@ -23,7 +23,7 @@ code{font-size:.95em}h1{font-size:1.5rem}h2{font-size:1.1rem;margin-top:2rem}"""
 _HEADINGS = {"input": "Inputs", "parameter": "Parameters", "output": "Outputs"}
 
 
-def page(about: "About", variables: tuple[Variable, ...], version: int) -> str:
+def page(about: "ModelInfo", variables: tuple[ModelVariable, ...], version: int) -> str:
     """HTML: what the model is, what it can do, and every variable."""
     abilities = {
         "saves, restores and serialises its state, exactly": about.saves,
@@ -63,7 +63,7 @@ def _unit(text: str) -> str:
     return text.replace("**", "^").replace("*", "·")
 
 
-def _bounds(v: Variable) -> str:
+def _bounds(v: ModelVariable) -> str:
     if not np.isfinite([v.minimum, v.maximum]).any():
         return ""
     low = "−∞" if v.minimum == -np.inf else f"{v.minimum:.4g}"

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..checks.finding import Finding
+from ..checks.finding import CheckFinding
 from ..models.model import Model
 from .diagnosis import Diagnosis
 from .fitting.experiment import Experiment
@@ -13,12 +13,12 @@ from .wording import listed
 _MEND = "Mend that first, with the lines under checks, or go on with --anyway."
 
 
-def contradict(checks: Sequence[Finding]) -> bool:
+def contradict(checks: Sequence[CheckFinding]) -> bool:
     """Whether one of the findings is that recordings and model contradict each other."""
     return any(check.fault for check in checks)
 
 
-def data_fault(model: Model, checks: Sequence[Finding], experiments: Sequence[Experiment] = ()) -> Diagnosis:
+def data_fault(model: Model, checks: Sequence[CheckFinding], experiments: Sequence[Experiment] = ()) -> Diagnosis:
     """A diagnosis that names no physics: what is not as it should be, and the lines that mend it."""
     faults = [check for check in checks if check.fault]
     said = list(dict.fromkeys(check.message for check in faults))

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks.finding import Finding as Check
+from ..checks.finding import CheckFinding
 
 Array = NDArray[np.float64]
 
@@ -120,7 +120,7 @@ class Limit:
 
 
 @dataclass(frozen=True)
-class Moved:
+class ParameterShift:
     """A baseline parameter before and after the missing physics was added."""
 
     name: str
@@ -251,7 +251,7 @@ class Diagnosis:
         Conditioning and excitation, in words.
     band : float
         Analysis band's edge [Hz].
-    checks : tuple of Check
+    checks : tuple of CheckFinding
         What of the recordings and the model is not as it should be; a ``data_fault`` where they contradict each other.
     curves : tuple of FrictionCurve
         Friction of each joint over its speed, of the laws that depend on speed alone, with its deviation.
@@ -270,12 +270,12 @@ class Diagnosis:
     fit: tuple[ChannelFit, ...]
     steps: tuple[Step, ...]
     candidates: tuple[Candidate, ...]
-    moved: tuple[Moved, ...]
+    moved: tuple[ParameterShift, ...]
     traces: tuple[Trace, ...]
     limits: tuple[Limit, ...]
     notes: tuple[str, ...]
     band: float
-    checks: tuple[Check, ...] = ()
+    checks: tuple[CheckFinding, ...] = ()
     curves: tuple[FrictionCurve, ...] = ()
     foremost: str = ""
     empirical: tuple[EmpiricalTable, ...] = ()

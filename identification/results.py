@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 
 from .. import __version__
-from ..checks.finding import Finding as Check
+from ..checks.finding import CheckFinding
 from ..errors import InputError
 from ..models.model import Model
 from ..models.model_write import save_model
@@ -86,7 +86,7 @@ class DiagnosisResult:
         return self.diagnosis.effects
 
     @property
-    def checks(self) -> tuple[Check, ...]:
+    def checks(self) -> tuple[CheckFinding, ...]:
         """What of the recordings and the model is not as it should be, each with the line that mends it."""
         return self.diagnosis.checks
 
@@ -158,7 +158,7 @@ class CheckResult:
     """What `check` found: ``checks`` on the recordings of ``model``, those of contradiction first."""
 
     model: str
-    checks: tuple[Check, ...]
+    checks: tuple[CheckFinding, ...]
 
     @property
     def sound(self) -> bool:

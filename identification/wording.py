@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..models.model import Placed
+from ..models.model import PlacedEffect
 from .diagnosis import ChannelFit, Finding
 from .nuisance.noise import Noise
 from .report.words import chance, words
@@ -26,7 +26,9 @@ def from_to(before: float, after: float) -> str:
     return f"from {percent(before, digits)} to {percent(after, digits)}"
 
 
-def evidence_sentence(placed: Placed, channels: Sequence[str], relative_with: float, relative_without: float) -> str:
+def evidence_sentence(
+    placed: PlacedEffect, channels: Sequence[str], relative_with: float, relative_without: float
+) -> str:
     """What an effect explains, and what happens on the held-out recording when it is taken out again."""
     where = " and ".join(channels) if len(channels) < 3 else f"{len(channels)} channels"
     what = placed.effect.sentence
@@ -43,7 +45,7 @@ def _part(share: float) -> str:
     return "all of" if share > 0.995 else f"{percent(share)} of"
 
 
-def experiment_sentence(placed: Placed, rival: Placed) -> str:
+def experiment_sentence(placed: PlacedEffect, rival: PlacedEffect) -> str:
     """The motion or measurement that would tell two effects apart."""
     own, other = placed.effect.experiment, rival.effect.experiment
     joint = rival.at.removeprefix("tau.").removeprefix("q.")

@@ -21,7 +21,7 @@ from .tree import Tree
 
 
 @dataclass(frozen=True)
-class Placed:
+class PlacedEffect:
     """An effect and the one place it acts at: a joint, an axis, a link, a sling, or a channel such as ``tau.joint1``.
 
     Parameters named in ``hold`` are not identified: the recordings did not ask for them, or another effect carries
@@ -78,7 +78,7 @@ class Model:
     urdf: Path | None
     tree: Tree
     inertia: str
-    effects: tuple[Placed, ...]
+    effects: tuple[PlacedEffect, ...]
     signals: Mapping[str, Signal]
     bandwidth: float | None
     values: Mapping[str, float]
@@ -92,7 +92,7 @@ class Model:
         """Joint names in order."""
         return tuple(j.name for j in self.tree.joints)
 
-    def with_effects(self, added: Sequence[Placed], values: Mapping[str, float]) -> "Model":
+    def with_effects(self, added: Sequence[PlacedEffect], values: Mapping[str, float]) -> "Model":
         """The model with more effects, and with parameters that a fit found."""
         return replace(self, effects=(*self.effects, *added), values={**self.values, **values})
 

@@ -15,7 +15,7 @@ import numpy as np
 _DEEPEST = 32
 
 
-class Refused(Exception):
+class Refusal(Exception):
     """What a user can mend."""
 
 
@@ -37,7 +37,7 @@ def collect(path: str, most: int, matlab: bool) -> dict[str, np.ndarray]:
                 continue
             size += item.size * item.dtype.itemsize
             if size > most:
-                raise Refused(
+                raise Refusal(
                     f"unpacks to {size / 2**30:.1f} GiB of numbers and at most {most >> 30} are read; "
                     "it is damaged, or cut it into parts"
                 )
@@ -53,7 +53,7 @@ def collect(path: str, most: int, matlab: bool) -> dict[str, np.ndarray]:
 def _inside(group: h5py.Group, name: str, seen: set[int]) -> Iterator[tuple[str, h5py.Dataset]]:
     """Datasets of a group and of the groups in it, each object once; h5py's own walk is slow where groups lie deep."""
     if name.count("/") > _DEEPEST:
-        raise Refused(f"has groups more than {_DEEPEST} deep; store the columns flatter")
+        raise Refusal(f"has groups more than {_DEEPEST} deep; store the columns flatter")
     for key in group:
         if not isinstance(group.get(key, getlink=True), h5py.HardLink):
             continue
@@ -75,7 +75,7 @@ def _text(value: object) -> str:
 if __name__ == "__main__":
     try:
         result: object = collect(sys.argv[1], int(sys.argv[2]), len(sys.argv) > 3)
-    except Refused as refused:
+    except Refusal as refused:
         result = str(refused)
     except Exception as error:  # a damaged file makes h5py raise anything from TypeError to SystemError
         result = error.__class__

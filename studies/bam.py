@@ -18,13 +18,13 @@ from ..errors import InputError
 from ..exit_status import status_of
 from ..models.effect import written_unit
 from ..models.effects import effects
-from ..models.model import Placed
+from ..models.model import PlacedEffect
 from ..models.model_file import load_model
 from ..models.model_write import save_model
 from ..recordings import find_recording
 from ..recordings.find import SHA256
 from .bam_figures import explained, positions
-from .bam_naming import START, Fitted, Round, Tried, Values, fit, name_missing, rms
+from .bam_naming import START, LawTrial, Round, ServoFit, Values, fit, name_missing, rms
 from .bam_servo import DUTY, MOTOR, ServoRun, position_error, read_run
 from .outcome import FOLDER, Quantity, table, write_result
 from .page import Picture, Section, write_page
@@ -65,7 +65,7 @@ def main() -> int:
     print("  Coulomb and viscous friction", flush=True)
     base = fit(train, START)
     rounds: list[Round] = []
-    named: list[Tried] = []
+    named: list[LawTrial] = []
     final, refused = base, None
     for r in name_missing(train, base, lambda text: print(f"  {text}", flush=True)):
         rounds.append(r)
@@ -85,12 +85,12 @@ def main() -> int:
     return 0
 
 
-def confirmed(before: Fitted, after: Fitted, held: Sequence[ServoRun]) -> bool:
+def confirmed(before: ServoFit, after: ServoFit, held: Sequence[ServoRun]) -> bool:
     """Whether a step makes the held-out recordings better too: without it, their squared error is 5 % higher."""
     return rms(held, before.values) ** 2 >= (1 + PROVED) * rms(held, after.values) ** 2
 
 
-def sentence(base: Fitted, named: Sequence[Tried], held: Sequence[ServoRun]) -> str:
+def sentence(base: ServoFit, named: Sequence[LawTrial], held: Sequence[ServoRun]) -> str:
     """The verdict."""
     before = position_error(held, base.values)
     if not named:
@@ -106,9 +106,9 @@ def sentence(base: Fitted, named: Sequence[Tried], held: Sequence[ServoRun]) -> 
 def numbers(
     train: Sequence[ServoRun],
     held: Sequence[ServoRun],
-    base: Fitted,
+    base: ServoFit,
     rounds: Sequence[Round],
-    named: Sequence[Tried],
+    named: Sequence[LawTrial],
 ) -> list[Quantity]:
     """Held-out position errors beside the check's, and what was named.
 
@@ -155,7 +155,7 @@ def unit(name: str) -> str:
 
 
 def steps(
-    train: Sequence[ServoRun], held: Sequence[ServoRun], base: Fitted, named: Sequence[Tried]
+    train: Sequence[ServoRun], held: Sequence[ServoRun], base: ServoFit, named: Sequence[LawTrial]
 ) -> list[dict[str, str | float]]:
     """Mean absolute position error [rad] after each law, fitted and held out."""
     lines = [("Coulomb and viscous", base), *((f"+ {t.name}", t.fit) for t in named)]
@@ -180,7 +180,7 @@ def as_lines(r: Round) -> list[dict[str, Any]]:
 
 
 def sections(
-    held: Sequence[ServoRun], base: Fitted, final: Fitted, rounds: Sequence[Round], refused: Tried | None
+    held: Sequence[ServoRun], base: ServoFit, final: ServoFit, rounds: Sequence[Round], refused: LawTrial | None
 ) -> list[Section]:
     """What is drawn, and what was not named."""
     words = [
@@ -235,7 +235,7 @@ def save(values: Values, note: str) -> None:
     placed = list(model.effects)
     for name in dict.fromkeys(key.partition(".")[0] for key in values if "." in key):
         if name not in [p.effect.name for p in placed]:
-            placed.append(Placed(effects()[name], "servo"))
+            placed.append(PlacedEffect(effects()[name], "servo"))
     own = {key.replace(".", ".servo."): float(value) for key, value in values.items() if "." in key}
     own["rotor_inertia.servo.inertia"] = float(values["rotor_inertia"])
     save_model(replace(model, effects=tuple(placed), values=own), FOLDER / "bam" / "model.toml", note)

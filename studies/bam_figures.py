@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from ..report.drawing import AFTER, BEFORE, GREY, MEASURED, drawing, line, margins, svg
 from ..report.time_axes import over_time
-from .bam_naming import Tried, Values
+from .bam_naming import LawTrial, Values
 from .bam_servo import ServoRun, simulate
 
 
@@ -31,7 +31,7 @@ def positions(runs: Sequence[ServoRun], before: Values, after: Values) -> bytes:
         return svg(figure)
 
 
-def explained(tried: Sequence[Tried]) -> bytes:
+def explained(tried: Sequence[LawTrial]) -> bytes:
     """Share of the squared position error that each law explains, fitted to all gains and foretold for each."""
     with drawing():
         figure = Figure(figsize=(8.0, 0.9 + 0.42 * len(tried)))

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from ..case import Case
-from ..finding import Finding, Kind
+from ..case import CheckCase
+from ..finding import CheckFinding, Kind
 
 UNEVEN = 0.05
 """Share of the period by which stamps must be off an even clock to be doubted."""
@@ -18,12 +18,12 @@ ABOUT = 25
 """Samples to either side over which a joint's speed is taken."""
 
 
-def find(case: Case) -> list[Finding]:
+def find(case: CheckCase) -> list[CheckFinding]:
     """Recordings whose stamps jitter while the motion does not."""
     return [finding for dataset in case.datasets if (finding := _clock(case, dataset)) is not None]
 
 
-def _clock(case: Case, dataset: xr.Dataset) -> Finding | None:
+def _clock(case: CheckCase, dataset: xr.Dataset) -> CheckFinding | None:
     t = np.asarray(dataset["time"].values, float)
     steps = np.diff(t)
     period = float(np.median(steps))
@@ -42,7 +42,7 @@ def _clock(case: Case, dataset: xr.Dataset) -> Finding | None:
     if not ratios or np.median(ratios) < SMOOTHER:
         return None
     name = Path(str(dataset.attrs["path"])).name
-    return Finding(
+    return CheckFinding(
         "clock",
         "time",
         0.99,

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..case import Case
+from ..case import CheckCase
 from ..finding import Kind
 from ..reading import Reading
 
@@ -16,7 +16,7 @@ LEAST = 0.02
 """[rad] Zeros nearer than this are a matter of calibration, and explained by a centre of mass as well."""
 
 
-def readings(case: Case) -> list[Reading]:
+def readings(case: CheckCase) -> list[Reading]:
     """Each rotary joint's zero where torque goes best with it; sliding joints feel none."""
     found = []
     for j in case.doubtful:
@@ -34,7 +34,7 @@ def readings(case: Case) -> list[Reading]:
     return found
 
 
-def _best(case: Case, j: int) -> float:
+def _best(case: CheckCase, j: int) -> float:
     """Zero of a joint [rad] by the evidence without bounds: the best of a circle, then of ever finer steps."""
 
     def value(offset: float) -> float:

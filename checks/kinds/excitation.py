@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from ..case import Case
-from ..finding import Finding, Kind
+from ..case import CheckCase
+from ..finding import CheckFinding, Kind
 
 TRAVEL = 30.0
 """A joint that moves less than this many times its encoder's noise says nothing of its friction or inertia."""
 
 
-def find(case: Case) -> list[Finding]:
+def find(case: CheckCase) -> list[CheckFinding]:
     """Joints that stand in every recording, and recordings in which none of them moves."""
     found = []
     for c, joint in enumerate(case.joints):
@@ -18,7 +18,7 @@ def find(case: Case) -> list[Finding]:
             far = max(travel for travel, _ in seen)
             unit = "m" if case.tree.joints[c].kind == "prismatic" else "rad"
             found.append(
-                Finding(
+                CheckFinding(
                     "excitation",
                     joint,
                     0.99,

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..case import Case
+from ..case import CheckCase
 from ..finding import Kind
 from ..reading import Reading
 
@@ -10,7 +10,7 @@ EARTH = 9.80665
 """[m/s²]"""
 
 
-def readings(case: Case) -> list[Reading]:
+def readings(case: CheckCase) -> list[Reading]:
     """Gravity along each axis, none, and along the direction that goes best with the torques."""
     given = case.tree.gravity
     size = float(np.linalg.norm(given)) or EARTH
@@ -27,13 +27,13 @@ def readings(case: Case) -> list[Reading]:
     return found
 
 
-def _pulled(case: Case, gravity: np.ndarray, words: str) -> Reading:
+def _pulled(case: CheckCase, gravity: np.ndarray, words: str) -> Reading:
     line = f"gravity = [{', '.join(f'{x + 0.0:.4g}' if x % 1 else f'{x + 0.0:.1f}' for x in gravity)}]"
     text = f"{words} ({', '.join(f'{x + 0.0:.3g}' for x in gravity)}) m/s²"
     return case.reading("gravity", ["gravity"], text, [line]).but(gravity=gravity)
 
 
-def _fitted(case: Case, size: float) -> np.ndarray | None:
+def _fitted(case: CheckCase, size: float) -> np.ndarray | None:
     """Direction of least squares, torque being linear in gravity; beside what friction is proportional to."""
     body, s = case.grounds.body, case.samples
     none = np.zeros(3)

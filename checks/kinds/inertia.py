@@ -3,17 +3,19 @@
 import numpy as np
 
 from ...models.inertia import to_central
-from ..case import Case
-from ..finding import Finding, Kind
+from ..case import CheckCase
+from ..finding import CheckFinding, Kind
 
 REACH = 3.0
 """Radius of gyration, in lengths of the whole robot, from which on an inertia belongs to another unit."""
 
 
-def find(case: Case) -> list[Finding]:
+def find(case: CheckCase) -> list[CheckFinding]:
     """Links whose inertia was mended, and links whose radius of gyration is larger than the robot."""
     found = [
-        Finding("inertia", note.partition("'")[2].partition("'")[0], 0.99, note, 'inertia_fix = "nearest"', fault=False)
+        CheckFinding(
+            "inertia", note.partition("'")[2].partition("'")[0], 0.99, note, 'inertia_fix = "nearest"', fault=False
+        )
         for note in case.tree.notes
         if note.startswith("inertia_fix: ")
     ]
@@ -25,7 +27,7 @@ def find(case: Case) -> list[Finding]:
         radius = float(np.sqrt(max(np.trace(inertia), 0.0) / (2 * mass)))
         if radius > REACH * reach:
             found.append(
-                Finding(
+                CheckFinding(
                     "inertia",
                     link.name,
                     0.99,

@@ -6,8 +6,8 @@ import numpy as np
 import xarray as xr
 from scipy.ndimage import median_filter
 
-from ..case import Case
-from ..finding import Finding, Kind
+from ..case import CheckCase
+from ..finding import CheckFinding, Kind
 
 TIMES = 12.0
 """A step this many times what positions do about it is none that a drive makes: joints have inertia."""
@@ -19,7 +19,7 @@ ABOUT = 10
 """Steps to either side that a step is held against."""
 
 
-def find(case: Case) -> list[Finding]:
+def find(case: CheckCase) -> list[CheckFinding]:
     """Jumps of each recording, by joint: where, how far, and that they stay."""
     found = []
     for dataset in case.datasets:
@@ -69,12 +69,12 @@ def _largest_about(size: np.ndarray) -> np.ndarray:
     return np.max(np.delete(windows, [ABOUT - 1, ABOUT, ABOUT + 1], axis=1), axis=1)
 
 
-def _finding(case: Case, dataset: xr.Dataset, name: str, at: float, far: float) -> Finding:
+def _finding(case: CheckCase, dataset: xr.Dataset, name: str, at: float, far: float) -> CheckFinding:
     joint = case.tree.joints[case.joints.index(name.partition(".")[2])]
     unit = "m" if joint.kind == "prismatic" else "rad"
     later = np.asarray(dataset["time"].values, float)
     after = float(later[later > at][0])
-    return Finding(
+    return CheckFinding(
         "jump",
         name,
         0.99,

@@ -8,10 +8,10 @@ from typing import TypeAlias
 import numpy as np
 
 from ...models.inertia import to_central
-from ..case import Case
+from ..case import CheckCase
 from ..compete import ODDS, SURE
-from ..evidence import GAIN, WAYS, Fitted
-from ..finding import Finding, Kind
+from ..evidence import GAIN, WAYS, ReadingFit
+from ..finding import CheckFinding, Kind
 from ..reading import as_read
 
 WORSE = 1.5
@@ -26,7 +26,7 @@ Columns: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
-class Apart:
+class OwnValue:
     """What may have another value in every recording.
 
     ``what`` and ``at`` say it; ``columns`` (n, J, k) are torques, of amplitudes whose standard deviation is ``width``;
@@ -40,14 +40,14 @@ class Apart:
     columns: np.ndarray
     width: float
     words: Callable[[np.ndarray], str]
-    own: Callable[[Fitted], np.ndarray] | None = None
+    own: Callable[[ReadingFit], np.ndarray] | None = None
 
     def count(self, runs: int) -> int:
         """Recordings that have amplitudes of their own."""
         return runs if self.own is None else runs - 1
 
 
-def find(case: Case) -> list[Finding]:
+def find(case: CheckCase) -> list[CheckFinding]:
     """Links whose mass properties, torques whose gain, and encoders whose zero are not the same in all recordings.
 
     Friction and biases may differ from day to day; they are fitted for each recording in both.
@@ -75,7 +75,7 @@ def find(case: Case) -> list[Finding]:
     which = "is the one that differs" if runs > 2 else "is further from the model's own"
     values = "; ".join(f"{best.words(x)} in {name}" for x, name in zip(each, names, strict=True))
     return [
-        Finding(
+        CheckFinding(
             "mixed",
             best.at,
             float(1 / (1 + np.exp(-min(log_odds, 50.0)))),
@@ -87,7 +87,7 @@ def find(case: Case) -> list[Finding]:
     ]
 
 
-def _candidates(case: Case) -> Iterator[Apart]:
+def _candidates(case: CheckCase) -> Iterator[OwnValue]:
     """All that may differ: of links, of torques, of encoders."""
     samples, tree, body = case.samples, case.tree, case.grounds.body
     regressor = body.regressor(samples.q, samples.qd, samples.qdd)
@@ -95,7 +95,7 @@ def _candidates(case: Case) -> Iterator[Apart]:
     inertial, modelled = regressor @ spread, regressor @ tree.phi
     for k, link in enumerate(tree.links):
         part, rows = slice(WAYS * k, WAYS * k + WAYS), slice(10 * k, 10 * k + 10)
-        yield Apart(
+        yield OwnValue(
             f"the mass properties of {link.name}",
             link.name,
             inertial[:, :, part],
@@ -107,7 +107,7 @@ def _candidates(case: Case) -> Iterator[Apart]:
     for c, joint in enumerate(case.joints):
         column, gain = np.zeros((*samples.q.shape, 1)), WAYS * (len(tree.links) + c + 1) - 1
         column[:, c, 0] = modelled[:, c]
-        yield Apart(
+        yield OwnValue(
             f"the gain of tau.{joint}",
             f"tau.{joint}",
             column,
@@ -116,7 +116,7 @@ def _candidates(case: Case) -> Iterator[Apart]:
             lambda fit, gain=gain: fit.parameters[[gain]] * GAIN / OTHER_GAIN,
         )
         unit = "m" if tree.joints[c].kind == "prismatic" else "rad"
-        yield Apart(
+        yield OwnValue(
             f"the zero of q.{joint}",
             f"q.{joint}",
             slope[:, :, [c]],
@@ -132,7 +132,7 @@ def _masses(phi: np.ndarray) -> str:
     return f"{mass:.3g} kg about ({', '.join(f'{x:.3g}' for x in com)}) m"
 
 
-def _apart(case: Case, daily: Columns, what: Apart) -> Fitted:
+def _apart(case: CheckCase, daily: Columns, what: OwnValue) -> ReadingFit:
     """Fit of one arm that has another value of something in every recording."""
     run = case.samples.run
     own = np.unique(run)[-what.count(len(case.experiments)) :]
@@ -147,12 +147,12 @@ def _apart(case: Case, daily: Columns, what: Apart) -> Fitted:
     return case.grounds.fit(as_read(len(case.joints)), beside)
 
 
-def _costs(what: Apart, runs: int) -> float:
+def _costs(what: OwnValue, runs: int) -> float:
     """What evidence counts against numbers that were fitted for each recording."""
     return 0.5 * what.columns.shape[2] * what.count(runs) * float(np.log(10.0))
 
 
-def _each(fit: Fitted, what: Apart, runs: int) -> np.ndarray:
+def _each(fit: ReadingFit, what: OwnValue, runs: int) -> np.ndarray:
     """Amplitudes of each recording (runs, k) as differences to the model's own."""
     k, count = what.columns.shape[2], what.count(runs)
     differ = fit.parameters[-k * count :].reshape(count, k)

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from ..case import Case
-from ..finding import Finding, Kind
+from ..case import CheckCase
+from ..finding import CheckFinding, Kind
 from ..reading import as_read
 
 LEAST = 0.005
@@ -17,7 +17,7 @@ REST = 0.3
 """Share of samples that must stand below the level: the model is fitted to those."""
 
 
-def find(case: Case) -> list[Finding]:
+def find(case: CheckCase) -> list[CheckFinding]:
     """Channels of which samples stand at one largest value while the model, fitted to the others, goes beyond it.
 
     A drive that is at its limit delivers that torque, and the motion shows it: the model then agrees.
@@ -48,7 +48,7 @@ def find(case: Case) -> list[Finding]:
             f"others goes {np.mean(over):.3g} beyond on average: the channel is cut off there{limit}"
         )
         mend = f'limits = {{ "tau.{joint}" = {level:.6g} }}'
-        found.append(Finding("saturation", f"tau.{joint}", 0.97, text, mend))
+        found.append(CheckFinding("saturation", f"tau.{joint}", 0.97, text, mend))
     return found
 
 

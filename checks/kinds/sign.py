@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from ..case import Case
+from ..case import CheckCase
 from ..finding import Kind
 from ..reading import Reading
 
 
-def readings(case: Case) -> list[Reading]:
+def readings(case: CheckCase) -> list[Reading]:
     """Each torque reversed, each encoder, and all torques together."""
     n, found = len(case.joints), []
     for j in case.doubtful:

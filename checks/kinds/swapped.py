@@ -4,12 +4,12 @@ from itertools import combinations
 
 import numpy as np
 
-from ..case import Case
+from ..case import CheckCase
 from ..finding import Kind
 from ..reading import Reading
 
 
-def readings(case: Case) -> list[Reading]:
+def readings(case: CheckCase) -> list[Reading]:
     """Every pair of joints of one kind: their positions, their torques, or both."""
     found = []
     for a, b in combinations(case.doubtful, 2):

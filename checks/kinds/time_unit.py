@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..case import Case
+from ..case import CheckCase
 from ..finding import Kind
 from ..reading import Reading
 
@@ -17,7 +17,7 @@ _USUAL, _DECADES = 5e-3, 1.0
 """Period [s] at which robots are sampled, and its spread in decades: prior of a reading's own period."""
 
 
-def readings(case: Case) -> list[Reading]:
+def readings(case: CheckCase) -> list[Reading]:
     """All time stamps times each factor; and what was in seconds, divided where [signals] has a unit."""
     period = float(np.median([e.motion.period for e in case.experiments]))
     given = case.model.signals.get("time")

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..case import Case
+from ..case import CheckCase
 from ..finding import Kind
 from ..reading import Reading
 
@@ -23,7 +23,7 @@ APART = 4.0
 """Least factor, either way, by which a torque of unknown unit must be off: less may be a gain or wrong masses."""
 
 
-def readings(case: Case) -> list[Reading]:
+def readings(case: CheckCase) -> list[Reading]:
     """One column, or all of a kind, times each factor that people mistake; and one torque, or all, times any."""
     joints, n = case.tree.joints, len(case.joints)
     found: list[Reading] = []
@@ -46,7 +46,7 @@ def _table(family: str, kind: str) -> tuple[tuple[float, str, str], ...]:
     return (_MOMENTS if kind == "revolute" else _FORCES) + _POWERS
 
 
-def _scaled(case: Case, family: str, group: tuple[int, ...], factor: float, unit: str, words: str) -> Reading:
+def _scaled(case: CheckCase, family: str, group: tuple[int, ...], factor: float, unit: str, words: str) -> Reading:
     names = [f"{family}.{case.joints[j]}" for j in group]
     mends = [case.mends.scaled(name, factor, unit) for name in names]
     what = names[0] if len(names) == 1 else f"{family} of all {len(names)} joints"
@@ -56,7 +56,7 @@ def _scaled(case: Case, family: str, group: tuple[int, ...], factor: float, unit
     return made.but(factor=scale) if family == "q" else made.but(torque_factor=scale)
 
 
-def _any_factor(case: Case) -> list[Reading]:
+def _any_factor(case: CheckCase) -> list[Reading]:
     """Torques times what brings them nearest to the rigid body's: currents, or torques before a gear."""
     regressor = case.grounds.body.regressor(case.samples.q, case.samples.qd, case.samples.qdd)
     own, tau = regressor @ case.tree.phi, case.samples.tau

@@ -7,13 +7,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..diagnosis import Diagnosis, Estimate, Location, Moved, Step, Trace
+from ..diagnosis import Diagnosis, Estimate, Location, ParameterShift, Step, Trace
 from ..sources.answer import candidates, channel_fits, estimates, finding, limits, not_confirmed, rms
-from ..sources.decide import Decided
-from ..sources.source import At, Linear
+from ..sources.decide import Decision
+from ..sources.source import Linearisation, ModelPoint
 from ..sources.weigh import covariances
 from ..wording import foremost, named
-from .recording import EVERY, Record, unit_of
+from .recording import EVERY, DockingRecording, unit_of
 from .runs import SHIFTS
 from .source import Dockings
 
@@ -26,7 +26,7 @@ LEAST = 0.01
 """Share of what changed below which a channel is not listed."""
 
 
-def report_on(source: Dockings, name: str, decided: Decided, seconds: float) -> Diagnosis:
+def report_on(source: Dockings, name: str, decided: Decision, seconds: float) -> Diagnosis:
     """Put everything into words and numbers; ``name`` is the model's."""
     found, best, records = decided.found, decided.best, source.records
     own, locked = ([records[i] for i in some] for some in (source.train, source.held))
@@ -66,7 +66,9 @@ def report_on(source: Dockings, name: str, decided: Decided, seconds: float) -> 
     )  # fmt: skip
 
 
-def _worst(records: Sequence[Record], without: Linear, within: Linear, size: Array) -> tuple[float, float, str, str]:
+def _worst(
+    records: Sequence[DockingRecording], without: Linearisation, within: Linearisation, size: Array
+) -> tuple[float, float, str, str]:
     """RMS without and with an effect, unit and name of the channel that misses it most."""
     a, b = rms(without), rms(within)
     c = int(np.argmax((a - b) / size))
@@ -79,8 +81,8 @@ def _size(value: float, unit: str) -> str:
     return f"{factor * value:.3g} {word}"
 
 
-def _steps(decided: Decided, sizes: tuple[Array, Array]) -> tuple[Step, ...]:
-    def line(label: str, *fits: Linear) -> Step:
+def _steps(decided: Decision, sizes: tuple[Array, Array]) -> tuple[Step, ...]:
+    def line(label: str, *fits: Linearisation) -> Step:
         return Step(label, *(float(np.sqrt(np.mean((rms(x) / s) ** 2))) for x, s in zip(fits, sizes, strict=True)))
 
     lines = [line("model as given", decided.found.first, decided.before)]
@@ -90,17 +92,17 @@ def _steps(decided: Decided, sizes: tuple[Array, Array]) -> tuple[Step, ...]:
     return tuple(lines)
 
 
-def _moved(given: At, values: dict[str, dict[str, Estimate]]) -> tuple[Moved, ...]:
+def _moved(given: ModelPoint, values: dict[str, dict[str, Estimate]]) -> tuple[ParameterShift, ...]:
     before = given.all_values
     return tuple(
-        Moved(f"{key}.{name}", e.unit, before[f"{key}.{name}"], e.value, e.std)
+        ParameterShift(f"{key}.{name}", e.unit, before[f"{key}.{name}"], e.value, e.std)
         for key, own in values.items()
         for name, e in own.items()
         if f"{key}.{name}" in before
     )
 
 
-def _locations(record: Record, decided: Decided) -> tuple[Location, ...]:
+def _locations(record: DockingRecording, decided: Decision) -> tuple[Location, ...]:
     """Channels by the share of what the names changed, or of what is left, each in units of its noise."""
     first, last, found = decided.found.first, decided.best.train, decided.found
     named_any = len(last.at.placed) > len(first.at.placed)
@@ -124,7 +126,7 @@ def _locations(record: Record, decided: Decided) -> tuple[Location, ...]:
     return tuple(made)
 
 
-def _windows(record: Record, change: Array) -> tuple[tuple[float, float], ...]:
+def _windows(record: DockingRecording, change: Array) -> tuple[tuple[float, float], ...]:
     """Half seconds that hold the strongest half of a change, neighbours merged."""
     size = round(0.5 / EVERY)
     energy = np.bincount(np.arange(len(change)) // size, change**2)
@@ -140,9 +142,11 @@ def _windows(record: Record, change: Array) -> tuple[tuple[float, float], ...]:
     return tuple((round(float(a + record.zero), 3), round(float(b + record.zero), 3)) for a, b in spans[:MOST_WINDOWS])
 
 
-def _traces(train: Sequence[Record], held: Sequence[Record], decided: Decided) -> tuple[Trace, ...]:
+def _traces(
+    train: Sequence[DockingRecording], held: Sequence[DockingRecording], decided: Decision
+) -> tuple[Trace, ...]:
     made = []
-    sets: tuple[tuple[Literal["train", "holdout"], Sequence[Record], Linear, Linear], ...] = (
+    sets: tuple[tuple[Literal["train", "holdout"], Sequence[DockingRecording], Linearisation, Linearisation], ...] = (
         ("train", train, decided.found.first, decided.best.train),
         ("holdout", held, decided.before, decided.best.held),
     )

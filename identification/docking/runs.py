@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ...errors import InputError
-from ...models.docking.bench import DockingBench, Motion, numbers_of
+from ...models.docking.bench import DockingBench, DockingCommand, numbers_of
 from ...models.docking.bench_setup import MACHINED, REGISTRATION, TOLERANCES, BenchSetup
 from ...models.dormand_prince import StepFault
-from .recording import Record
+from .recording import DockingRecording
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
@@ -27,10 +27,10 @@ def _bench() -> DockingBench:
     return DockingBench()
 
 
-class Runs:
+class DockingRuns:
     """Simulations of some docking tests."""
 
-    def __init__(self, setup: BenchSetup, records: Sequence[Record]) -> None:
+    def __init__(self, setup: BenchSetup, records: Sequence[DockingRecording]) -> None:
         """Start nothing yet."""
         self.setup, self.records = setup, tuple(records)
         self._said = numbers_of(setup)
@@ -65,7 +65,7 @@ class Runs:
         return self._known[key]
 
 
-def _registered(motion: Motion, off: Array) -> Motion:
+def _registered(motion: DockingCommand, off: Array) -> DockingCommand:
     """The same from where the end effector truly was, the pose measured being off by so much [m, rad]."""
     if not off.any():
         return motion

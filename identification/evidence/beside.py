@@ -7,14 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..deciding import BASELINE, BASELINE_OWN, BASELINE_SHAPE, BENDS, DISCREPANCY, LAW_ERROR
-from ..fitting.assembly import Assembly
+from ..fitting.assembly import TorqueModel
 from ..fitting.experiment import Experiment
 from ..fitting.fit import Fit
 from ..fitting.problem import gather
 from ..nuisance.curve import SMALL
 from ..search.refit import carry
-from .hypotheses import Along, Curves, coordinate, lagging, remembers
-from .pool import Columns
+from .hypotheses import ColumnSource, Curves, coordinate, lagging, remembers
+from .pool import CandidateColumns
 
 Array = NDArray[np.float64]
 Part = tuple[NDArray[np.int_], Array]
@@ -22,7 +22,7 @@ Part = tuple[NDArray[np.int_], Array]
 
 
 @dataclass(frozen=True)
-class Beside:
+class NuisanceColumns:
     """``parts[i][c]`` of recording i and channel c; ``tolerant``: where the masses' tolerance stands, one part each."""
 
     parts: list[list[Part]]
@@ -41,8 +41,12 @@ class Beside:
 
 
 def beside(
-    along: Along, found: Fit, by_words: Curves, columns: Columns, nameless: Mapping[tuple[int, str], float]
-) -> Beside:
+    along: ColumnSource,
+    found: Fit,
+    by_words: Curves,
+    columns: CandidateColumns,
+    nameless: Mapping[tuple[int, str], float],
+) -> NuisanceColumns:
     """All of it for some recordings under a fit; ``nameless`` curves have a size of their own."""
     assembly, n, n_channels = found.assembly, along.n_train, len(along.scale)
     blocks = [assembly.residual(e, found.theta)[1] for e in along.instruments]
@@ -83,7 +87,7 @@ def beside(
                 row[c].append((count + np.arange(2), columns.some(i, c, item.index) * size))
         count += 2
     joined = [[_joined(own) for own in row] for row in parts]
-    return Beside(joined, count, tolerant, baseline)
+    return NuisanceColumns(joined, count, tolerant, baseline)
 
 
 def _small(found: Fit, baseline: Sequence[Sequence[Part]], scale: Array) -> dict[tuple[int, str], float]:
@@ -129,13 +133,13 @@ def _spread(found: Fit, baseline: Sequence[Sequence[Part]], scale: Array) -> Arr
     return np.where(_shapes(found.assembly), np.minimum(spread, BASELINE_SHAPE * own), spread)
 
 
-def _shapes(assembly: Assembly) -> NDArray[np.bool_]:
+def _shapes(assembly: TorqueModel) -> NDArray[np.bool_]:
     """Parameters that the torque is not linear in (P,)."""
     shapes = {(p.effect.name, p.at, x.name) for p in assembly.placed for x in p.effect.parameters if x.grid}
     return np.array([(s.effect, s.at, s.name) in shapes for s in assembly.slots], bool)
 
 
-def inertial_part(assembly: Assembly) -> Array:
+def inertial_part(assembly: TorqueModel) -> Array:
     """The unit of every link's inertial parameters (10 L,): its mass, that times its reach, and times its square.
 
     The reach is the radius of gyration about the link's frame, √(trace(I) / m).

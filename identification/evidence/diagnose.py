@@ -8,20 +8,20 @@ from ...models.model import Model
 from ..deciding import SECOND_CHOICES
 from ..fitting.base_parameters import BaseParameters
 from ..fitting.experiment import Experiment, Scales
-from .confirm import Confirmed, confirm
-from .found import Name
-from .left import LeftOver, left_over
+from .confirm import ArmConfirmation, confirm
+from .found import ArmNaming
+from .left import NamelessParts, left_over
 from .rounds import search
 
 
 @dataclass(frozen=True)
-class Decided:
+class ArmDecision:
     """What the recordings say: names confirmed on the held-out ones, what is left without a name, and names that the
     held-out recordings did not confirm."""
 
-    best: Confirmed
-    left: LeftOver
-    rejected: tuple[Name, ...]
+    best: ArmConfirmation
+    left: NamelessParts
+    rejected: tuple[ArmNaming, ...]
 
     @property
     def verdict(self) -> Literal["missing_physics", "unknown_effect", "adequate"]:
@@ -41,7 +41,7 @@ def decide(
     *,
     progress: Callable[[str], None] = lambda _: None,
     seed: int = 0,
-) -> Decided:
+) -> ArmDecision:
     """Name what a model leaves out.
 
     Parameters
@@ -71,4 +71,4 @@ def decide(
         rejected |= {n.placed.key: n for n in last.rejected}
         if last.foretold.density > best.foretold.density:
             best = last
-    return Decided(best, left_over(best, scales, train, held, rejected), tuple(rejected.values()))
+    return ArmDecision(best, left_over(best, scales, train, held, rejected), tuple(rejected.values()))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..nuisance.covariance import Covariance
-from .pool import Columns, Hypothesis, Item
+from .pool import CandidateColumns, Hypothesis, Item
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int_]
@@ -25,7 +25,7 @@ AT_ONCE = 512
 
 
 @dataclass(frozen=True)
-class Channel:
+class ResidualChannel:
     """One channel of one recording: residual (n,), its covariance, and what always stands beside it: positions (p,)
     among all such parameters, and columns (n, p) in units of their prior deviation."""
 
@@ -51,7 +51,7 @@ class Products:
 
 
 @dataclass(frozen=True)
-class Alike:
+class ItemStack:
     """Items of the same number of columns k, side by side: their numbers (N,), columns and spreads (N, k), signs."""
 
     numbers: Index
@@ -62,7 +62,7 @@ class Alike:
 
 
 class Evidence:
-    """Products of all columns over every recording; `Projected` sums some of them.
+    """Products of all columns over every recording; `ProjectedEvidence` sums some of them.
 
     Parameters
     ----------
@@ -76,7 +76,11 @@ class Evidence:
     """
 
     def __init__(
-        self, channels: Sequence[Sequence[Channel]], columns: Columns, items: Sequence[Item], n_always: int
+        self,
+        channels: Sequence[Sequence[ResidualChannel]],
+        columns: CandidateColumns,
+        items: Sequence[Item],
+        n_always: int,
     ) -> None:
         """Work the products out, one channel after the other."""
         self.channels = [list(row) for row in channels]
@@ -92,13 +96,13 @@ class Evidence:
         by: dict[tuple[int, bool], list[int]] = {}
         for number, item in enumerate(self.items):
             by.setdefault((len(item.index), item.whole), []).append(number)
-        self.alike: list[Alike] = []
+        self.alike: list[ItemStack] = []
         for (_, whole), numbers in by.items():
             rows = [self.items[x] for x in numbers]
             index, spread, positive = (
                 np.stack(x) for x in zip(*((r.index, r.spread, r.positive) for r in rows), strict=True)
             )
-            self.alike.append(Alike(np.array(numbers), index, spread, positive, whole))
+            self.alike.append(ItemStack(np.array(numbers), index, spread, positive, whole))
         self._own: dict[tuple[int, int], list[tuple[Index, Array]]] = {}
         self._rows: dict[tuple[int, int, int], Array] = {}
 

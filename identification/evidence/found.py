@@ -6,25 +6,25 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.model import Model, Placed
+from ...models.model import Model, PlacedEffect
 from ..fitting.experiment import Experiment
 from ..fitting.fit import Fit
-from .arm import Weighed
+from .arm import WeighedRecordings
 from .rival import RivalOdds
-from .search import Search, Slot
+from .search import MemberOdds, Search
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Name:
+class ArmNaming:
     """An effect that the search named.
 
     ``gain`` is its log Bayes factor on the training recordings, ``share`` its posterior share among all that could
     stand in its place.
     """
 
-    placed: Placed
+    placed: PlacedEffect
     channels: tuple[int, ...]
     gain: float
     share: float
@@ -44,33 +44,33 @@ class Remainder:
 
 
 @dataclass(frozen=True)
-class Trial:
+class ArmTrial:
     """What one effect at one place explains by itself on top of the baseline: share of the residual energy of its
     channels [0 to 1], and log posterior odds; ``smallest`` holds, by parameter, what would have been named."""
 
-    placed: Placed
+    placed: PlacedEffect
     explained: float
     odds: float
     smallest: Mapping[str, float]
 
 
 @dataclass(frozen=True)
-class Found:
+class ArmSelection:
     """Baseline fit, model with all that was named and its fit, and the recordings as they were weighed."""
 
     first: Fit
     model: Model
     fit: Fit
-    names: tuple[Name, ...]
-    trials: tuple[Trial, ...]
+    names: tuple[ArmNaming, ...]
+    trials: tuple[ArmTrial, ...]
     """Before anything was found ..."""
-    closing: tuple[Trial, ...]
+    closing: tuple[ArmTrial, ...]
     """... and beside all that was."""
-    opening: Weighed
+    opening: WeighedRecordings
     """The recordings under the first fit ..."""
-    weighed: Weighed
+    weighed: WeighedRecordings
     """... and under the last."""
-    slots: tuple[Slot, ...]
+    slots: tuple[MemberOdds, ...]
     """Of the last search."""
     search: Search
     instruments: tuple[Experiment, ...]

@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 
 from ..deciding import DISCREPANCY, GATE
 from ..fitting.experiment import Experiment, Scales
-from ..nuisance.bursts import Bursts, Left, bursts
+from ..nuisance.bursts import Bursts, ChannelResidual, bursts
 from .arm import weigh
-from .confirm import Confirmed, blocks, scatter
-from .found import Found, Remainder
+from .confirm import ArmConfirmation, blocks, scatter
+from .found import ArmSelection, Remainder
 from .members import Members
-from .projected import Projected
+from .projected import ProjectedEvidence
 from .rounds import share_of_residual
 from .tolerant import searched
 
@@ -21,18 +21,18 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class LeftOver:
+class NamelessParts:
     """Nameless curves, and bursts by channel."""
 
     curves: tuple[Remainder, ...]
     bursts: Mapping[int, Bursts]
 
 
-def remainders(found: Found, train: Sequence[Experiment], held: Sequence[Experiment]) -> tuple[Remainder, ...]:
+def remainders(found: ArmSelection, train: Sequence[Experiment], held: Sequence[Experiment]) -> tuple[Remainder, ...]:
     """Nameless curves of the last search that the held-out recordings confirm."""
     n, search, slots = len(train), found.search, found.slots
     evidence = search.on.evidence
-    both = Projected(evidence, range(n + len(held)), found.weighed.beside.weight(found.tolerance))
+    both = ProjectedEvidence(evidence, range(n + len(held)), found.weighed.beside.weight(found.tolerance))
 
     def beside(some: Sequence[int]) -> tuple[float, Array]:
         taken = [(slots[k].taken.item, slots[k].taken.size) for k in some]
@@ -75,12 +75,12 @@ def remainders(found: Found, train: Sequence[Experiment], held: Sequence[Experim
 
 
 def left_over(
-    best: Confirmed,
+    best: ArmConfirmation,
     scales: Mapping[str, Scales],
     train: Sequence[Experiment],
     held: Sequence[Experiment],
     barred: Collection[str],
-) -> LeftOver:
+) -> NamelessParts:
     """What the confirmed model still leaves."""
     if best.rejected:
         n = len(train)
@@ -90,10 +90,10 @@ def left_over(
             weighed, range(n), barred, {c for x in best.rejected for c in x.channels}
         )
         best = replace(best, found=replace(own, weighed=weighed, search=made, slots=tuple(slots), tolerance=tolerance))
-    return LeftOver(remainders(best.found, train, held), _bursts(best.found, train))
+    return NamelessParts(remainders(best.found, train, held), _bursts(best.found, train))
 
 
-def _bursts(found: Found, train: Sequence[Experiment]) -> dict[int, Bursts]:
+def _bursts(found: ArmSelection, train: Sequence[Experiment]) -> dict[int, Bursts]:
     """Of every channel of the training recordings, beside all that was found.
 
     On a suspension or a floating base every joint moves what carries the others, which rings as it likes: nothing is
@@ -114,7 +114,9 @@ def _bursts(found: Found, train: Sequence[Experiment]) -> dict[int, Bursts]:
             for item, amplitudes in mean:
                 left = left - evidence.contribution(i, c, evidence.items[item], amplitudes)
             step = e.motion.period * e.motion.thinning
-            parts.append(Left(left, left * own.covariance.solve(left), found.weighed.runs[i][c].settles == 0, step))
+            parts.append(
+                ChannelResidual(left, left * own.covariance.solve(left), found.weighed.runs[i][c].settles == 0, step)
+            )
         one = bursts(parts)
         if one is not None:
             told[c] = one

@@ -9,7 +9,7 @@ from scipy.special import log_ndtr
 
 from .. import deciding
 from ..deciding import WHOLE
-from .projected import Projected
+from .projected import ProjectedEvidence
 
 Array = NDArray[np.float64]
 
@@ -22,7 +22,7 @@ class Members:
     A law without amplitudes has its prior about one, and a small spread.
     """
 
-    def __init__(self, on: Projected, taken: Sequence[tuple[int, float]] = ()) -> None:
+    def __init__(self, on: ProjectedEvidence, taken: Sequence[tuple[int, float]] = ()) -> None:
         """``taken``: (number of the item, size)."""
         self.on, self.taken = on, tuple(taken)
         self.value = 0.0

@@ -10,12 +10,12 @@ from ..diagnosis import ChannelFit, Diagnosis, Finding, Location, Step
 from ..fitting.experiment import Experiment
 from ..search.locate import locate
 from ..sources.answer import candidates, channel_fits, limits, rms, with_found
-from .diagnose import Compared
+from .diagnose import EncoderComparison
 from .findings import findings_of, length, nameless, noise_floor, notes_of, traces_of, unit_of
 from .source import Links
 
 
-def with_links(diagnosis: Diagnosis, model: Model, one: Compared) -> tuple[Diagnosis, Model]:
+def with_links(diagnosis: Diagnosis, model: Model, one: EncoderComparison) -> tuple[Diagnosis, Model]:
     """One answer from the torques' diagnosis and the encoders'.
 
     Effects are ordered by the share of its own channel's misfit that each kind of channel was told by what is named:
@@ -79,7 +79,7 @@ def _told(fits: Sequence[ChannelFit]) -> list[float]:
     return [max(0.0, 1 - (f.holdout.rms_after / max(f.holdout.rms_before, 1e-300)) ** 2) for f in fits]
 
 
-def _fits(one: Compared) -> tuple[ChannelFit, ...]:
+def _fits(one: EncoderComparison) -> tuple[ChannelFit, ...]:
     links, every = one.links, range(len(one.links.joints))
     sizes = _readings(links, links.train), _readings(links, links.held)
     units, floors = [unit_of(links, c) for c in every], [noise_floor(links, c) for c in every]
@@ -120,7 +120,7 @@ def _sentence(moving: Sequence[Finding], offsets: Sequence[Finding], fits: Seque
     )
 
 
-def _location(diagnosis: Diagnosis, one: Compared, fits: Sequence[ChannelFit]) -> tuple[Location, ...]:
+def _location(diagnosis: Diagnosis, one: EncoderComparison, fits: Sequence[ChannelFit]) -> tuple[Location, ...]:
     """Channels by the share of their own misfit that is told; torques and encoders have no unit in common."""
     told = dict(zip((f.channel for f in diagnosis.fit), _told(diagnosis.fit), strict=True))
     places = [(told[p.channel], p) for p in diagnosis.location if told.get(p.channel, 0.0) > 0]
@@ -142,7 +142,7 @@ def _location(diagnosis: Diagnosis, one: Compared, fits: Sequence[ChannelFit]) -
     return tuple(replace(p, share=float(share / total) * (1 - 1e-12)) for share, p in places)
 
 
-def _steps(one: Compared) -> list[Step]:
+def _steps(one: EncoderComparison) -> list[Step]:
     """Relative misfit of the encoders, each effect's name added at all its joints at once."""
     sizes = [_readings(one.links, numbers) for numbers in (one.links.train, one.links.held)]
     return [

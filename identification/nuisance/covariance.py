@@ -23,7 +23,7 @@ ROOT6 = np.sqrt(6.0)
 
 
 @dataclass(frozen=True)
-class Remembering:
+class FirstOrderNoise:
     """A process of first order: standard deviation ``level``, one number or one a sample (n,), and correlation
     ``time`` [s]."""
 
@@ -50,7 +50,7 @@ class Covariance:
     def __init__(
         self,
         variance: Array,
-        processes: Sequence[Remembering],
+        processes: Sequence[FirstOrderNoise],
         derivative: Array | None,
         step: float,
         segments: Sequence[slice],

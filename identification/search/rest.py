@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..fitting.assembly import Assembly
+from ..fitting.assembly import TorqueModel
 from ..fitting.experiment import Bridge, Experiment
 
 Array = NDArray[np.float64]
@@ -74,7 +74,7 @@ def _bridge(experiment: Experiment, rest: Mask) -> Bridge:
     return Bridge(*(np.concatenate(x) for x in zip(*parts, strict=True)))
 
 
-def fitted(assembly: Assembly, experiments: Sequence[Experiment]) -> list[Experiment]:
+def fitted(assembly: TorqueModel, experiments: Sequence[Experiment]) -> list[Experiment]:
     """What a model is fitted to: samples near rest count where it has a law for what happens there."""
     whole = {assembly.joint_of(p) for p in assembly.placed if p.effect.at_rest}
     creeping = {assembly.joint_of(p) for p in assembly.placed if p.effect.exceeds_at_rest}

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from ..diagnosis import Location
 from .channels import channels, modelled
 from .comparison import QUARTER
-from .recording import Capture
-from .search import Searched
+from .recording import CaptureRecording
+from .search import CaptureSelection
 
 Array = NDArray[np.float64]
 
@@ -21,7 +21,7 @@ TOUCH, STANDS_OUT = 0.5, 8.0
 MOST_WINDOWS = 6
 
 
-def locate_capture(found: Searched, train: Sequence[Capture]) -> tuple[Location, ...]:
+def locate_capture(found: CaptureSelection, train: Sequence[CaptureRecording]) -> tuple[Location, ...]:
     """Channels of the first capture by the share of their own energy that is explained, or left without a name."""
     entries = []
     capture, before, after = train[0], found.first.tracks[0], found.last.tracks[0]
@@ -48,7 +48,7 @@ def locate_capture(found: Searched, train: Sequence[Capture]) -> tuple[Location,
     return tuple(made)
 
 
-def _touch(capture: Capture) -> float:
+def _touch(capture: CaptureRecording) -> float:
     """When a force first stands out of its start [s]; not a number without a sensor or a contact."""
     for body, force in capture.measured.force.items():
         size = np.linalg.norm(np.nan_to_num(force), axis=1)

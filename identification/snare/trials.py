@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.model import Model, Placed
+from ...models.model import Model, PlacedEffect
 from .comparison import Blocks, price, variances
-from .fit import Fit, evaluate, fit, step_from, with_slopes
+from .fit import CaptureFit, evaluate, fit, step_from, with_slopes
 from .handles import bounds, handle_of, steps, values_of
 from .library import absent
-from .recording import Capture
+from .recording import CaptureRecording
 from .sets import CaptureSet
 
 Array = NDArray[np.float64]
@@ -30,14 +30,14 @@ FORESIGHT = 4.0
 
 
 @dataclass(frozen=True)
-class Trial:
+class CaptureTrial:
     """A candidate beside what was there: its fit, and the share of the weighted residual energy that it explains.
 
     ``score`` is the likelihood gained less the price of a parameter.
     """
 
-    placed: Placed
-    fit: Fit
+    placed: PlacedEffect
+    fit: CaptureFit
     score: float
     explained: float
 
@@ -45,11 +45,11 @@ class Trial:
 def try_all(
     model: Model,
     captures: CaptureSet,
-    found: Fit,
-    candidates: Sequence[Placed],
+    found: CaptureFit,
+    candidates: Sequence[PlacedEffect],
     rejected: Collection[str],
     progress: Callable[[str], None],
-) -> tuple[Trial, ...]:
+) -> tuple[CaptureTrial, ...]:
     """Try all candidates beside a fit, and fit the best few; best foreseen first.
 
     Parameters
@@ -81,11 +81,11 @@ def try_all(
             progress(f"fitting {p.effect.name} at {p.at} together with what is there")
             best = _joint(captures, found, [f for f in tries if f.residuals], absent(model, p))
         score = float(best.likelihood - found.likelihood - price(found.residuals))
-        trials.append(Trial(p, best, score, _explained(captures.captures, found, best)))
+        trials.append(CaptureTrial(p, best, score, _explained(captures.captures, found, best)))
     return tuple(trials)
 
 
-def _joint(captures: CaptureSet, found: Fit, tried: Sequence[Fit], nothing: float) -> Fit:
+def _joint(captures: CaptureSet, found: CaptureFit, tried: Sequence[CaptureFit], nothing: float) -> CaptureFit:
     """Fit a candidate with everything, from the best of its tries and of four more on either side of that.
 
     Its first derivative is the secant to the nearest of them, or to its absence, where its handle is at ``nothing``:
@@ -116,12 +116,14 @@ def _joint(captures: CaptureSet, found: Fit, tried: Sequence[Fit], nothing: floa
     return fit(captures, here)
 
 
-def _most_hopeful(captures: Sequence[Capture], found: Fit, tries: Sequence[Fit]) -> tuple[float, Fit]:
+def _most_hopeful(
+    captures: Sequence[CaptureRecording], found: CaptureFit, tries: Sequence[CaptureFit]
+) -> tuple[float, CaptureFit]:
     """The try that is foreseen to reach the most of L, after that."""
     return max(((_foreseen(captures, found, f)[0], f) for f in tries), key=lambda e: e[0])
 
 
-def _foreseen(captures: Sequence[Capture], found: Fit, there: Fit) -> tuple[float, Array]:
+def _foreseen(captures: Sequence[CaptureRecording], found: CaptureFit, there: CaptureFit) -> tuple[float, Array]:
     """L of a try once the parameters that were there move as their derivatives allow, and where they then stand."""
     if not np.isfinite(there.likelihood) or not len(found.x):
         return there.likelihood, found.x
@@ -130,7 +132,7 @@ def _foreseen(captures: Sequence[Capture], found: Fit, there: Fit) -> tuple[floa
     return float(there.likelihood + gain), found.x + move
 
 
-def _explained(captures: Sequence[Capture], found: Fit, there: Fit) -> float:
+def _explained(captures: Sequence[CaptureRecording], found: CaptureFit, there: CaptureFit) -> float:
     """Share of the residual energy that is gone, each block by its own scale before."""
     if not there.residuals:
         return 0.0

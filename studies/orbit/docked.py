@@ -3,7 +3,7 @@
 import numpy as np
 
 from ...cosim.docked import (
-    Docked,
+    DockingRun,
     ball_shares,
     docked_of,
     energies,
@@ -16,10 +16,10 @@ from ...cosim.docked import (
 from ...models.docking.parameters import PRELOAD_WINDOW, DockingParameters
 from ..outcome import Quantity
 
-__all__ = ["Docked", "docked_of", "energies", "is_latched", "mean_wrist", "measure", "momentum_drift"]
+__all__ = ["DockingRun", "docked_of", "energies", "is_latched", "mean_wrist", "measure", "momentum_drift"]
 
 
-def measure(d: Docked, p: DockingParameters, soft: float, spent: float) -> list[Quantity]:
+def measure(d: DockingRun, p: DockingParameters, soft: float, spent: float) -> list[Quantity]:
     """The numbers after the soft capture; ``soft`` and ``spent`` are the processor times of both runs [s]."""
     latched, _ = is_latched(d, p)
     ends = [begin for state, begin, _ in d.whole.phases if state == "LATCHED"]

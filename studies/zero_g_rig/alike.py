@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import subspace_angles
 
-from ...identification.fitting.assembly import Assembly
+from ...identification.fitting.assembly import TorqueModel
 from ...identification.fitting.experiment import Experiment
 from ...identification.fitting.fit import Fit
-from ...models.model import Placed
+from ...models.model import PlacedEffect
 
 Array = NDArray[np.float64]
 
@@ -24,7 +24,7 @@ WEAK = 1e-6
 
 
 @dataclass(frozen=True)
-class Alike:
+class StandIns:
     """How well other explanations stand in for one.
 
     Parameters
@@ -42,10 +42,10 @@ class Alike:
     mimicked: float
 
 
-def columns(base: Fit, placed: Sequence[Placed], experiments: Sequence[Experiment], noise: Array) -> Array:
+def columns(base: Fit, placed: Sequence[PlacedEffect], experiments: Sequence[Experiment], noise: Array) -> Array:
     """Torque per parameter of an explanation (n_band * J, P), from where friction alone was fitted."""
     values = base.assembly.values(base.theta)
-    assembly = Assembly(base.assembly.tree, placed, None, base.assembly.scales, values)
+    assembly = TorqueModel(base.assembly.tree, placed, None, base.assembly.scales, values)
     return _stacked(assembly, assembly.start, experiments, noise)
 
 
@@ -55,8 +55,8 @@ def friction_columns(base: Fit, experiments: Sequence[Experiment], noise: Array)
 
 
 def compare(
-    base: Fit, named: Mapping[str, Sequence[Placed]], experiments: Sequence[Experiment], noise: Array
-) -> list[Alike]:
+    base: Fit, named: Mapping[str, Sequence[PlacedEffect]], experiments: Sequence[Experiment], noise: Array
+) -> list[StandIns]:
     """Every ordered pair of explanations.
 
     Parameters
@@ -81,11 +81,11 @@ def compare(
             if a != b:
                 angle = float(np.degrees(np.min(subspace_angles(bases[a], basis))))
                 taken = float(np.sum((basis.T @ own) ** 2) / np.sum(own**2))
-                found.append(Alike(a, b, angle, taken))
+                found.append(StandIns(a, b, angle, taken))
     return found
 
 
-def _stacked(assembly: Assembly, theta: Array, experiments: Sequence[Experiment], noise: Array) -> Array:
+def _stacked(assembly: TorqueModel, theta: Array, experiments: Sequence[Experiment], noise: Array) -> Array:
     parts = []
     for experiment in experiments:
         _, blocks = assembly.residual(experiment, theta)

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from ...identification.diagnosis import Diagnosis
 from ...models.effects import get_effect
-from ...models.model import Placed, places
+from ...models.model import PlacedEffect, places
 from ...models.rig.rig import Rig
-from .alike import Alike, compare
+from .alike import StandIns, compare
 from .study import Friction
 
 Array = NDArray[np.float64]
@@ -44,15 +44,15 @@ def suspected_boom(rig: Rig, found: Diagnosis) -> str:
     return [*named, *(c.at for c in tried), *places(get_effect(torsion), rig)][0]
 
 
-def explanations(rig: Rig, boom: str) -> dict[str, list[Placed]]:
+def explanations(rig: Rig, boom: str) -> dict[str, list[PlacedEffect]]:
     """Explanations of what is left on joints 2 and 6, each with the parameters that would be free.
 
     ``boom`` is the link that may be twisted.
     """
 
-    def placed(name: str, at: str, *free: str) -> Placed:
+    def placed(name: str, at: str, *free: str) -> PlacedEffect:
         effect = get_effect(name)
-        return Placed(effect, at, tuple(p.name for p in effect.parameters if p.name not in free))
+        return PlacedEffect(effect, at, tuple(p.name for p in effect.parameters if p.name not in free))
 
     last = rig.links[-1].name
     return {
@@ -63,7 +63,7 @@ def explanations(rig: Rig, boom: str) -> dict[str, list[Placed]]:
     }
 
 
-def tell_apart(rig: Rig, friction: Friction, boom: str) -> list[Alike]:
+def tell_apart(rig: Rig, friction: Friction, boom: str) -> list[StandIns]:
     """Every pair of explanations, and what all but the first can do together, with and without measurements."""
     named = explanations(rig, boom)
     others = {name: placed for name, placed in named.items() if name != TWIST}
@@ -79,7 +79,7 @@ def after(some: Sequence[str]) -> str:
     return f"{TOGETHER}, with {' and '.join(some)}"
 
 
-def alike_in_words(pairs: Sequence[Alike]) -> list[str]:
+def alike_in_words(pairs: Sequence[StandIns]) -> list[str]:
     """One sentence a pair of single explanations that is hard to tell apart, worst first."""
     hard = [p for p in pairs if p.mimicked > ALIKE and TOGETHER not in p.name + p.other]
     return [
@@ -89,7 +89,7 @@ def alike_in_words(pairs: Sequence[Alike]) -> list[str]:
     ]
 
 
-def remedy(pairs: Sequence[Alike], boom: str) -> str:
+def remedy(pairs: Sequence[StandIns], boom: str) -> str:
     """What torques and joint angles alone could not have settled, and the fewest measurements that would."""
     taken = {p.other: p.mimicked for p in pairs if p.name == TWIST}
     shares = ", ".join(f"{100 * taken[other]:.0f} % by {other}" for other in (TENSION, PAYLOAD, DRIFT))

@@ -77,7 +77,7 @@ DURATION = 190.0
 
 
 @dataclass(frozen=True)
-class Joints:
+class JointMoves:
     """Moves as a motion: time [s] (n,) to position and rate, each (n, 7) [rad, rad/s], zero at the start."""
 
     moves: Sequence[Move]

@@ -9,7 +9,7 @@ import pytest
 
 import snarelab
 from snarelab.models.effects import get_effect
-from snarelab.models.model import Placed
+from snarelab.models.model import PlacedEffect
 from snarelab.models.model_file import load_model
 from snarelab.studies import cart, tx40
 
@@ -38,7 +38,7 @@ def test_the_coupled_wrist_of_a_tx40_is_what_its_makers_say(halves):
     """Friction and rotor of motor 6 load joints 5 and 6; without them both joints' errors are twice and more."""
     model = load_model(tx40.HERE / "tx40" / "tx40.toml")
     laws = ("viscous_friction", "coulomb_friction", "rotor_inertia")
-    tied = replace(model, effects=(*model.effects, *(Placed(get_effect(name), "motor6") for name in laws)))
+    tied = replace(model, effects=(*model.effects, *(PlacedEffect(get_effect(name), "motor6") for name in laws)))
     alone = snarelab.identify(model, halves[0], holdout=halves[1])
     found = snarelab.identify(tied, halves[0], holdout=halves[1])
     assert found.published["checks"] == []

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from snarelab.cosim.iteration import Iteration
-from snarelab.cosim.macro_step import Taken
+from snarelab.cosim.macro_step import AcceptedStep
 from snarelab.cosim.master import Master
 from snarelab.cosim.participants.oscillator import LeftOscillator, RightOscillator
 from snarelab.cosim.step_control import StepControl
@@ -79,7 +79,7 @@ def test_the_largest_magnitude_so_far_is_kept():
     """-3 N at first; once 6 N were passed, a miss of 1.2 N is a fifth."""
     one = master(hold="constant", control=StepControl(0.1))
     for change in (9.0, -5.0):
-        one._step.remember(Taken(outputs(one, right_force=change), 0.1, None))
+        one._step.remember(AcceptedStep(outputs(one, right_force=change), 0.1, None))
     assert one.value("right.force") == pytest.approx(1.0)
     assert one._step._error(outputs(one, right_force=1.2), 0.1) == pytest.approx(1.2 / 6.0 / 0.1)
 
@@ -89,7 +89,7 @@ def test_what_is_foretold_follows_the_hold_through_the_last_points():
     for hold, foretold in (("constant", 5.0), ("linear", 11.0), ("midpoint", 11.0), ("quadratic", 15.0)):
         one = master(hold=hold, iterate=True)
         for change in (2.0, 6.0):
-            one._step.remember(Taken(outputs(one, right_force=change), 0.1, None))
+            one._step.remember(AcceptedStep(outputs(one, right_force=change), 0.1, None))
         at = one.system.layout.outputs.index("right.force")
         assert one._step._predicted(0.1)[at] == pytest.approx(foretold)
         assert one._step._predicted(0.1)[one.system.layout.outputs.index("left.x")] == pytest.approx(1.0)

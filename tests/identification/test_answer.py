@@ -11,10 +11,10 @@ from small_answers import MODEL, NAMES, experiment, fit
 
 from snarelab.identification import answer
 from snarelab.identification.diagnosis import ChannelFit, Finding, Misfit, Step
-from snarelab.identification.evidence.confirm import Missed
-from snarelab.identification.evidence.diagnose import Decided
-from snarelab.identification.evidence.found import Name, Remainder, Trial
-from snarelab.identification.evidence.left import LeftOver
+from snarelab.identification.evidence.confirm import ArmLoss
+from snarelab.identification.evidence.diagnose import ArmDecision
+from snarelab.identification.evidence.found import ArmNaming, ArmTrial, Remainder
+from snarelab.identification.evidence.left import NamelessParts
 from snarelab.identification.evidence.rival import RivalOdds
 from snarelab.identification.nuisance.bursts import Bursts
 from snarelab.identification.nuisance.noise import Noise
@@ -24,21 +24,21 @@ QUIET = Noise(0.1, 0.2, 0.3, 0.4, 8.0, 0.5)
 HEARD = "0.1 N·m from sample to sample, 0.2 N·m over 0.3 s, a wander of 0.4 N·m over 8 s and 5 N·m of the encoders"
 
 
-def name(effect, share=0.5, gain=30.0, rivals=(), channels=(0,)) -> Name:
-    return Name(effect, channels, gain, share, tuple(RivalOdds(*r) for r in rivals))
+def name(effect, share=0.5, gain=30.0, rivals=(), channels=(0,)) -> ArmNaming:
+    return ArmNaming(effect, channels, gain, share, tuple(RivalOdds(*r) for r in rivals))
 
 
-def trial(effect, explained=0.5, odds=3.0, smallest=()) -> Trial:
-    return Trial(effect, explained, odds, dict(smallest))
+def trial(effect, explained=0.5, odds=3.0, smallest=()) -> ArmTrial:
+    return ArmTrial(effect, explained, odds, dict(smallest))
 
 
 def curve(channel, over, explained) -> Remainder:
     return Remainder(channel, over, 20.0, explained, 3.0)
 
 
-def decided(*, names=(), rest=(), bursting=(), rejected=(), missed=None, **found) -> Decided:
+def decided(*, names=(), rest=(), bursting=(), rejected=(), missed=None, **found) -> ArmDecision:
     best: Any = SimpleNamespace(names=tuple(names), missed=missed or {}, found=SimpleNamespace(**found))
-    return Decided(best, LeftOver(tuple(rest), dict(bursting)), tuple(rejected))
+    return ArmDecision(best, NamelessParts(tuple(rest), dict(bursting)), tuple(rejected))
 
 
 @pytest.fixture
@@ -200,7 +200,7 @@ def found(monkeypatch, right, share, rivals) -> Finding:
     final = fit([1, 2, 3], std=[0.1, 0.2, 0.3], at_bound=np.array([True, False, True]),
                 assembly={"slots": slots, "index_of": lambda p: [1, 2]})  # fmt: skip
     own = name(COULOMB, share, rivals=rivals, channels=(2, 0))
-    told = decided(names=[own], missed={COULOMB.key: Missed(5.0, 2.0, 0.08, (0.02, 0.08), 0.9375, cast(Any, None))})
+    told = decided(names=[own], missed={COULOMB.key: ArmLoss(5.0, 2.0, 0.08, (0.02, 0.08), 0.9375, cast(Any, None))})
     return answer._finding(own, told, final, ["tau.a", "tau.b", "tau.c"])
 
 

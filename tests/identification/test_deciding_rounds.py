@@ -9,7 +9,7 @@ from snarelab.identification import deciding
 from snarelab.identification.evidence import diagnose as deciding_all
 from snarelab.identification.evidence import rounds
 from snarelab.models.effects import get_effect
-from snarelab.models.model import Placed
+from snarelab.models.model import PlacedEffect
 
 
 def searching(monkeypatch, rounds_with_news: int) -> tuple[int, set[float]]:
@@ -22,7 +22,9 @@ def searching(monkeypatch, rounds_with_news: int) -> tuple[int, set[float]]:
 
     slot = SimpleNamespace(gain=10.0, taken=SimpleNamespace(hypothesis=0))
     made = SimpleNamespace(members=lambda _: SimpleNamespace(value=20.0), scan=lambda _: SimpleNamespace(odds=[1.0]))
-    weighed = SimpleNamespace(noises=(), pool=[SimpleNamespace(named=True, label=Placed(get_effect("backlash"), "a"))])
+    weighed = SimpleNamespace(
+        noises=(), pool=[SimpleNamespace(named=True, label=PlacedEffect(get_effect("backlash"), "a"))]
+    )
     left = iter([[slot]] * rounds_with_news + [[]] * 99)
     model: Any = SimpleNamespace(with_effects=lambda *_: model)
     stubs: dict[str, Any] = {

@@ -16,8 +16,8 @@ from tolerance_toy import toy_results, toy_study
 from proof.page import write_page as write_proof
 from proof.score import score
 from proof.seal import Seal
-from snarelab.fmu.description import About
-from snarelab.fmu.equations import Variable
+from snarelab.fmu.description import ModelInfo
+from snarelab.fmu.equations import ModelVariable
 from snarelab.fmu.page import page as fmu_page
 from snarelab.identification.diagnosis import Diagnosis, FrictionCurve
 from snarelab.identification.report.page import write_report
@@ -53,11 +53,13 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         sections = [Section("Motion", ["What moves."], [picture()])]
         study = write_page("demo", "Test", "It moves.", QUANTITIES, sections, moving().html(1.0)).resolve()
     variables = (
-        Variable("torque", "input", "N*m", 0.0, "torque of the motor"),
-        Variable("stiffness", "parameter", "N*m/rad", 5400.0, "of the spring", 0.0),
-        Variable("speed", "output", "rad/s", 0.0, "of the link"),
+        ModelVariable("torque", "input", "N*m", 0.0, "torque of the motor"),
+        ModelVariable("stiffness", "parameter", "N*m/rad", 5400.0, "of the spring", 0.0),
+        ModelVariable("speed", "output", "rad/s", 0.0, "of the link"),
     )
-    about = About("elastic_joint", "joint", "A joint on a spring", "0", 0.001, 1.0, True, False, False, True, "joint.c")
+    about = ModelInfo(
+        "elastic_joint", "joint", "A joint on a spring", "0", 0.001, 1.0, True, False, False, True, "joint.c"
+    )
     (folder / "fmu.html").write_text(fmu_page(about, variables, 3), encoding="utf-8")
     captures = toy_results(folder / "captures", toy_study(folder))
     summarise(toy_study(folder), captures)

@@ -9,7 +9,7 @@ import pytest
 
 from snarelab.errors import InputError
 from snarelab.studies import bam, bam_naming, bam_servo
-from snarelab.studies.bam_naming import START, Fitted, Tried, best, evolve, fit, name_missing, rms
+from snarelab.studies.bam_naming import START, LawTrial, ServoFit, best, evolve, fit, name_missing, rms
 from snarelab.studies.bam_servo import DUTY, GRAVITY, ServoRun, position_error, read_run, simulate
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -143,8 +143,8 @@ def test_steps_are_fine_enough(recorded, monkeypatch):
 
 def tried(name, parameters, score, *foretold):
     """A law with so many parameters, that explains a half."""
-    return Tried(
-        name, Fitted(dict.fromkeys(map(str, range(parameters)), 0.0), 0.1), 0.5, dict(enumerate(foretold)), score
+    return LawTrial(
+        name, ServoFit(dict.fromkeys(map(str, range(parameters)), 0.0), 0.1), 0.5, dict(enumerate(foretold)), score
     )
 
 
