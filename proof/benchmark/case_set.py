@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from snarelab.models.model_file import load_model
 
-from ..drives.make import make
+from ..drives.make import make as drives
+from ..played.make import make as played
 from ..rival_columns import baseline, fixed, low_pass, read
 from ..rivals import Task
 from .rules import rules, vocabulary
@@ -68,7 +69,10 @@ class CaseSet:
         return json.loads(path.read_text(encoding="utf-8"))
 
 
-def export(folder: Path, seed: int, count: int, tell: Tell = print) -> CaseSet:
+GENERATORS = {"drives": drives, "played": played}
+
+
+def export(folder: Path, seed: int, count: int, tell: Tell = print, generator: str = "drives") -> CaseSet:
     """Draw cases and write them without answers.
 
     Parameters
@@ -76,9 +80,11 @@ def export(folder: Path, seed: int, count: int, tell: Tell = print) -> CaseSet:
     folder : Path
         New or empty, or an export of the same seed and count that was stopped, which goes on.
     seed, count : int
-        Of `proof.drives`, and how many.
+        Of the generator, and how many.
     tell : callable
         Told of each case.
+    generator : "drives" or "played"
+        Who draws them.
 
     Raises
     ------
@@ -86,7 +92,7 @@ def export(folder: Path, seed: int, count: int, tell: Tell = print) -> CaseSet:
         ``folder`` holds another set.
     """
     made = CaseSet(folder)
-    drawn = make(made.truth_folder / "drawn", seed, count, tell=tell)
+    drawn = GENERATORS[generator](made.truth_folder / "drawn", seed, count, tell=tell)
     mark = folder / "set.json"
     if mark.exists() and json.loads(mark.read_text())["cases"] != [path.name for path in drawn]:
         raise ValueError(f"{folder} holds another set of cases; give another folder")

@@ -16,6 +16,7 @@ def main(words: Sequence[str]) -> int:
     exporting.add_argument("folder", type=Path, metavar="DIR")
     exporting.add_argument("--seed", type=int, required=True)
     exporting.add_argument("--cases", type=int, default=150)
+    exporting.add_argument("--generator", choices=("drives", "played"), default="drives")
     answering = commands.add_parser("answer", help="worked examples: answer them with a method that is here")
     answering.add_argument("folder", type=Path, metavar="DIR")
     answering.add_argument("--method", choices=("snarelab", "joint_bic"), required=True)
@@ -43,7 +44,7 @@ def _do(given: argparse.Namespace) -> None:
 
     cases = CaseSet(given.folder)
     if given.command == "export":
-        export(given.folder, given.seed, given.cases, tell)
+        export(given.folder, given.seed, given.cases, tell, given.generator)
     elif given.command == "answer":
         from .methods import answer
 
