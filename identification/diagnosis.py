@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .checks.finding import CheckFinding
+from .verdict import Verdict
 
 Array = NDArray[np.float64]
 
@@ -261,7 +262,7 @@ class Diagnosis:
         What stands for physics without a name; in the model beside all that has one.
     """
 
-    verdict: Literal["data_fault", "missing_physics", "adequate", "unknown_effect"]
+    verdict: Verdict
     sentence: str
     description: str
     model: str
