@@ -30,7 +30,7 @@ class CompiledLoop:
     calls : sequence of CompiledCalls
         Of every participant, in order.
     layout : Layout
-    plan : Plan
+    plan : SweepPlan
     size : float
         Macro step [s].
 

@@ -25,7 +25,7 @@ class DockingRun:
     Parameters
     ----------
     whole : WholeRun
-    capture : Capture
+    capture : OrbitCapture
         Its frames; ``tip`` is the carriage's, on which the rings are, ``pin`` the pin's foot.
     travel, motor, tension : array (n,)
         Of the carriage [m], its motor's force [N], and the largest force of a cable on its ring [N].

@@ -62,7 +62,7 @@ def arm_equations(
         The model's tree on its base, and the tip; inputs and outputs ``mount`` where a floating one has a mount.
     stiff : bool or None
         Linearly implicit integrator; None: where friction or hidden states are faster than 1 ms.
-    servo : Servo or None
+    servo : ServoGains or None
         Adds inputs ``servo`` and ``target.<joint>`` to the drive torques.
     start : sequence of float or None
         Default joint positions at the start (J,) [rad or m]; None: zero.

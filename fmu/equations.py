@@ -61,7 +61,7 @@ class Equations:
         A C identifier.
     description : str
         One sentence.
-    variables : tuple of Variable
+    variables : tuple of ModelVariable
         Inputs, then parameters, then outputs.
     functions : mapping of str to casadi.Function
         ``initial`` (t, u, p), ``output`` (t, x, u, p), ``derivative`` (t, x, u, p, du, dp) and ``rate`` or ``advance``;

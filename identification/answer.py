@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..models.floating.tree import channel
 from ..models.model import Model
+from ..report.words import percent
 from .diagnosis import (
     Candidate,
     ChannelFit,
@@ -29,7 +30,7 @@ from .fitting.fit import Fit, channel_rms
 from .fitting.floating_terms import momentum_floor
 from .reliability import of_name
 from .search.locate import locate
-from .wording import evidence_sentence, experiment_sentence, foremost, listed, noise_words, percent, verdict_sentence
+from .wording import evidence_sentence, experiment_sentence, foremost, listed, noise_words, verdict_sentence
 
 Array = NDArray[np.float64]
 
@@ -48,7 +49,7 @@ def report_on(
     ----------
     model : Model
         Baseline.
-    decided : Decided
+    decided : ArmDecision
         Verdict, names, nameless curves, and what was not confirmed.
     final : Fit
         With the confirmed effects.

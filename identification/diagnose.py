@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ..checks.run import early_checks, run_checks
 from ..models.docking.bench_setup import DockingTree
 from ..models.effects import effects
 from ..models.hidden_state import prepare
@@ -14,6 +13,7 @@ from ..models.model import Model
 from ..models.rigid_body import RigidBody
 from ..models.snare.setup import SnareTree
 from .answer import report_on
+from .checks.run import early_checks, run_checks
 from .data_fault import contradict, data_fault
 from .diagnosis import Diagnosis, Step
 from .empirical import empirical_laws

@@ -7,7 +7,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks.finding import CheckFinding
+from .checks.finding import CheckFinding
+from .verdict import Verdict
 
 Array = NDArray[np.float64]
 
@@ -243,7 +244,7 @@ class Diagnosis:
         Baseline first, then one line an effect added.
     candidates : tuple of Candidate
         Each effect at each place by itself on top of the model as given, best first.
-    moved : tuple of Moved
+    moved : tuple of ParameterShift
     traces : tuple of Trace
     limits : tuple of Limit
         What would have been seen, had it been there.
@@ -261,7 +262,7 @@ class Diagnosis:
         What stands for physics without a name; in the model beside all that has one.
     """
 
-    verdict: Literal["data_fault", "missing_physics", "adequate", "unknown_effect"]
+    verdict: Verdict
     sentence: str
     description: str
     model: str

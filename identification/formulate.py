@@ -16,6 +16,7 @@ from ..errors import InputError
 from ..models.empirical import NAME, table_values, tables_of
 from ..models.model import Model
 from ..models.table import Table
+from ..report.words import percent
 
 Array = NDArray[np.float64]
 
@@ -113,9 +114,9 @@ class FormulaChoice:
         """What the command prints."""
         lines = [
             f"{NAME} at {self.at} over {self.table.words}:",
-            f"  {self.best.words(self.table)}   {100 * self.best.share:.1f} % of it",
+            f"  {self.best.words(self.table)}   {percent(self.best.share, 3)} of it",
         ]
-        lines += [f"  or, within its error: {r.words(self.table)}   {100 * r.share:.1f} %" for r in self.rivals]
+        lines += [f"  or, within its error: {r.words(self.table)}   {percent(r.share, 3)}" for r in self.rivals]
         return "\n".join(lines)
 
 

@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..checks.finding import CheckFinding
-from ..checks.run import early_checks, run_checks
 from ..errors import InputError
 from ..models.docking.bench_setup import DockingTree
 from ..models.floating.tree import channel
@@ -16,6 +14,8 @@ from ..models.inertia import Array
 from ..models.model import Model
 from ..models.rigid_body import RigidBody
 from ..models.snare.setup import SnareTree
+from .checks.finding import CheckFinding
+from .checks.run import early_checks, run_checks
 from .fitting.assembly import TorqueModel
 from .fitting.base_parameters import INERTIAL, BaseParameters, base_parameters
 from .fitting.consistent_inertia import ConsistentInertia, consistent_inertia

@@ -14,7 +14,7 @@ def parameter_list(placed: Sequence[PlacedEffect], made: Mapping[str, Mapping[st
 
     Parameters
     ----------
-    placed : sequence of Placed
+    placed : sequence of PlacedEffect
     made : mapping
         Estimates by the effects' keys, then by parameter.
     """

@@ -6,18 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..models.model import PlacedEffect
+from ..report.words import chance, percent, words
 from .diagnosis import ChannelFit, Finding
 from .nuisance.noise import Noise
-from .report.words import chance, words
 
 LIKELY = 0.5
 """Probability [1] from which an effect is said to be there; below it, another explanation is likelier."""
-
-
-def percent(share: float, digits: int = 2) -> str:
-    """A share (0 to 1) in per cent, to so many digits below a hundred."""
-    value = 100 * share
-    return f"{value:.{digits}g} %" if abs(value) < 10 else f"{value:.{digits - 2}f} %"
 
 
 def from_to(before: float, after: float) -> str:

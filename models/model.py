@@ -54,7 +54,7 @@ class Model:
         ``free_floating_arm``, whose first six joints carry the base; a `SnareTree` without joints for
         ``snare_capture``, a `DockingTree` for ``docking``.
     inertia : "fixed" or "free"
-    effects : tuple of Placed
+    effects : tuple of PlacedEffect
         Physics that the model has, one entry a place.
     signals : mapping of str to Signal
         Where a recording with columns of its own has each signal.

@@ -162,6 +162,7 @@ def table(
     """A table of markup cells; the first of each row is its header, columns in ``numeric`` stand to the right."""
 
     def cells(row: Sequence[str], tag: str, scope: str) -> str:
+        row = [cell.replace(" %", "\u202f%") for cell in row]
         return "".join(
             f'<th scope="{scope}"{_class("n" if i in numeric else "")}>{cell}</th>'
             if (tag == "th" and cell) or i == 0
@@ -184,7 +185,7 @@ def figure(svg: bytes, alternative: str, caption: str, small: bool = False, zoom
         f'<figure><div class="plate{" small" if small else ""}">'
         f'<div class="plot"{time_axes(svg)}><img src="data:image/svg+xml;base64,{data}" alt="{escape(alternative)}">'
         f"</div></div>{zoom}"
-        f"<figcaption>{escape(caption)}</figcaption></figure>\n"
+        f"<figcaption>{_kept(caption)}</figcaption></figure>\n"
     )
 
 
@@ -198,7 +199,7 @@ def bar(share: float, text: str) -> str:
     width = 100 * min(max(share, 0.0), 1.0) if share == share else 0.0
     return (
         f'<span class="share"><span class="bar" aria-hidden="true"><i style="width:{width:.1f}%"></i></span>'
-        f"{escape(text)}</span>"
+        f"{_kept(text)}</span>"
     )
 
 

@@ -52,7 +52,7 @@ def snare_scene(seen: SceneData, parameters: SnareParameters) -> Playback:
 
     Parameters
     ----------
-    seen : Seen
+    seen : SceneData
     parameters : SnareParameters
     """
     scene, times, p = Playback(), seen.times, parameters

@@ -23,6 +23,7 @@ from ..models.model_file import load_model
 from ..models.model_write import save_model
 from ..recordings import find_recording
 from ..recordings.find import SHA256
+from ..report.words import percent
 from .bam_figures import explained, positions
 from .bam_naming import START, LawTrial, Round, ServoFit, Values, fit, name_missing, rms
 from .bam_servo import DUTY, MOTOR, ServoRun, position_error, read_run
@@ -99,7 +100,7 @@ def sentence(base: ServoFit, named: Sequence[LawTrial], held: Sequence[ServoRun]
     names = " and ".join(t.name.replace("_", " ") for t in named)
     return (
         f"The model leaves out {names}. With that added, the position error at the gain that the fit never saw falls "
-        f"from {1e3 * before:.1f} to {1e3 * after:.1f} mrad, by {100 * (1 - after / before):.0f} %."
+        f"from {1e3 * before:.1f} to {1e3 * after:.1f} mrad, by {percent(1 - after / before)}."
     )
 
 
@@ -193,8 +194,8 @@ def sections(
         if t.foretold and not (rounds[0].named and t.name == rounds[0].named.name):
             worst = min(t.foretold, key=lambda gain: t.foretold[gain])
             words.append(
-                f"{t.name.replace('_', ' ').capitalize()} explains {100 * t.explained:.0f} % of what is fitted; at "
-                f"gain {worst:.0f}, foretold from the others, {100 * t.foretold[worst]:.0f} %; score {t.score:.0f}."
+                f"{t.name.replace('_', ' ').capitalize()} explains {percent(t.explained)} of what is fitted; at "
+                f"gain {worst:.0f}, foretold from the others, {percent(t.foretold[worst])}; score {t.score:.0f}."
             )
     if rounds[0].named:
         words.append(

@@ -166,7 +166,7 @@ def name_missing(
     ----------
     runs : sequence of ServoRun
         Training recordings, of several controller gains.
-    base : Fitted
+    base : ServoFit
     progress : callable
         Told in a few words what is under way.
     """

@@ -32,6 +32,7 @@ from ..models.floating.plant import FloatingPlant, PlantRun
 from ..models.inertia import Array, to_central
 from ..report.drawing import AFTER, BEFORE, MEASURED, drawing, line, margins, svg
 from ..report.playback import Playback
+from ..report.words import percent
 from .outcome import Quantity, table, write_result
 from .page import Picture, Section, write_page
 
@@ -60,7 +61,7 @@ def main() -> int:
     found = (
         f"Six joints that move by up to 0.6 rad turn the base at up to {1e3 * n['peak_base_rate']:.2f}·10⁻³ rad/s, "
         f"in proportion to the servo's bandwidth (here {OMEGA:g} rad/s); leaving the base's motion out would put the "
-        f"tip's velocity wrong by {100 * n['tip_error_without_base']:.1f} %."
+        f"tip's velocity wrong by {percent(n['tip_error_without_base'])}."
     )
     write_page(STUDY, "ETS-VII, six joints, base floating", found, quantities, _sections(arm, run), _playback(arm, run))
     path = write_result(STUDY, quantities, time.monotonic() - begun, {"found": found, "published_as_is": True})

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...fmu.archive import open_fmu
+from ...fmi.archive import open_fmu
 from ...scratch import scratch_folder
 from ..fmi_calls import CompiledCalls, Instance, Vector, address
 from ..fmi_variables import FmiVariable, read_interface

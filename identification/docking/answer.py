@@ -59,7 +59,7 @@ def report_on(source: Dockings, name: str, decided: Decision, seconds: float) ->
     notes.append(f"numbers of the set-up moved within their tolerances, in deviations: {shifts or 'none by one'}")
     notes.append(f"{source.count} dockings were simulated in {seconds:.0f} s")
     return Diagnosis(
-        "missing_physics" if findings else "adequate", sentence, "", name, tuple(findings),
+        decided.verdict, sentence, "", name, tuple(findings),
         _locations(own[0], decided), fits, _steps(decided, sizes), candidates(decided),
         _moved(decided.given, values), _traces(own, locked, decided), limits(source, decided), tuple(notes), BAND,
         foremost=worst.channel,

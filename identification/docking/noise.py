@@ -43,8 +43,8 @@ def hangs(
 
     Parameters
     ----------
-    records : sequence of Record
-    linear : Linear
+    records : sequence of DockingRecording
+    linear : Linearisation
         Their residuals.
     could : sequence of sequence of array (n, k)
         What could explain each channel's of each.

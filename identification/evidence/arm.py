@@ -86,7 +86,7 @@ def weigh(
     scales : mapping of str to Scales
     noises : sequence of Noise or None
         Of each channel; None learns them from the training recordings.
-    runs : lists of Run, optional
+    runs : lists of NoiseChannel, optional
         What the noise of every channel hangs on, as another fit has it: two models are compared under one noise.
     search : bool
         False leaves out all hypotheses: only the evidence of the fit itself is wanted.

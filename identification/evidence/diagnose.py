@@ -2,12 +2,12 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 from ...models.model import Model
 from ..deciding import SECOND_CHOICES
 from ..fitting.base_parameters import BaseParameters
 from ..fitting.experiment import Experiment, Scales
+from ..verdict import Verdict, verdict
 from .confirm import ArmConfirmation, confirm
 from .found import ArmNaming
 from .left import NamelessParts, left_over
@@ -24,12 +24,9 @@ class ArmDecision:
     rejected: tuple[ArmNaming, ...]
 
     @property
-    def verdict(self) -> Literal["missing_physics", "unknown_effect", "adequate"]:
-        """By what is named and what is left."""
-        if self.best.names:
-            return "missing_physics"
-        nameless = self.left.curves or any(b.again for b in self.left.bursts.values())
-        return "unknown_effect" if nameless else "adequate"
+    def verdict(self) -> Verdict:
+        """By what is named, and by curves and bursts without a name; a burst that came once is no law."""
+        return verdict(self.best.names, [*self.left.curves, *(b for b in self.left.bursts.values() if b.again)])
 
 
 def decide(

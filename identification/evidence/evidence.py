@@ -66,9 +66,9 @@ class Evidence:
 
     Parameters
     ----------
-    channels : sequence of sequences of Channel
+    channels : sequence of sequences of ResidualChannel
         Of recording i and channel c.
-    columns : Columns
+    columns : CandidateColumns
     items : sequence of Item
         Every hypothesis at every shape.
     n_always : int

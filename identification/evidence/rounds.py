@@ -49,7 +49,7 @@ def search(
     scales : mapping of str to Scales
     train, held : sequence of Experiment
         What is searched; and what is weighed beside it, but not looked at before the confirmation.
-    before : Found, optional
+    before : ArmSelection, optional
         An earlier search of the same: its baseline, noise and first columns are not worked out again.
     barred : collection of str
         Keys of effects that must not be named.

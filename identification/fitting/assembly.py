@@ -83,7 +83,7 @@ class TorqueModel:
     Parameters
     ----------
     tree : Tree
-    placed : sequence of Placed
+    placed : sequence of PlacedEffect
         Effects and where they act.
     base : BaseParameters or None
         Identified base inertial parameters; None trusts the tree's.

@@ -43,7 +43,7 @@ def contributions(
     experiment : Experiment
         n samples, J joints.
     tree : Tree
-    placed : Placed
+    placed : PlacedEffect
     joint : int
         The joint of the effect's place; of an axis, the first.
     load, reading : array (n, J)

@@ -34,7 +34,7 @@ class Fit:
 
     Parameters
     ----------
-    assembly : Assembly
+    assembly : TorqueModel
     theta, std : array (P,)
         Parameters in the assembly's order and their standard deviations; inf where the data say nothing.
     covariance : array (P, P)
@@ -72,7 +72,7 @@ def fit(
 
     Parameters
     ----------
-    assembly : Assembly
+    assembly : TorqueModel
     experiments : sequence of Experiment
     start : array (P,), optional
         Where to start; the assembly's own start otherwise.

@@ -32,7 +32,7 @@ class Problem:
 
     Parameters
     ----------
-    assembly : Assembly
+    assembly : TorqueModel
         With the effects that reach these channels only; P parameters.
     experiments : tuple of Experiment
     channels : array (C,) of int

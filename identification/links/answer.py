@@ -10,6 +10,7 @@ from ..diagnosis import ChannelFit, Diagnosis, Finding, Location, Step
 from ..fitting.experiment import Experiment
 from ..search.locate import locate
 from ..sources.answer import candidates, channel_fits, limits, rms, with_found
+from ..verdict import gravest
 from .diagnose import EncoderComparison
 from .findings import findings_of, length, nameless, noise_floor, notes_of, traces_of, unit_of
 from .source import Links
@@ -27,7 +28,7 @@ def with_links(diagnosis: Diagnosis, model: Model, one: EncoderComparison) -> tu
         Of the torques.
     model : Model
         With what the torques asked for.
-    one : Compared
+    one : EncoderComparison
 
     Returns
     -------
@@ -42,23 +43,21 @@ def with_links(diagnosis: Diagnosis, model: Model, one: EncoderComparison) -> tu
     # A constant difference of zeros explains nothing that moves, and comes last.
     offsets = tuple(f for f in findings if (f.name, f.at) in still)
     moving = tuple(f for f in findings if (f.name, f.at) not in still)
-    verdict, description = diagnosis.verdict, diagnosis.description
+    both, description = gravest(diagnosis.verdict, decided.verdict), diagnosis.description
     sentences, spoken_of = [diagnosis.sentence], diagnosis.foremost
     if findings:
         spoken_of = _foremost(fits).channel if first else spoken_of
         said = _sentence(moving, offsets, fits)
-        if verdict == "adequate":
+        if diagnosis.verdict == "adequate":
             sentences = ["The torques ask for nothing that these recordings can show."]
         sentences = [said, *sentences] if first else [*sentences, said]
-        verdict = "missing_physics"
-    elif nameless(one) and verdict != "missing_physics":
+    elif decided.left and both == "unknown_effect":
         description = "; ".join(filter(None, [description, nameless(one)]))
         sentences = [f"Something is missing that no effect of the vocabulary explains: {description}."]
-        verdict = "unknown_effect"
     steps, torques = _steps(one), diagnosis
     answer = replace(
         diagnosis,
-        verdict=verdict,
+        verdict=both,
         sentence=" ".join(sentences),
         description=description,
         effects=(*moving, *others, *offsets) if first else (*others, *moving, *offsets),

@@ -52,7 +52,7 @@ def diagnose_links(
     model : Model
     recordings, holdout : paths
     body : RigidBody
-    assembly, theta : Assembly, array (P,)
+    assembly, theta : TorqueModel, array (P,)
         Of the torques: their rigid-body part loads the drives.
     scales : mapping of str to Scales
     band : float

@@ -8,12 +8,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ...report.words import percent
 from ..diagnosis import Estimate, Finding, Rival, Trace
 from ..sources.answer import estimates, finding, not_confirmed, rms
 from ..sources.search import Naming
 from ..sources.source import Linearisation
 from ..sources.weigh import covariances
-from ..wording import percent
 from .diagnose import EncoderComparison
 from .source import Links
 

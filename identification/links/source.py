@@ -41,7 +41,7 @@ class Links:
         Of each.
     scales : sequence of Scales
         Of each in the training recordings, which bounds and grids refer to.
-    rows : sequence of sequences of Run
+    rows : sequence of sequences of EncoderPair
         Of recording i and joint c.
     n_train : int
     """

@@ -38,7 +38,7 @@ class Covariance:
     ----------
     variance : array (n,)
         Of what is independent from sample to sample; positive.
-    processes : sequence of Remembering
+    processes : sequence of FirstOrderNoise
     derivative : array (n,) or None
         Standard deviation b of noise that is a second difference; None or zeros: there is none.
     step : float

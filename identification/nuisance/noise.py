@@ -97,7 +97,7 @@ def learn(
         Of each recording, under the baseline.
     columns : sequence of array (n, k)
         What could explain them, of about unit RMS.
-    runs : sequence of Run
+    runs : sequence of NoiseChannel
     freely : bool
         Whether the columns may explain as much as they can. Otherwise their amplitudes have a common prior deviation,
         estimated beside the noise: where nothing is missing it is small, and nothing of the noise is lost to them.

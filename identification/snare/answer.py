@@ -9,6 +9,7 @@ import numpy as np
 
 from ...models.model import Model
 from ...models.snare.setup import APPLIED, SnareTree
+from ...report.words import percent
 from ..diagnosis import (
     Candidate,
     ChannelFit,
@@ -23,7 +24,8 @@ from ..diagnosis import (
     Trace,
 )
 from ..reliability import probability as reliability
-from ..wording import experiment_sentence, foremost, named, percent
+from ..verdict import verdict
+from ..wording import experiment_sentence, foremost, named
 from .channels import channel_errors, channels, modelled
 from .comparison import QUARTER, SLOW, variances
 from .fit import CaptureFit, spread
@@ -57,8 +59,8 @@ def report_on(
     ----------
     model : Model
         As it was.
-    found : Searched
-    train, locked : sequences of Capture
+    found : CaptureSelection
+    train, locked : sequences of CaptureRecording
     seconds, runs : float, int
         What the search took [s], and the simulations in it.
     """
@@ -69,8 +71,8 @@ def report_on(
         for p in found.last.placed
         if p.effect.name not in APPLIED
     ]
-    description = "" if findings else _unexplained(fits)
-    verdict = "missing_physics" if findings else "unknown_effect" if description else "adequate"
+    unexplained = () if findings else _unexplained(fits)
+    description = _unexplained_words(unexplained)
     notes = [f"{Path(c.path).name}: {note}" for c in (*train, *locked) for note in c.notes]
     notes += [
         f"{p.effect.name} at {p.at} passed on the captures fitted but made the held-out one hardly better: not named"
@@ -88,7 +90,7 @@ def report_on(
         if np.isfinite(t.score)
     )
     return Diagnosis(
-        verdict,
+        verdict(findings, unexplained),
         _sentence(findings, fits, description) + _corrected(corrected),
         description,
         model.name,
@@ -173,18 +175,19 @@ def _misfits(
     return {a.channel: (a.unit, Misfit(a.rms, b.rms, a.relative, b.relative)) for a, b in pairs}
 
 
-def _unexplained(fits: Sequence[ChannelFit]) -> str:
-    """Motion that is left without a name, in words; empty where it is too little."""
+def _unexplained(fits: Sequence[ChannelFit]) -> tuple[ChannelFit, ...]:
+    """Channels of a motion that remains without a name: more than `LEFT_OVER` of the largest, and `VISIBLE`."""
     positions = [f for f in fits if f.unit == "m"]
     largest = max(f.holdout.rms_before / max(f.holdout.relative_before, 1e-12) for f in positions)
-    found = [
-        f"{_size(f.train.rms_after, 'm')} of {f.channel}"
-        for f in positions
-        if f.train.rms_after > max(LEFT_OVER * largest, VISIBLE) and f.holdout.rms_after > VISIBLE
-    ]
-    if not found:
+    least = max(LEFT_OVER * largest, VISIBLE)
+    return tuple(f for f in positions if f.train.rms_after > least and f.holdout.rms_after > VISIBLE)
+
+
+def _unexplained_words(channels: Sequence[ChannelFit]) -> str:
+    if not channels:
         return ""
-    return f"{' and '.join(found)} are left that no effect of a capture explains: check the set-up's sizes and masses"
+    sizes = " and ".join(f"{_size(f.train.rms_after, 'm')} of {f.channel}" for f in channels)
+    return f"{sizes} are left that no effect of a capture explains: check the set-up's sizes and masses"
 
 
 def _foremost(findings: Sequence[Finding], fits: Sequence[ChannelFit]) -> ChannelFit:

@@ -120,7 +120,7 @@ def fit(captures: CaptureSet, start: CaptureFit, most: int = 4) -> CaptureFit:
     Parameters
     ----------
     captures : CaptureSet
-    start : Fit
+    start : CaptureFit
         Effects that hold their parameter are simulated with it and not moved.
     most : int
         Most steps.

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ...report.words import percent
 from ..diagnosis import Location
 from .channels import channels, modelled
 from .comparison import QUARTER
@@ -41,9 +42,9 @@ def locate_capture(found: CaptureSelection, train: Sequence[CaptureRecording]) -
         where = "throughout the capture"
         inside = float(np.sum(change[channel.times >= touched] ** 2)) / max(float(np.sum(change**2)), 1e-300)
         if np.isfinite(touched) and inside > 0.9:
-            where = f"in contact, from {touched:.2f} s on ({100 * inside:.0f} % of it)"
+            where = f"in contact, from {touched:.2f} s on ({percent(inside)} of it)"
         elif np.isfinite(touched) and inside < 0.5:
-            where = f"before contact, until {touched:.2f} s ({100 * (1 - inside):.0f} % of it)"
+            where = f"before contact, until {touched:.2f} s ({percent(1 - inside)} of it)"
         made.append(Location(channel.name, float(energy / total), _windows(channel.times, change), where))
     return tuple(made)
 

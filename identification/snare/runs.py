@@ -82,7 +82,7 @@ class CaptureRuns:
 
     Parameters
     ----------
-    captures : sequence of Capture
+    captures : sequence of CaptureRecording
     workers : int
         Processes; 1 runs everything in this one.
     """

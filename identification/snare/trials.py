@@ -57,9 +57,9 @@ def try_all(
     model : Model
     captures : CaptureSet
         Those that are fitted.
-    found : Fit
+    found : CaptureFit
         Of the model with what was named so far.
-    candidates : sequence of Placed
+    candidates : sequence of PlacedEffect
     rejected : collection of str
         Keys of candidates that are not worth a fit.
     progress : callable

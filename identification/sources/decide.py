@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from ..deciding import SECOND_CHOICES
 from ..evidence.found import Remainder
+from ..verdict import Verdict, verdict
 from .confirm import Confirmation, confirm, remainders
 from .fit import residuals
 from .search import Naming, Selection, search
@@ -22,6 +23,11 @@ class Decision:
     rejected: tuple[Naming, ...]
     left: tuple[Remainder, ...]
     before: Linearisation
+
+    @property
+    def verdict(self) -> Verdict:
+        """By what is named, and by curves without a name."""
+        return verdict(self.best.names, self.left)
 
 
 def decide(source: Source, given: ModelPoint, progress: Callable[[str], None] = lambda _: None) -> Decision:

@@ -49,15 +49,15 @@ def weigh(
     source : Source
     numbers : sequence of int
         Recordings, those for training first.
-    given : At
+    given : ModelPoint
         The model as given.
-    linear : Linear
+    linear : Linearisation
         The fit on these recordings.
-    known : Weighed, optional
+    known : WeighedRecordings, optional
         Has the noise, which is learnt without it.
     search : bool
         False leaves out all hypotheses: only the evidence of the fit itself is wanted.
-    alone : mapping of str to Variant, optional
+    alone : mapping of str to GridPoint, optional
         Laws that were fitted by themselves, by their key: a point more of their grid.
     """
     columns, scale = CandidateColumns([len(r) for r in linear.residuals]), source.scale()

@@ -52,7 +52,7 @@ class Drive:
     ----------
     stiffness, damping : array (J,) or None
         Gains of the servo [N·m/rad, N·m·s/rad; or N/m, N·s/m]; None: zero, a joint that is always passive.
-    effects : sequence of Placed
+    effects : sequence of PlacedEffect
         Effects of a joint that act as a torque, one entry a joint.
     values : mapping of str to float
         Their parameters by ``effect.joint.parameter``; those left out are the effect's usual ones (``zero``).

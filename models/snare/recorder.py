@@ -27,7 +27,7 @@ class Recorder:
 
     Parameters
     ----------
-    assembly : Assembly
+    assembly : SnareAssembly
     origin : array (3,)
         Of the assembly's positions in the world [m].
     """

@@ -63,7 +63,7 @@ def compare(
     ----------
     base : Fit
         Friction.
-    named : mapping of str to sequence of Placed
+    named : mapping of str to sequence of PlacedEffect
         Explanations.
     experiments : sequence of Experiment
     noise : array (J,)

@@ -10,6 +10,7 @@ from ...identification.diagnosis import Diagnosis
 from ...models.effects import get_effect
 from ...models.model import PlacedEffect, places
 from ...models.rig.rig import Rig
+from ...report.words import percent
 from .alike import StandIns, compare
 from .study import Friction
 
@@ -83,7 +84,7 @@ def alike_in_words(pairs: Sequence[StandIns]) -> list[str]:
     """One sentence a pair of single explanations that is hard to tell apart, worst first."""
     hard = [p for p in pairs if p.mimicked > ALIKE and TOGETHER not in p.name + p.other]
     return [
-        f"{p.other[0].upper()}{p.other[1:]} can pose as {p.name}: {100 * p.mimicked:.0f} % of its torque, "
+        f"{p.other[0].upper()}{p.other[1:]} can pose as {p.name}: {percent(p.mimicked)} of its torque, "
         f"smallest angle {p.angle:.1f} degrees."
         for p in sorted(hard, key=lambda p: -p.mimicked)
     ]
@@ -92,12 +93,12 @@ def alike_in_words(pairs: Sequence[StandIns]) -> list[str]:
 def remedy(pairs: Sequence[StandIns], boom: str) -> str:
     """What torques and joint angles alone could not have settled, and the fewest measurements that would."""
     taken = {p.other: p.mimicked for p in pairs if p.name == TWIST}
-    shares = ", ".join(f"{100 * taken[other]:.0f} % by {other}" for other in (TENSION, PAYLOAD, DRIFT))
+    shares = ", ".join(f"{percent(taken[other])} by {other}" for other in (TENSION, PAYLOAD, DRIFT))
     best = [min((some for some in SETS if len(some) == n), key=lambda some: taken[after(some)]) for n in (1, 2)]
-    steps = "; ".join(f"{100 * taken[after(some)]:.0f} % with {' and '.join(some)}" for some in best)
+    steps = "; ".join(f"{percent(taken[after(some)])} with {' and '.join(some)}" for some in best)
     direct = get_effect("link_torsion").experiment.format(at=boom)
     return (
         f"From torques and joint angles alone, as the paper had them, {TWIST} ({boom}) can be mimicked to {shares}, "
-        f"and to {100 * taken[TOGETHER]:.0f} % by all of these. The best of further measurements leave {steps}. "
+        f"and to {percent(taken[TOGETHER])} by all of these. The best of further measurements leave {steps}. "
         f"What settles it directly: {direct}."
     )

@@ -47,7 +47,7 @@ def score(answer: Mapping[str, Any], diagnosis: Diagnosis, drawn: Sequence[Slide
     answer : mapping
         From `recordings.open_answer`.
     diagnosis : Diagnosis
-    drawn : sequence of Curve
+    drawn : sequence of SlideFrictionCurve
     """
     effect = answer["effect"]
     covered = coverage(drawn, true_curves(answer, drawn))

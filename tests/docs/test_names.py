@@ -7,7 +7,7 @@ from collections import Counter
 import pytest
 from documentation import DOCS
 
-PRODUCT = ("checks", "cosim", "fmu", "identification", "models", "recordings", "report", "studies", "tolerance")
+PRODUCT = ("cosim", "fmi", "fmu", "identification", "models", "recordings", "report", "studies", "tolerance")
 IRREGULAR = {
     "Apart",
     "Drawn",

@@ -55,7 +55,7 @@ def test_steps_are_drawn_from_the_second_on(asked):
     assert rows(content)[0] == ["as <given>", "50.0\u202f%", "25.0\u202f%"]
     assert rows(content)[2] == ["+ two", "6.25\u202f%", "10.0\u202f%"]
     assert re.findall(r'alt="([^"]*)', content) == [
-        "Relative misfit by step; on the held-out recording from 25.0\u202f% to 10.0\u202f%."
+        "Relative misfit by step; on the held-out recording from 25.0 % to 10.0 %."
     ]
     assert asked == [(two,)]
     assert "<figure>" not in fit.step_by_step(diagnosis(steps=two[:1]))[2]

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from ..models.model import Model
-from ..models.model_write import toml_text
-from ..recordings.columns import split_header
-from ..recordings.mixes import signal_fields
-from ..recordings.signals import Signal
-from ..recordings.units import convert, parse_unit
+from ...models.model import Model
+from ...models.model_write import toml_text
+from ...recordings.columns import split_header
+from ...recordings.mixes import signal_fields
+from ...recordings.signals import Signal
+from ...recordings.units import convert, parse_unit
 
 
 class Mends:

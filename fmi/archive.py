@@ -14,7 +14,7 @@ from xml.parsers import expat
 from ..errors import InputError
 from ..extras import needed_for
 from ..files import ZIP_FAULTS
-from .build import binary_folder, library_suffix
+from .binaries import binary_folder, library_suffix
 from .elf import ElfFault, exported_symbols
 
 _TOTAL, _ENTRIES, _XML = 4 << 30, 20_000, 64 << 20

@@ -34,14 +34,19 @@ def number(value: float, digits: int = 3) -> str:
     return f"{_fixed(value / 10.0**exponent, digits - 1)}\u2009×\u200910{str(exponent).translate(_SUPERSCRIPT)}"
 
 
-def percent(share: float) -> str:
-    """A share (0 to 1) as a percentage, to three significant digits at most."""
+def percent(share: float, digits: int = 2) -> str:
+    """A share (0 to 1) as a percentage to so many significant digits, at most ``max(2, digits - 1)`` decimals.
+
+    Prose takes two digits, a table three.
+    """
     if not math.isfinite(share):
         return _MISSING
     value = 100 * share
-    if 0 < abs(value) < 0.005:
-        return "under 0.01\u202f%"
-    return f"{_fixed(value, 1 if abs(value) >= 9.95 else 2)}\u202f%"
+    if value == 0:
+        return "0 %"
+    if abs(value) < 0.005:
+        return "under 0.01 %"
+    return f"{_fixed(value, max(0, min(digits - 1 - _exponent(value, digits), max(2, digits - 1))))} %"
 
 
 def chance(probability: float) -> str:
@@ -49,10 +54,10 @@ def chance(probability: float) -> str:
     if not math.isfinite(probability):
         return _MISSING
     if probability > 0.99:
-        return "over 99\u202f%"
+        return "over 99 %"
     if probability < 0.01:
-        return "under 1\u202f%"
-    return f"{100 * probability:.0f}\u202f%"
+        return "under 1 %"
+    return f"{100 * probability:.0f} %"
 
 
 def with_std(value: float, std: float) -> tuple[str, str]:

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ....report.words import percent
 from ..case import CheckCase
 from ..finding import CheckFinding, Kind
 from ..reading import as_read
@@ -44,7 +45,7 @@ def find(case: CheckCase) -> list[CheckFinding]:
         effort = case.tree.joints[c].effort
         limit = f"; the URDF's effort limit is {effort:g}" if np.isfinite(effort) else ""
         text = (
-            f"tau.{joint} stands at {level:.4g} in {100 * share:.2g} % of all samples, and the model fitted to the "
+            f"tau.{joint} stands at {level:.4g} in {percent(share)} of all samples, and the model fitted to the "
             f"others goes {np.mean(over):.3g} beyond on average: the channel is cut off there{limit}"
         )
         mend = f'limits = {{ "tau.{joint}" = {level:.6g} }}'

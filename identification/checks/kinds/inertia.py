@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...models.inertia import to_central
+from ....models.inertia import to_central
 from ..case import CheckCase
 from ..finding import CheckFinding, Kind
 

@@ -7,7 +7,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from ...models.inertia import to_central
+from ....models.inertia import to_central
+from ....report.words import percent
 from ..case import CheckCase
 from ..compete import ODDS, SURE
 from ..evidence import GAIN, WAYS, ReadingFit
@@ -80,8 +81,8 @@ def find(case: CheckCase) -> list[CheckFinding]:
             best.at,
             float(1 / (1 + np.exp(-min(log_odds, 50.0)))),
             f"recordings contradict each other in {best.what}: {values}; {names[odd]} {which}; fitted for each, the "
-            f"error of tau.{case.joints[worst]} falls from {100 * same.relative[worst]:.3g} % to "
-            f"{100 * fit.relative[worst]:.2g} %",
+            f"error of tau.{case.joints[worst]} falls from {percent(same.relative[worst])} to "
+            f"{percent(fit.relative[worst])}",
             f"# leave out {names[odd]}, or diagnose the recordings apart: snarelab compare",
         )
     ]

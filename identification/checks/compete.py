@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...report.words import percent
 from .case import ALL, CheckCase
 from .evidence import ReadingFit
 from .finding import CheckFinding
@@ -95,8 +96,8 @@ def findings(case: CheckCase, judged: Sequence[ReadingScore]) -> list[CheckFindi
     if fault < SURE or not (plain or likelier):
         return []
     fall = (
-        f"the error of tau.{case.joints[worst]} falls from {100 * case.given.relative[worst]:.3g} % to "
-        f"{100 * best.fit.relative[worst]:.2g} %"
+        f"the error of tau.{case.joints[worst]} falls from {percent(case.given.relative[worst])} to "
+        f"{percent(best.fit.relative[worst])}"
     )
     alike = [j.reading for j, s in zip(judged[1:], share[2:], strict=True) if s > 0.05]
     besides = f"; as likely: {'; '.join(r.message for r in alike[:3])}" if alike else ""

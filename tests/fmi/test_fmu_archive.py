@@ -10,8 +10,8 @@ import pytest
 
 from bench.fmu_models import Slave, rewritten
 from snarelab.errors import InputError
-from snarelab.fmu.archive import open_fmu
-from snarelab.fmu.build import binary_folder
+from snarelab.fmi.archive import open_fmu
+from snarelab.fmi.binaries import binary_folder
 from snarelab.fmu.export import export
 
 

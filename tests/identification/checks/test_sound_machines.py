@@ -9,7 +9,7 @@ import snarelab
 from snarelab.studies import cart, tx40
 
 STUDIES = Path(cart.__file__).parent
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 CURRENTS = ["shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper"]
 MOTIONS = ["backlash_detection", "chirp_sweep", "friction_gravity", "large_amplitude", "multisine", "random_waypoints"]

@@ -5,15 +5,15 @@ from pathlib import Path
 
 import xarray as xr
 
-from ..errors import InputError
-from ..identification.fitting.constants import with_constants
-from ..identification.fitting.experiment import Experiment, load_experiments, with_silence
-from ..identification.fitting.recorded import read_all, with_recorded_joints
-from ..models.docking.bench_setup import DockingTree
-from ..models.model import Model
-from ..models.model_file import load_model
-from ..models.rigid_body import RigidBody
-from ..models.snare.setup import SnareTree
+from ...errors import InputError
+from ...models.docking.bench_setup import DockingTree
+from ...models.model import Model
+from ...models.model_file import load_model
+from ...models.rigid_body import RigidBody
+from ...models.snare.setup import SnareTree
+from ..fitting.constants import with_constants
+from ..fitting.experiment import Experiment, load_experiments, with_silence
+from ..fitting.recorded import read_all, with_recorded_joints
 from .case import CheckCase
 from .compete import compete, findings, is_sound
 from .finding import CheckFinding

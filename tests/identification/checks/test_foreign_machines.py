@@ -13,7 +13,7 @@ from snarelab.models.model import PlacedEffect
 from snarelab.models.model_file import load_model
 from snarelab.studies import cart, tx40
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 
 def folder(name, file):

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from checked import MODEL, checked, mended, written
 
-from snarelab.checks.kinds import ORDER, kinds
 from snarelab.cli import main
+from snarelab.identification.checks.kinds import ORDER, kinds
 
 ONCE = [
     bank.degrees,

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-from ..models.inertia import to_central
-from ..models.rigid_body import RigidBody
-from ..models.tree import Tree
+from ...models.inertia import to_central
+from ...models.rigid_body import RigidBody
+from ...models.tree import Tree
 from .reading import Reading, Samples
 
 Array = NDArray[np.float64]

@@ -8,10 +8,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ..identification.fitting.experiment import Experiment
-from ..models.model import Model
-from ..models.tree import Tree
-from ..recordings.signals import Signal
+from ...models.model import Model
+from ...models.tree import Tree
+from ...recordings.signals import Signal
+from ..fitting.experiment import Experiment
 from .evidence import CheckBasis, ReadingFit
 from .mend import Mends
 from .reading import Reading, Samples, as_read
