@@ -69,8 +69,8 @@ mutants: .venv/installed ## change identification and cosim at random places, an
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt '.[mutants]'
 	$(BIN)/python bench/mutants.py --mutants $(MUTANTS)
 
-proof: .venv/installed ## conceal effects in another engine's recordings, let the tool name them, and score it: half an hour
-	$(BIN)/python -m proof
+proof: .venv/installed ## conceal effects in another engine's recordings, let the tool name them, and score it: half an hour; HOURS=H: what is registered, for so long, resumed
+	$(BIN)/python -m proof $(if $(HOURS),registered --hours $(HOURS))
 
 ledger: .venv/installed ## what the tool says of every recording that must not get worse, into bench/ledger.json: half an hour, resumed; OLD=FILE tells what moved
 	$(BIN)/python bench/ledger.py $(if $(OLD),--compare $(OLD))

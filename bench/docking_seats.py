@@ -60,6 +60,8 @@ SEATED = 1e-4
 """A ball that is nearer to its seat than this sits [m]."""
 AFTER = (0.05, 0.2, 1.0)
 """How long after its first touch each engine's impulse is taken [s]: the first one is that touch."""
+NEAR = 0.03
+"""Impulses that differ by less are alike."""
 P = DockingParameters()
 
 
@@ -248,6 +250,13 @@ def flights(seed: int, count: int) -> int:
         starts = [start(rng) for _ in range(count)]
         rows = [touches(body, friction if drawn else 0.0, place, turn) for friction, place, turn in starts]
         print(f"{count} flights, {words}: {apart(rows)}", flush=True)
+        for number, (row, (friction, _, turn)) in enumerate(zip(rows, starts, strict=True)):
+            if row["impulse"][0] > NEAR:
+                way = [float(np.linalg.norm(x)) for x in row["impulses"][0]]
+                print(
+                    f"  start {number}: {100 * row['impulse'][0]:.2g} %, friction {friction:.3f}, "
+                    f"{np.rad2deg(turn.magnitude()):.2g} deg, {way[0]:.3g} and {way[1]:.3g} N s"
+                )
     return 0
 
 
@@ -256,7 +265,7 @@ def apart(rows: Sequence[dict[str, Any]]) -> str:
     shares = [np.array([row["impulse"][k] for row in rows]) for k in range(len(AFTER))]
     return "impulse of the first touch " + ", ".join(
         f"{wait:g} s after it began: median {100 * np.median(x):.2g} %, at most {100 * x.max():.2g} %, "
-        f"{(x <= 0.03).sum()} within 3 %"
+        f"{(x <= NEAR).sum()} within {100 * NEAR:g} %"
         for wait, x in zip(AFTER, shares, strict=True)
     )
 

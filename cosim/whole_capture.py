@@ -38,6 +38,9 @@ SIZES = dict.fromkeys(("PULL", "SEAT", "BACK_OFF", "UNLOAD"), 2.5e-3) | dict.fro
 """Macro steps by the program's state [s]: short where bodies meet or part, long where slack cables slide; `USUAL`
 in all others."""
 USUAL = 5e-3
+TOUCHING = 1e-3
+"""Longest macro step in the program's first state, in which the ring closes, while cables touch [s]. What a light touch
+hands over steers arm and target until the next one; from steps of 5 ms they are 12 µm off by then."""
 AFTER = 1.0
 """How long a run goes on in its last state [s]."""
 
@@ -126,14 +129,15 @@ def co_simulate_whole(
     disturb: Callable[[float, "Master"], None] | None = None,
     until: Collection[str] = (),
     sizes: Mapping[str, float] | None = None,
+    touching: float = TOUCHING,
 ) -> WholeRun:
     """Run until `AFTER` past the program's last transition into a state that nothing leaves, ``longest`` [s] at most.
 
     It ends, too, where the program comes to a state of ``until``.
 
-    Macro steps are `SIZES`, or ``sizes`` where that has the state, times ``scale``; ``own_step`` [s] is that inside the
-    snare while cables touch. ``frames`` is filled as by `co_simulate`; ``disturb`` is called each period of the program
-    with the time and the master.
+    Macro steps are `SIZES`, or ``sizes`` where that has the state, times ``scale``, and no longer than ``touching``
+    [s] where `TOUCHING` says so; ``own_step`` [s] is that inside the snare while cables touch. ``frames`` is filled as
+    by `co_simulate`; ``disturb`` is called each period of the program with the time and the master.
     """
     coupled = whole_system(
         start, passive or JointResistance(), snare or SNARE, docking or DockingParameters(), table, own_step
@@ -141,20 +145,24 @@ def co_simulate_whole(
     program: Any = coupled.participants["program"]
     model: Any = coupled.participants["snare"]
 
-    def film(time: float) -> None:
-        if frames is not None and time >= len(frames) / 15:
-            frames.append((time, model.cables()))
-
     fault, steps = "", SIZES | dict(sizes or {})
     with Master(coupled, USUAL, scheme="gauss_seidel", hold="quadratic") as master:
-        film(0.0)
+
+        def ready(time: float) -> None:
+            """Film, and set the next step."""
+            if frames is not None and time >= len(frames) / 15:
+                frames.append((time, model.cables()))
+            size = scale * steps.get(program.state, USUAL)
+            touches = program.state == program.table.start and master.value("snare.touching") > 0
+            master.set_step(min(size, touching) if touches else size)
+
         ended = None
         while master.time < longest - 1e-9 and (ended is None or master.time < ended + AFTER - 1e-9):
-            master.set_step(scale * steps.get(program.state, USUAL))
+            ready(master.time)
             if disturb:
                 disturb(master.time, master)
             try:
-                master.go_to(program.next_event(master.time), film)
+                master.go_to(program.next_event(master.time), ready)
             except StepError as error:
                 fault = str(error)
                 break

@@ -25,8 +25,9 @@ from .inspection import SOURCES as ARRIVAL_SOURCES
 
 END = 10.0
 """Of the soft capture, by the paper [s]."""
-SCALE = 1.5
-"""Of the orbit studies' macro steps, which are for their energies: two thirds of the processor time."""
+SCALE, TOUCHING = 1.5, 5e-3
+"""Of the orbit studies' macro steps, which are for their energies, and the longest while cables touch [s], which there
+is for micrometres: two thirds of the processor time."""
 WAY_OUT = ("OPEN", "UNLOAD")
 """States with which the program gives up."""
 SEAT = Axis("docking_friction", "1", "Coulomb's, between ball and groove", 0.15, 0.0, 0.4)
@@ -59,7 +60,9 @@ def outcome(
     """One case from where everything stands; the rest as of `co_simulate_whole`."""
     docking = DockingParameters(friction=values["docking_friction"])
     rubbing = snare.with_values(friction=values["friction"])
-    whole = co_simulate_whole(start, passive, rubbing, docking, table, scale=scale, sizes=sizes, until=WAY_OUT)
+    whole = co_simulate_whole(
+        start, passive, rubbing, docking, table, scale=scale, sizes=sizes, touching=TOUCHING, until=WAY_OUT
+    )
     if whole.fault and whole.final == "CLOSE":
         return Outcome.failed(whole.fault)
     d = docked_of(whole)

@@ -49,7 +49,7 @@ def _names(diagnosis: Diagnosis) -> str:
     heads = ["Effect", "Value ± deviation", "Probability", "Share"]
     more = len(diagnosis.effects) - len(shown)
     rest = paragraph(f"And {more} more that are less likely: see what is missing, below.") if more else ""
-    return f'<div class="names">{table(caption, heads, rows, numeric=(2, 3))}</div>{rest}'
+    return table(caption, heads, rows, numeric=(2, 3)) + rest
 
 
 def _values(finding: Finding) -> str:

@@ -164,7 +164,9 @@ def measure(result: Result) -> list[Quantity]:
         Quantity("controlled_force_error", "1", force_error(chosen, result.single), "reference"),
         Quantity("real_time_factor", "1", DURATION / result.processor[0], "reference"),
         Quantity("controlled_real_time_factor", "1", DURATION / result.processor[1], "reference"),
-        *measure_docked(result.docked, DockingParameters(), result.processor[0], result.docked_processor),
+        *measure_docked(
+            result.docked, DockingParameters(), result.single, result.processor[0], result.docked_processor
+        ),
     ]  # fmt: skip
 
 

@@ -15,12 +15,18 @@ from ...cosim.docked import (
 )
 from ...models.docking.parameters import PRELOAD_WINDOW, DockingParameters
 from ..outcome import Quantity
+from .ledger import force_error, position_error
+from .setting import OrbitCapture
 
 __all__ = ["DockingRun", "docked_of", "energies", "is_latched", "mean_wrist", "measure", "momentum_drift"]
 
+END = 10.0
+"""Until then the ring moves as in the soft capture by itself [s]."""
 
-def measure(d: DockingRun, p: DockingParameters, soft: float, spent: float) -> list[Quantity]:
-    """The numbers after the soft capture; ``soft`` and ``spent`` are the processor times of both runs [s]."""
+
+def measure(d: DockingRun, p: DockingParameters, single: OrbitCapture, soft: float, spent: float) -> list[Quantity]:
+    """The numbers of the whole end effector; ``single`` is the soft capture as one system, ``soft`` and ``spent`` are
+    the processor times of both runs [s]."""
     latched, _ = is_latched(d, p)
     ends = [begin for state, begin, _ in d.whole.phases if state == "LATCHED"]
     radial, angle = residual(d)
@@ -40,5 +46,9 @@ def measure(d: DockingRun, p: DockingParameters, soft: float, spent: float) -> l
             float(np.abs(ledger["residual"]).max() / np.abs(ledger["motors"]).max()), "reference",
         ),
         Quantity("latched.momentum_drift", "1", momentum_drift(d), "reference"),
+        Quantity("latched.error_to_monolithic", "m", position_error(d.capture, single, END), "reference"),
+        Quantity(
+            "latched.force_error_to_monolithic", "1", force_error(d.capture, single, END, 0.01), "reference"
+        ),
         Quantity("latched.cost", "1", spent / soft, "reference"),
     ]  # fmt: skip

@@ -85,15 +85,19 @@ def _middle(values: Array) -> Array:
     return 0.5 * (values[1:] + values[:-1])
 
 
-def position_error(capture: OrbitCapture, reference: OrbitCapture) -> float:
-    """Largest distance [m] between the pin's places in the end effector's frame, at the reference's times."""
+def position_error(capture: OrbitCapture, reference: OrbitCapture, end: float = np.inf) -> float:
+    """Largest distance [m] between the pin's places in the end effector's frame, at the reference's times to ``end``
+    [s]."""
     own = np.column_stack([np.interp(reference.times, capture.times, x) for x in capture.relative.T])
-    return float(np.linalg.norm(own - reference.relative, axis=1).max())
+    return float(np.linalg.norm(own - reference.relative, axis=1)[reference.times < end + 1e-9].max())
 
 
-def force_error(capture: OrbitCapture, reference: OrbitCapture) -> float:
-    """RMS of the difference of the forces on the end effector over the RMS of the reference's, over `WINDOW`."""
-    (_, ours), (_, theirs) = capture.mean_force(WINDOW), reference.mean_force(WINDOW)
+def force_error(capture: OrbitCapture, reference: OrbitCapture, end: float = np.inf, window: float = WINDOW) -> float:
+    """RMS of the difference of the forces on the end effector over the RMS of the reference's, both means over a
+    ``window`` [s], to ``end`` [s]."""
+    (_, ours), (middles, theirs) = capture.mean_force(window), reference.mean_force(window)
+    n = int(np.sum(middles < end))
+    ours, theirs = ours[:n], theirs[:n]
     return float(np.sqrt(np.sum((ours - theirs) ** 2) / np.sum(theirs**2)))
 
 
