@@ -1,4 +1,4 @@
-"""Make a release's section of ``CHANGELOG.md`` of the fragments in ``changelog.d/``: ``make_changelog.py VERSION DATE``.
+"""Make a release's section of ``CHANGELOG.md`` from ``changelog.d/``: ``make_changelog.py VERSION DATE``.
 
 A fragment is one file for one change, ``NAME.KIND.md``, with what a user sees of it.
 """
@@ -20,7 +20,9 @@ def fragments(folder: Path) -> dict[str, list[str]]:
         _, _, kind = path.name.removesuffix(".md").rpartition(".")
         text = path.read_text(encoding="utf-8").strip()
         if path.suffix != ".md" or kind not in KINDS or not text:
-            raise ValueError(f"{path.name} is no fragment: NAME.KIND.md with a sentence, KIND one of {', '.join(KINDS)}")
+            raise ValueError(
+                f"{path.name} is no fragment: NAME.KIND.md with a sentence, KIND one of {', '.join(KINDS)}"
+            )
         found[kind].append(text)
     return found
 

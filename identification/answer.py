@@ -24,7 +24,7 @@ from .diagnosis import (
     Trace,
 )
 from .evidence.diagnose import ArmDecision
-from .evidence.found import ArmNaming
+from .evidence.selection import ArmNaming
 from .fitting.experiment import Experiment
 from .fitting.fit import Fit, channel_rms
 from .fitting.floating_terms import momentum_floor
@@ -78,7 +78,9 @@ def report_on(
     ]
     description = "; ".join(said)
     if findings:
-        remainder = f" Part of what is left on {listed([channels[c] for c in loud])} has no name." if loud else ""
+        remainder = (
+            f" Part of the remaining residual of {listed([channels[c] for c in loud])} has no name." if loud else ""
+        )
     else:
         remainder = f" {description[:1].upper()}{description[1:]}." if description else ""
     noise = {
@@ -89,7 +91,7 @@ def report_on(
     notes = [f"{Path(e.motion.path).name}: {note}" for e in (*train, *held) for note in e.motion.notes]
     notes += [
         f"{n.placed.effect.name} at {n.placed.at} passed on the training recordings, but the held-out ones are "
-        f"foretold no better with it: not named"
+        f"predicted no better with it: not named"
         for n in decided.rejected
         if n.placed.key not in named
     ]

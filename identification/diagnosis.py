@@ -339,7 +339,7 @@ def _finding(finding: Finding) -> dict[str, Any]:
 
 
 def _finite(content: Any) -> Any:
-    """The same with null in place of numbers that are none."""
+    """Content for JSON, with null in place of numbers that are not finite."""
     if isinstance(content, dict):
         return {key: _finite(x) for key, x in content.items()}
     if isinstance(content, list | tuple):

@@ -27,10 +27,10 @@ def evidence_sentence(
     where = " and ".join(channels) if len(channels) < 3 else f"{len(channels)} channels"
     what = placed.effect.sentence
     explained = 1 - (relative_with / relative_without) ** 2 if relative_without > relative_with else 0.0
-    told = f"it explains {_part(explained)} what the model without it leaves over on {where}"
+    told = f"it explains {_part(explained)} the remaining residual of {where}"
     return (
-        f"{what[:1].upper()}{what[1:]}: {told}; "
-        f"taking it out again raises the error on the held-out recording {from_to(relative_with, relative_without)}."
+        f"{what[:1].upper()}{what[1:]}: {told}. "
+        f"Without it, the error on the held-out recording rises {from_to(relative_with, relative_without)}."
     )
 
 
@@ -91,10 +91,8 @@ def verdict_sentence(
 
 
 def _rest(worst: ChannelFit, noise: Mapping[str, str]) -> str:
-    """What an adequate model leaves over on the channel where that stands highest above the noise."""
-    left = (
-        f"What it leaves over on the held-out recording is {percent(worst.holdout.relative_before)} of {worst.channel}"
-    )
+    """An adequate model's remaining residual, on the channel where it stands highest above the noise."""
+    left = f"The remaining residual on the held-out recording is {percent(worst.holdout.relative_before)} of {worst.channel}"
     if worst.noise_floor > 0:
         left += f", {worst.holdout.rms_before / worst.noise_floor:.2g} times that channel's noise floor"
     told = f" It is noise: {noise[worst.channel]}." if worst.channel in noise else ""

@@ -131,7 +131,7 @@ def places(effect: Effect, tree: Tree) -> tuple[str, ...]:
 
 
 def all_places(effect: Effect, tree: Tree) -> tuple[str, ...]:
-    """The same, and axes that are not one joint's own: an effect acts there only where it is asked for by name."""
+    """`places`, and axes of several joints, where an effect acts only if the model file names them."""
     own = places(effect, tree)
     if effect.at != "joint" or effect.acts_on != "torque" or isinstance(tree, SnareTree | DockingTree):
         return own

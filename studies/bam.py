@@ -1,7 +1,7 @@
 """A position servo with a pendulum (BAM, XL330): what Coulomb and viscous friction leave out, from its positions alone.
 
 Twelve recordings at controller gains of 100, 200 and 800 are fitted; the four at gain 400 are locked away, and the
-position is foretold there in closed loop. Recordings: Duclusaud et al. (2025), looked for in ``$SNARELAB_RECORDINGS``,
+position is predicted there in closed loop. Recordings: Duclusaud et al. (2025), looked for in ``$SNARELAB_RECORDINGS``,
 beside the project, and at their publisher.
 """
 
@@ -167,13 +167,13 @@ def steps(
 
 
 def as_lines(r: Round) -> list[dict[str, Any]]:
-    """A round's candidates for scripts; foretold shares and score are null where a law explained too little to try."""
+    """A round's candidates for scripts; predicted shares and score are null where a law explained too little to try."""
     return [
         {
             "name": t.name,
             "explained": t.explained,
-            "foretold": {f"{gain:g}": share for gain, share in t.foretold.items()} or None,
-            "score": t.score if t.foretold else None,
+            "foretold": {f"{gain:g}": share for gain, share in t.forecast.items()} or None,
+            "score": t.score if t.forecast else None,
             "passes": t.passes,
         }
         for t in r.tried
@@ -186,16 +186,16 @@ def sections(
     """What is drawn, and what was not named."""
     words = [
         "Bars: share of the squared position error at gains 100, 200 and 800. Dots: the same at one of these gains, "
-        "foretold by fits to the other two. A law is named when it explains at least 5 %, foretells more than chance "
-        "over all gains, and no dot is below -5 %; of several, the one that foretells most for its number of "
+        "predicted by fits to the other two. A law is named when it explains at least 5 %, predicts more than chance "
+        "over all gains, and no dot is below -5 %; of several, the one that predicts most for its number of "
         "parameters, and where that is a tie, the simplest."
     ]
     for t in rounds[0].tried:
-        if t.foretold and not (rounds[0].named and t.name == rounds[0].named.name):
-            worst = min(t.foretold, key=lambda gain: t.foretold[gain])
+        if t.forecast and not (rounds[0].named and t.name == rounds[0].named.name):
+            worst = min(t.forecast, key=lambda gain: t.forecast[gain])
             words.append(
                 f"{t.name.replace('_', ' ').capitalize()} explains {percent(t.explained)} of what is fitted; at "
-                f"gain {worst:.0f}, foretold from the others, {percent(t.foretold[worst])}; score {t.score:.0f}."
+                f"gain {worst:.0f}, predicted from the others, {percent(t.forecast[worst])}; score {t.score:.0f}."
             )
     if rounds[0].named:
         words.append(

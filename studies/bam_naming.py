@@ -3,8 +3,8 @@
 A servo that sticks most of the time tells inverse dynamics little: while it sticks, any torque up to the level will
 do. In its own closed loop, where it sticks is the best witness. Each law of the vocabulary is added in turn, everything
 is fitted again, and a law is named when it explains a share of the squared position error worth a name, and, fitted
-without each controller gain in turn, foretells the recordings left out better, and those of no gain worse by such a
-share. Among those that do, the best score wins: log-likelihood foretold less ½ log(samples) for each parameter,
+without each controller gain in turn, predicts the recordings left out better, and those of no gain worse by such a
+share. Among those that do, the best score wins: log-likelihood predicted less ½ log(samples) for each parameter,
 clusters of half a second as samples; of scores as good as equal, that with the fewest parameters.
 
 Sticking makes slopes unreliable: fits go down by Gauss-Newton with coarse steps, and the best are finished without
@@ -78,18 +78,18 @@ class ServoFit:
 @dataclass(frozen=True)
 class LawTrial:
     """A law added to a model: the fit, the share of the squared error it explains, the same share of each controller
-    gain's recordings foretold by fits to the others (empty where that was not tried), and the score of that."""
+    gain's recordings predicted by fits to the others (empty where that was not tried), and the score of that."""
 
     name: str
     fit: ServoFit
     explained: float
-    foretold: Mapping[float, float] = field(default_factory=dict)
+    forecast: Mapping[float, float] = field(default_factory=dict)
     score: float = -np.inf
 
     @property
     def passes(self) -> bool:
-        """Whether it is worth a name, and what was left out was foretold better, for no gain much worse."""
-        return self.explained > WORTH and self.score > 0 and min(self.foretold.values()) > -WORTH
+        """Whether it is worth a name, and what was left out was predicted better, for no gain much worse."""
+        return self.explained > WORTH and self.score > 0 and min(self.forecast.values()) > -WORTH
 
 
 @dataclass(frozen=True)
@@ -212,13 +212,13 @@ def _left_out(runs: Sequence[ServoRun], model: ServoFit) -> dict[float, float]:
 
 
 def _judged(runs: Sequence[ServoRun], base: ServoFit, tried: LawTrial, before: Mapping[float, float]) -> LawTrial:
-    """Foretold shares, and the score: each gain's error has a variance of its own."""
+    """Predicted shares, and the score: each gain's error has a variance of its own."""
     after = _left_out(runs, tried.fit)
     seconds = {gain: sum(float(np.ptp(r.time)) for r in runs if r.gain == gain) for gain in before}
     gained = sum(seconds[gain] / CLUSTER * np.log(before[gain] / after[gain]) for gain in before)
     added = len(tried.fit.values) - len(base.values)
     score = float(gained - 0.5 * added * np.log(sum(seconds.values()) / CLUSTER))
-    return replace(tried, foretold={gain: 1 - (after[gain] / before[gain]) ** 2 for gain in before}, score=score)
+    return replace(tried, forecast={gain: 1 - (after[gain] / before[gain]) ** 2 for gain in before}, score=score)
 
 
 def _errors(runs: Sequence[ServoRun], values: Values) -> Array:

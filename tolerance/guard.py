@@ -72,7 +72,7 @@ def load(path: str | Path) -> dict[str, dict[str, GuardedNumber]]:
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); name the file of guarded numbers") from None
     except (ValueError, TypeError, KeyError, AttributeError) as error:
-        raise InputError(f"{path}: each number needs value, allowed and unit ({error}); mend that line") from None
+        raise InputError(f"{path}: each number needs value, allowed and unit ({error}); correct that line") from None
 
 
 def moved(section: str, before: Mapping[str, GuardedNumber], after: Mapping[str, float]) -> list[GuardShift]:

@@ -38,9 +38,8 @@ def report_on(source: Dockings, name: str, decided: Decision, seconds: float) ->
         a, b, unit, channel = _worst(locked, best.missed[p.key].held, best.held, sizes[1])
         what = p.effect.sentence
         evidence = (
-            f"{what[:1].upper()}{what[1:]}: the recordings are e^{n.gain:.0f} times likelier with it, and taking it "
-            f"out again raises the error of {channel} on the held-out docking from {_size(b, unit)} to "
-            f"{_size(a, unit)}."
+            f"{what[:1].upper()}{what[1:]}: the recordings are e^{n.gain:.0f} times likelier with it. Without it, "
+            f"the error of {channel} on the held-out docking rises from {_size(b, unit)} to {_size(a, unit)}."
         )
         findings.append(finding(decided, n, values[p.key], evidence, max(0.0, 1 - (b / max(a, 1e-300)) ** 2)))
     units = [unit_of(c) for c in source.channels]

@@ -1,4 +1,4 @@
-"""What the noise of a docking's channels hangs on: balls that touch and slide, a carriage that stands."""
+"""What the noise of a docking's channels depends on: balls that touch and slide, a carriage that stands."""
 
 from collections.abc import Sequence
 
@@ -31,10 +31,10 @@ def standing(record: DockingRecording) -> NDArray[np.bool_]:
     return (slowest < STICKS[0][0] * np.abs(rate).max()) | (rate[1:] * rate[:-1] < 0)
 
 
-def hangs(
+def noise_channels(
     records: Sequence[DockingRecording], linear: Linearisation, could: Sequence[Sequence[Array]], scale: Array
 ) -> list[list[NoiseChannel]]:
-    """What the noise of every channel hangs on.
+    """What the noise of every channel depends on.
 
     While balls touch and slide no law of contact tells the load to the window: a channel may then be off, as a joint
     near rest may hold any torque, by what nothing explains there, in the RMS over `ABOUT` windows either way, and by

@@ -48,7 +48,7 @@ class DockingRuns:
         return None if seen is None else self.records[number].of(seen)
 
     def seen(self, number: int, values: Values, shifts: Array) -> Array | None:
-        """The same of all that a simulation shows, over each stretch of the travel."""
+        """All that a simulation shows over each stretch of the travel; None where it fails."""
         moved = dict(zip(SHIFTS, map(float, shifts), strict=True))
         own = dict(values) | {k: self._said[k] + moved[k] * x for k, x in TOLERANCES.items() if moved[k]}
         own |= {k: values.get(k, 0.0) + moved[k] * x for k, x in MACHINED.items() if moved[k]}
@@ -66,7 +66,7 @@ class DockingRuns:
 
 
 def _registered(motion: DockingCommand, off: Array) -> DockingCommand:
-    """The same from where the end effector truly was, the pose measured being off by so much [m, rad]."""
+    """The command, started at the end effector's true pose: the measured one is off by this much [m, rad]."""
     if not off.any():
         return motion
     start = Rotation.from_rotvec(-off[3:]) * Rotation.from_quat(motion.quaternion, scalar_first=True)

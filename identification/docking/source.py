@@ -19,7 +19,7 @@ from ..deciding import BLOCK
 from ..nuisance.noise import NoiseChannel
 from ..sources.fit import differences, shift_differences
 from ..sources.source import GridPoint, Linearisation, ModelPoint
-from .noise import hangs
+from .noise import noise_channels
 from .recording import EVERY, load_records
 from .runs import SHIFTS, DockingRuns
 
@@ -108,10 +108,10 @@ class Dockings(DockingRuns):
     def curves(self, numbers: Sequence[int]) -> Mapping[tuple[int, str], list[Array]]:
         return {}
 
-    def hangs(
+    def noise_channels(
         self, numbers: Sequence[int], linear: Linearisation, could: Sequence[Sequence[Array]]
     ) -> list[list[NoiseChannel]]:
-        return hangs([self.records[i] for i in numbers], linear, could, self.scale())
+        return noise_channels([self.records[i] for i in numbers], linear, could, self.scale())
 
     def blocks(self, i: int, x: Array) -> Array:
         count = max(round(BLOCK / EVERY), 1)

@@ -1,4 +1,4 @@
-"""The evidence of recordings of an arm: residuals along the motion as measured, columns along the motion asked for."""
+"""The evidence of recordings of an arm: residuals along the motion as measured, columns along the instrument motion."""
 
 import functools
 from collections.abc import Callable, Mapping, Sequence
@@ -16,9 +16,9 @@ from ..nuisance.curve import SMALL
 from ..nuisance.encoder import encoder_noise
 from ..nuisance.noise import Noise, NoiseChannel, learn
 from ..nuisance.rest import SETTLES, STICKS, share
-from .beside import NuisanceColumns, beside, regressor_columns
 from .evidence import Evidence, ResidualChannel
 from .hypotheses import ColumnSource, Curves, curves, names, pool
+from .nuisance_columns import NuisanceColumns, beside, regressor_columns
 from .pool import CandidateColumns, Hypothesis, Item
 
 Array = NDArray[np.float64]
@@ -27,7 +27,7 @@ QUIET = 0.01
 """RMS torque of the loudest channel that stands for that of a channel which is as good as silent."""
 
 STILL = 0.03
-"""Share of the peak speed below which what is left over tells how much a joint holds."""
+"""Share of the peak speed below which the residual tells how much a joint holds."""
 
 STRONGEST = 40
 """Directions of all that could explain a channel beside which its noise is learnt."""
@@ -48,7 +48,7 @@ class WeighedRecordings:
     """A channel's noise where nothing is missing."""
 
     def with_noise(self, c: int, noise: Noise, alone: Evidence) -> "WeighedRecordings":
-        """The same with another noise of one channel, whose evidence by itself has it already."""
+        """These recordings with another noise of one channel; ``alone`` is that channel's evidence under it."""
         noises = tuple(noise if k == c else x for k, x in enumerate(self.noises))
         return replace(self, evidence=self.evidence.with_channel(c, alone), noises=noises)
 
@@ -81,13 +81,13 @@ def weigh(
         With the effects of the fit.
     found : Fit
     experiments, instruments : sequence of Experiment
-        Recordings, and the same with the motion that was asked for; the first ``n_train`` are for training.
+        Recordings, and these recordings along the instrument motion; the first ``n_train`` are for training.
     n_train : int
     scales : mapping of str to Scales
     noises : sequence of Noise or None
         Of each channel; None learns them from the training recordings.
     runs : lists of NoiseChannel, optional
-        What the noise of every channel hangs on, as another fit has it: two models are compared under one noise.
+        What the noise of every channel depends on, as another fit has it: two models are compared under one noise.
     search : bool
         False leaves out all hypotheses: only the evidence of the fit itself is wanted.
     nameless : mapping of (channel, words) to float, optional
@@ -136,7 +136,7 @@ def _runs(
     n_train: int,
     scale: Array,
 ) -> list[list[NoiseChannel]]:
-    """What the noise of every channel of every recording hangs on."""
+    """What the noise of every channel of every recording depends on."""
     train, made = experiments[:n_train], []
     peaks = np.max([np.abs(e.motion.qd).max(axis=0) for e in train], axis=0)
     travels = np.max([np.ptp(e.motion.q, axis=0) for e in train], axis=0)
@@ -167,7 +167,7 @@ def _level(
     peak: float,
     scale: float,
 ) -> float:
-    """How much a joint may hold at rest [T]: its level of dry friction, or what is left over there."""
+    """How much a joint may hold at rest [T]: its level of dry friction, or the residual there."""
     joint = assembly.tree.joints[channel].name
     torque = {
         assembly.unit(p, x) for p in assembly.placed if p.at == joint for x in p.effect.parameters if x.unit == "T"

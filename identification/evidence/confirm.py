@@ -1,6 +1,6 @@
 """Confirm on the held-out recordings what a search named, by the same evidence.
 
-With an effect and without it the rest is fitted again, and both models foretell the held-out recordings: the log
+With an effect and without it the rest is fitted again, and both models predict the held-out recordings: the log
 density of these given the training recordings (Dawid 1984), every nuisance integrated out anew. The nameless curves
 that the search ended with stand beside both, so that what only stands in for one of them is not missed.
 A name stays if that density falls without it by more than it scatters over blocks of time, and if what is missed is
@@ -19,8 +19,8 @@ from ..fitting.experiment import Experiment, Scales
 from ..fitting.fit import Fit, channel_rms
 from ..search.refit import without
 from .arm import weigh
-from .found import ArmNaming, ArmSelection
 from .projected import ProjectedEvidence
+from .selection import ArmNaming, ArmSelection
 
 Array = NDArray[np.float64]
 
@@ -73,7 +73,7 @@ class ArmConfirmation:
     missed: Mapping[str, ArmLoss]
     model: Model
     fit: Fit
-    foretold: PredictiveDensity
+    forecast: PredictiveDensity
 
 
 def confirm(
@@ -90,7 +90,7 @@ def confirm(
     """
     progress("confirming on the held-out recordings")
     model, final = found.model, found.fit
-    whole = foretold(model, final, found, train, held, scales)
+    whole = forecast(model, final, found, train, held, scales)
     left = {n.placed.key: n for n in found.names}
     missed: dict[str, ArmLoss] = {}
     rejected: list[ArmNaming] = []
@@ -111,14 +111,14 @@ def confirm(
                 rejected.append(out)
                 weak[weakest] = gone
             model = _without(model, weakest)
-            whole = foretold(model, final, found, train, held, scales)
+            whole = forecast(model, final, found, train, held, scales)
             stale = set(left)
             progress(f"confirming on the held-out recordings: {out.placed.key} is not missed, {len(left)} left")
     names = tuple(sorted(left.values(), key=lambda n: -missed[n.placed.key].size))
     return ArmConfirmation(found, names, tuple(rejected), weak, missed, model, final, whole)
 
 
-def foretold(
+def forecast(
     model: Model,
     own: Fit,
     found: ArmSelection,
@@ -126,7 +126,7 @@ def foretold(
     held: Sequence[Experiment],
     scales: Mapping[str, Scales],
 ) -> PredictiveDensity:
-    """How well a fitted model foretells the held-out recordings."""
+    """How well a fitted model predicts the held-out recordings."""
     n = len(train)
     noise = found.weighed
     weighed = weigh(
@@ -179,7 +179,7 @@ def _missed(
     """Take one effect out of a fit, and fit the rest again."""
     key = name.placed.key
     rest = without(final, [key], train)
-    other = foretold(_without(model, key), rest, found, train, held, scales)
+    other = forecast(_without(model, key), rest, found, train, held, scales)
     c = list(name.channels)
     with_it, measured = channel_rms(final.assembly, held, final.theta)
     rms, _ = channel_rms(rest.assembly, held, rest.theta)
@@ -194,7 +194,7 @@ def _missed(
 
 def _explained(found: ArmSelection, final: Fit, rest: Fit, held: Sequence[Experiment], c: int) -> float:
     """Share of a channel's residual energy that goes with an effect, every sample by its own variance: near rest, where
-    a joint holds any torque, little counts. What wanders counts as left over, for a law without a name may be it."""
+    a joint holds any torque, little counts. A wander counts as residual, because a law without a name may look like one."""
     n, sums = found.weighed.n_train, np.zeros(2)
     for e, row in zip(held, found.weighed.evidence.channels[n:], strict=True):
         both = [f.assembly.residual(e, f.theta)[0][:, c] for f in (final, rest)]

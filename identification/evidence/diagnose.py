@@ -9,9 +9,9 @@ from ..fitting.base_parameters import BaseParameters
 from ..fitting.experiment import Experiment, Scales
 from ..verdict import Verdict, verdict
 from .confirm import ArmConfirmation, confirm
-from .found import ArmNaming
-from .left import NamelessParts, left_over
+from .nameless import NamelessParts, left_over
 from .rounds import search
+from .selection import ArmNaming
 
 
 @dataclass(frozen=True)
@@ -66,6 +66,6 @@ def decide(
         )
         last = confirm(again, train, held, scales, progress)
         rejected |= {n.placed.key: n for n in last.rejected}
-        if last.foretold.density > best.foretold.density:
+        if last.forecast.density > best.forecast.density:
             best = last
     return ArmDecision(best, left_over(best, scales, train, held, rejected), tuple(rejected.values()))

@@ -165,7 +165,7 @@ class Evidence:
         return self._rows[key]
 
     def with_covariances(self, c: int, covariances: Sequence[Covariance]) -> "Evidence":
-        """The same with other covariances of one channel, one a recording."""
+        """This evidence with other covariances of one channel, one a recording."""
         other = copy(self)
         other.channels = [list(row) for row in self.channels]
         other._forget(c)
@@ -174,7 +174,7 @@ class Evidence:
         return other
 
     def _forget(self, c: int) -> None:
-        """Forget, on a copy, what hangs on the covariance of a channel."""
+        """Forget, on a copy, what depends on the covariance of a channel."""
         self._made = {key: x for key, x in self._made.items() if key[1] != c}
         self._own = {key: x for key, x in self._own.items() if key[1] != c}
         self._rows = {key: x for key, x in self._rows.items() if key[1] != c}
@@ -197,7 +197,7 @@ class Evidence:
         return other, own, always
 
     def with_channel(self, c: int, alone: "Evidence") -> "Evidence":
-        """The same with one channel as it became by itself: another covariance, and its products."""
+        """This evidence with one channel's covariance and products taken from ``alone``."""
         other = copy(self)
         other.channels = [list(row) for row in self.channels]
         other._forget(c)

@@ -95,7 +95,7 @@ def log_bayes(curvature: Array, score: Array, positive: NDArray[np.bool_]) -> Ar
 
 
 def log_bayes_whole(curvature: Array, score: Array) -> Array:
-    """The same of a column that is a whole law, its amplitude about one: (N,)."""
+    """Log Bayes factors (N,) of columns that are a whole law each, with an amplitude about one."""
     h = np.maximum(curvature, 0.0)
     left = score - h
     k2 = WHOLE**2

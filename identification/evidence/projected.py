@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ProjectedStack(ItemStack):
-    """The same with their curvature (N, k, k) and score (N, k), all that stands beside projected out."""
+    """Items with their curvature (N, k, k) and score (N, k), the nuisance columns projected out."""
 
     curvature: Array
     score: Array

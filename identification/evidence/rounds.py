@@ -16,11 +16,11 @@ from ..search.closed_loop import planned
 from ..search.refit import assemble, refitted
 from ..search.rest import fitted
 from .arm import WeighedRecordings, weigh
-from .found import ArmNaming, ArmSelection, ArmTrial
 from .hypotheses import remembers, rings
 from .members import Members, log_bayes
 from .rival import RivalOdds
 from .search import Member, MemberOdds, Search
+from .selection import ArmNaming, ArmSelection, ArmTrial
 from .tolerant import searched
 
 Array = NDArray[np.float64]

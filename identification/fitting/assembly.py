@@ -198,7 +198,7 @@ class TorqueModel:
         }
 
     def keep(self, placed: Sequence[PlacedEffect], theta: Array) -> "TorqueModel":
-        """The same model with only some of its effects, to start from where it is."""
+        """This model with only some of its effects, started from its values."""
         kept = TorqueModel(self.tree, placed, self.base, self.scales, self.values(theta))
         kept.phi = self.phi
         return kept

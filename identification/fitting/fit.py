@@ -1,8 +1,8 @@
 """Joint fit of all parameters to all recordings: weighted least squares in the analysis band, with covariance.
 
 Output error in torque: measured torque minus the model's along the measured motion, each channel weighted by its own
-residual (iteratively reweighted). The covariance is the sandwich over half-second clusters, because what is left over
-is never white (White 1980; Liang & Zeger 1986).
+residual (iteratively reweighted). The covariance is the sandwich over half-second clusters, because the residual is
+never white (White 1980; Liang & Zeger 1986).
 """
 
 from collections.abc import Callable, Sequence

@@ -3,7 +3,7 @@
 One pass over the samples gives cost, gradient and normal matrix; the (n_samples, n_parameters) Jacobian need never
 stand in memory at once, which is what makes it quicker than a general solver where samples are many and parameters few
 (Levenberg 1944; Marquardt 1963). Where residuals stay large, the curvature that the normal matrix lacks is learnt from
-the steps, and used while it foretells them better. Bounds are kept by solving each step's quadratic program (Stark &
+the steps, and used while it predicts them better. Bounds are kept by solving each step's quadratic program (Stark &
 Parker 1995, BVLS).
 """
 

@@ -3,7 +3,7 @@
 The search runs over the shape parameters s alone; for every s the amplitudes a are solved between their bounds. Where
 amplitude and shape trade off along a curved valley, as they do in friction curves, this gets to the end where a search
 over both crawls (Golub & Pereyra 1973). A step is Kaufman's (1975): the Schur complement of the normal equations.
-Amplitudes for a new s are foretold to first order, so that a point takes one pass over the samples or two.
+Amplitudes for a new s are predicted to first order, so that a point takes one pass over the samples or two.
 """
 
 import numpy as np
@@ -87,20 +87,20 @@ class _Search:
         self._scale = np.zeros(len(start))
 
     def __call__(self, shape: Array) -> NormalEquations:
-        foretold = self.theta + self._follow @ (shape - self.theta[self._shapes])
-        foretold[self._shapes] = shape
+        forecast = self.theta + self._follow @ (shape - self.theta[self._shapes])
+        forecast[self._shapes] = shape
         low, high = self._objective.low, self._objective.high
-        foretold = np.clip(foretold, low, high)
-        theta, cost, here = project(self._objective, foretold, self._shapes, self._scale)
+        forecast = np.clip(forecast, low, high)
+        theta, cost, here = project(self._objective, forecast, self._shapes, self._scale)
         if not np.isfinite(cost):
             return NormalEquations(np.inf, np.zeros(len(shape)), np.zeros((len(shape), len(shape))))
         self._scale = np.maximum(self._scale, np.sqrt(np.diag(here.matrix)))
         progress = self.here.cost - cost if np.isfinite(self.here.cost) else 0.0
         if here.cost - cost > WORTH_A_PASS * abs(progress):
             there = self._objective.normal(theta)
-            theta, here = (theta, there) if there.cost < here.cost else (foretold, here)
+            theta, here = (theta, there) if there.cost < here.cost else (forecast, here)
         else:
-            theta = foretold
+            theta = forecast
         free = ~self._shapes & (theta > low) & (theta < high)
         reduced, follow = _schur(here, free, self._shapes, self._scale)
         if here.cost < self.here.cost:

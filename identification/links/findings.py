@@ -60,8 +60,8 @@ def _finding(one: EncoderComparison, n: Naming, values: dict[str, Estimate]) -> 
     else:
         share = max(0.0, 1 - (within / max(without, 1e-300)) ** 2)
         text += (
-            f"it explains {percent(share)} of what motor and link encoder of {joint} differ by without it; taking it "
-            f"out again raises the difference left on the held-out recording from {length(within, unit)} to "
+            f"it explains {percent(share)} of the difference of motor and link encoder of {joint}. Without it, the "
+            f"remaining difference on the held-out recording rises from {length(within, unit)} to "
             f"{length(without, unit)}.{_twist(one, n)}"
         )
     # Of a fault that time does not tell apart, the two cannot say which of the two encoders is off.

@@ -23,7 +23,7 @@ from ..evidence.confirm import FEWEST_BLOCKS
 from ..fitting.assembly import TorqueModel
 from ..fitting.experiment import Experiment, Scales
 from ..nuisance.curve import Coordinates, family
-from ..nuisance.noise import NoiseChannel as Hangs
+from ..nuisance.noise import NoiseChannel
 from ..nuisance.rest import SETTLES, STICKS, share
 from ..sources.source import GridPoint, Linearisation, ModelPoint
 from .run import EncoderPair
@@ -98,7 +98,7 @@ class Links:
         return found
 
     def refused(self, i: int) -> InputError:
-        return InputError(f"{self.rows[i][0].motion.path}: the encoders cannot be foretold")
+        return InputError(f"{self.rows[i][0].motion.path}: the encoders cannot be predicted")
 
     def slopes(self, i: int, at: ModelPoint, here: Array) -> Array:
         found, k = np.zeros((*here.shape, len(at.values))), 0
@@ -203,12 +203,12 @@ class Links:
             lambda m: np.abs(m.qd[:, j]), lambda m: np.ptp(m.q[:, j])))  # fmt: skip
         return max(speed, 1e-12), max(travel, 1e-12)
 
-    def hangs(
+    def noise_channels(
         self, numbers: Sequence[int], linear: Linearisation, could: Sequence[Sequence[Array]]
-    ) -> list[list[Hangs]]:
+    ) -> list[list[NoiseChannel]]:
         """Where a joint stands, friction holds its drive wound up by what no load tells, and encoders hold their steps:
         what nothing explains there, in the RMS, and `LEAST_LEVEL` of the channel at least."""
-        found: list[list[Hangs]] = [[] for _ in numbers]
+        found: list[list[NoiseChannel]] = [[] for _ in numbers]
         for c in range(len(self.joints)):
             peak, travel = self._moves(c)
             motions, j = [self.rows[i][c].motion for i in numbers], self.rows[0][c].joint
@@ -222,7 +222,7 @@ class Links:
                 level = max(level, float(np.sqrt(left @ left / (len(left) - beside.shape[1]))))
             for own, m, x in zip(found, motions, shares, strict=True):
                 step, n = m.period * m.thinning, len(x[0])
-                own.append(Hangs(step, m.band_segments(), np.zeros(n), tuple(x[:-1]), x[-1], level))
+                own.append(NoiseChannel(step, m.band_segments(), np.zeros(n), tuple(x[:-1]), x[-1], level))
         return found
 
     def blocks(self, i: int, x: Array) -> Array:

@@ -51,7 +51,7 @@ class Coordinates:
 
     @staticmethod
     def along(m: Motion, load: Array, joint: int, peak: float, travel: float) -> "Coordinates":
-        """The same of a motion and the joint's load (n,)."""
+        """Coordinates of a joint along a motion, given its load (n,)."""
         speed = m.qd[:, joint]
         power = load * speed
         return Coordinates(

@@ -46,8 +46,10 @@ def slow(experiment: Experiment, joint: int, share: float = REST) -> Mask:
 
 
 def moving(experiment: Experiment, shares: Sequence[float] | None = None) -> Experiment:
-    """The same without what happens near rest: bridged, for it would reach far through the low-pass into the samples
-    in motion; and what lies on the bridges counts for nothing, for a line between two samples has their noise.
+    """The experiment without its samples near rest.
+
+    They are bridged, because the low-pass would carry them far into the samples in motion. Samples on a bridge do not
+    count: a line between two samples has the noise of these two.
 
     ``shares`` of the peak speed are where motion begins, for each channel; `REST` by default.
     """

@@ -140,8 +140,8 @@ def _finding(
     before, after = max(pairs, key=lambda e: e[0].relative - e[1].relative)
     what = placed.effect.sentence
     evidence = (
-        f"{what[:1].upper()}{what[1:]}: it explains {percent(named.trial.explained)} of what the model so far left "
-        f"over; taking it out again raises the error of {before.channel} on the held-out capture from "
+        f"{what[:1].upper()}{what[1:]}: it explains {percent(named.trial.explained)} of the remaining residual. "
+        f"Without it, the error of {before.channel} on the held-out capture rises from "
         f"{_size(after.rms, after.unit)} to {_size(before.rms, before.unit)}."
     )
     values = estimates(train, found.last)[placed.key]

@@ -67,7 +67,7 @@ def channels(capture: CaptureRecording) -> list[MeasuredChannel]:
 
 
 def modelled(capture: CaptureRecording, track: Track) -> list[Array]:
-    """The same channels of a simulation, (n,) each."""
+    """A capture's `channels` as a simulation has them, (n,) each."""
     found = [*slow_means(track.position).T]
     for body in capture.sensors:
         found += [*slow_means(track.force[body]).T]

@@ -33,7 +33,7 @@ LEAST = {"position": 1.5e-4, "turn": 4e-3, "slow": 0.05, "chatter": 0.15}
 MuJoCo under a smooth skin and this snare do by 0.15 mm on a soft pin; on a hard one, where cables bounce, by more, as
 the residual itself then says. Less than that is no physics left out."""
 LEAST_SHARE = 0.02
-"""The same of a force, as a share of its RMS; rods and this snare: 0.02 on a soft pin, 0.09 on a hard one."""
+"""Least difference of forces, as a share of their RMS; rods and this snare: 0.02 on a soft pin, 0.09 on a hard one."""
 QUIET = 0.05
 """[N] Chatter below this is none."""
 

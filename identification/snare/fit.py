@@ -73,7 +73,8 @@ def started(captures: CaptureSet, placed: Sequence[PlacedEffect], x: Array) -> C
 
 
 def with_slopes(captures: CaptureSet, at: CaptureFit) -> CaptureFit:
-    """The same with derivatives by the handles, one difference each, away from the upper bound; 0 where none can be."""
+    """This fit with derivatives by the handles: one forward difference each (backward at the upper bound), 0 where the
+    capture cannot be simulated."""
     _, high = bounds(at.placed)
     step = steps(at.placed)
     step = np.where(at.x + step > high, -step, step)
@@ -153,8 +154,8 @@ def _broyden(here: CaptureFit, there: CaptureFit, step: Array) -> Slopes:
     share = move / step**2 / max(float(np.sum((move / step) ** 2)), 1e-300)
     made: list[list[dict[str, Array]]] = [[] for _ in move]
     for c, (a, b) in enumerate(zip(here.residuals, there.residuals, strict=True)):
-        foretold = {name: sum(own[c][name] * m for own, m in zip(here.slopes, move, strict=True)) for name in a}
-        miss = {name: b[name] - a[name] - foretold[name] for name in a}
+        forecast = {name: sum(own[c][name] * m for own, m in zip(here.slopes, move, strict=True)) for name in a}
+        miss = {name: b[name] - a[name] - forecast[name] for name in a}
         for k, own in enumerate(here.slopes):
             made[k].append({name: own[c][name] + miss[name] * share[k] for name in a})
     return tuple(tuple(m) for m in made)

@@ -18,7 +18,7 @@ from .recording import EVERY, CaptureRecording, Track
 SEARCH = (5e-3, 6, 1e-3)
 """Step [s], elements per cable and first steps [s] in a search: within 0.1 mm of finer ones over a capture."""
 FINER = (1e-3, 10, 2.5e-4)
-"""The same where the coarse ones do not converge."""
+"""Step [s], elements per cable and first steps [s] where `SEARCH` does not converge."""
 
 MOST_LOST = 3
 """Times that processes which died are replaced."""

@@ -122,7 +122,7 @@ def start_at(model: Model, captures: CaptureSet) -> CaptureFit:
 
 
 def demand_simulated(model: Model, at: CaptureFit) -> CaptureFit:
-    """The same; raises InputError for a capture that cannot be simulated, fitted or held out."""
+    """The fit as it came; raises InputError for a capture, fitted or held out, that cannot be simulated."""
     if not np.isfinite(at.likelihood):
         raise InputError(
             f"{model.path}: the capture cannot be simulated from where the recording starts (the pin inside a cable, "

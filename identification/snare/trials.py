@@ -1,7 +1,7 @@
 """One round of the search over a capture's effects: every candidate tried, the best few fitted.
 
 Each candidate is tried at a few values beside what the model has; the likelihood that this would reach, once the
-model's own parameters have moved, is foreseen from their derivatives. The best few are fitted together with everything
+model's own parameters have moved, is expected from their derivatives. The best few are fitted together with everything
 else.
 """
 
@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 FITTED = 3
 """Candidates of a round that are fitted."""
 HOPE = 2.0
-"""A candidate that is foreseen to lose more of the likelihood is not fitted."""
+"""A candidate that is expected to lose more of the likelihood is not fitted."""
 FORESIGHT = 4.0
 """How far derivatives are believed where no simulation follows, in units of the differences."""
 
@@ -50,7 +50,7 @@ def try_all(
     rejected: Collection[str],
     progress: Callable[[str], None],
 ) -> tuple[CaptureTrial, ...]:
-    """Try all candidates beside a fit, and fit the best few; best foreseen first.
+    """Try all candidates beside a fit, and fit the best few; best expected first.
 
     Parameters
     ----------
@@ -75,8 +75,8 @@ def try_all(
         tries = evaluate(captures, (*found.placed, p), places[p.key])
         entries.append((*_most_hopeful(captures.captures, found, tries), p, tries))
     trials = []
-    for rank, (foreseen, best, p, tries) in enumerate(sorted(entries, key=lambda e: -e[0])):
-        hopeful = foreseen > found.likelihood - HOPE and np.isfinite(best.likelihood)
+    for rank, (expected, best, p, tries) in enumerate(sorted(entries, key=lambda e: -e[0])):
+        hopeful = expected > found.likelihood - HOPE and np.isfinite(best.likelihood)
         if rank < FITTED and hopeful and p.key not in rejected:
             progress(f"fitting {p.effect.name} at {p.at} together with what is there")
             best = _joint(captures, found, [f for f in tries if f.residuals], absent(model, p))
@@ -109,7 +109,7 @@ def _joint(captures: CaptureSet, found: CaptureFit, tried: Sequence[CaptureFit],
         {name: (a[name] - b[name]) / gap for name in a} for a, b in zip(best.residuals, other.residuals, strict=True)
     )
     here = replace(best, slopes=(*found.slopes, last))
-    _, moved = _foreseen(own, found, best)
+    _, moved = _expected(own, found, best)
     if np.any(moved != found.x):
         (start,) = evaluate(captures, placed, [np.append(moved, best.x[-1])])
         here = replace(start, slopes=here.slopes) if start.likelihood > best.likelihood else here
@@ -119,11 +119,11 @@ def _joint(captures: CaptureSet, found: CaptureFit, tried: Sequence[CaptureFit],
 def _most_hopeful(
     captures: Sequence[CaptureRecording], found: CaptureFit, tries: Sequence[CaptureFit]
 ) -> tuple[float, CaptureFit]:
-    """The try that is foreseen to reach the most of L, after that."""
-    return max(((_foreseen(captures, found, f)[0], f) for f in tries), key=lambda e: e[0])
+    """The try that is expected to reach the most of L, after that."""
+    return max(((_expected(captures, found, f)[0], f) for f in tries), key=lambda e: e[0])
 
 
-def _foreseen(captures: Sequence[CaptureRecording], found: CaptureFit, there: CaptureFit) -> tuple[float, Array]:
+def _expected(captures: Sequence[CaptureRecording], found: CaptureFit, there: CaptureFit) -> tuple[float, Array]:
     """L of a try once the parameters that were there move as their derivatives allow, and where they then stand."""
     if not np.isfinite(there.likelihood) or not len(found.x):
         return there.likelihood, found.x

@@ -1,6 +1,6 @@
 """Confirm on the held-out recordings what a search named: log density of them given the others, with and without each.
 
-As in `evidence.confirm`: without an effect the rest is fitted again, and both foretell the held-out recordings, every
+As in `evidence.confirm`: without an effect the rest is fitted again, and both predict the held-out recordings, every
 nuisance integrated out. A name stays if that density falls without it by more than it scatters over blocks of time. By
 the same rule a nameless curve of the last search stays.
 """
@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from ..deciding import DISCREPANCY, GATE, TOLERANCES
 from ..evidence.arm import WeighedRecordings
 from ..evidence.confirm import scatter
-from ..evidence.found import Remainder
 from ..evidence.members import Members
 from ..evidence.projected import ProjectedEvidence
 from ..evidence.rounds import as_names, share_of_residual
 from ..evidence.search import MemberOdds, Search
+from ..evidence.selection import Remainder
 from ..evidence.tolerant import searched
 from .fit import fit, linearised, shift_columns
 from .search import Naming, Selection, opened
@@ -69,8 +69,8 @@ def confirm(
     there = linearised(source, held, source.settled(last.at, held))
     beside = shift_columns(there)
     could = [[x[:, c] for x in there.columns] for c in range(len(source.channels))]
-    noise = replace(found.weighed, runs=[*found.weighed.runs, *source.hangs(held, there, could)])
-    whole = _foretold(source, given, last, there, noise)
+    noise = replace(found.weighed, runs=[*found.weighed.runs, *source.noise_channels(held, there, could)])
+    whole = _forecast(source, given, last, there, noise)
     missed: dict[str, HeldOutLoss] = {}
     rejected: list[Naming] = []
     while names:
@@ -78,7 +78,7 @@ def confirm(
             key = name.placed.key
             rest = fit(source, given, last.at.without(key), own, shifted)
             other = linearised(source, held, source.settled(rest.at, held), beside)
-            density, blocks = _foretold(source, given, rest, other, noise)
+            density, blocks = _forecast(source, given, rest, other, noise)
             missed[key] = HeldOutLoss(whole[0] - density, scatter(0.5 * (blocks - whole[1])), rest, other)
         weakest = min(names, key=lambda n: missed[n.placed.key].sure)
         if missed[weakest.placed.key].sure > GATE:
@@ -87,11 +87,11 @@ def confirm(
         rejected.append(weakest)
         gone = missed.pop(weakest.placed.key)
         last, there = gone.train, gone.held
-        whole = _foretold(source, given, last, there, noise)
+        whole = _forecast(source, given, last, there, noise)
     return Confirmation(tuple(names), missed, tuple(rejected), last, there, whole[0], noise)
 
 
-def _foretold(
+def _forecast(
     source: Source, given: ModelPoint, here: Linearisation, there: Linearisation, known: WeighedRecordings
 ) -> tuple[float, Array]:
     """Log density of the held-out recordings given the training ones, averaged over how exactly the shifts may be

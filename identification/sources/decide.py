@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ..deciding import SECOND_CHOICES
-from ..evidence.found import Remainder
+from ..evidence.selection import Remainder
 from ..verdict import Verdict, verdict
 from .confirm import Confirmation, confirm, remainders
 from .fit import residuals

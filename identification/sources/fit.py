@@ -28,8 +28,8 @@ FARTHEST = 4.0
 """Most that a shift is moved [deviations]."""
 
 
-def foretold(source: Source, i: int, at: ModelPoint) -> Array:
-    """Channels of a recording (n, c); raises InputError where they cannot be foretold."""
+def forecast(source: Source, i: int, at: ModelPoint) -> Array:
+    """Channels of a recording (n, c); raises InputError where they cannot be predicted."""
     found = source.predicted(i, at)
     if found is None:
         raise source.refused(i)
@@ -37,8 +37,8 @@ def foretold(source: Source, i: int, at: ModelPoint) -> Array:
 
 
 def residuals(source: Source, numbers: Sequence[int], at: ModelPoint) -> tuple[Array, ...]:
-    """Measurement less what is foretold, 0 where nothing was measured."""
-    return tuple(np.nan_to_num(source.measured(i) - foretold(source, i, at)) for i in numbers)
+    """Measurement less what is predicted, 0 where nothing was measured."""
+    return tuple(np.nan_to_num(source.measured(i) - forecast(source, i, at)) for i in numbers)
 
 
 def linearised(
@@ -48,7 +48,7 @@ def linearised(
     known."""
     columns, left = [], []
     for k, i in enumerate(numbers):
-        here = foretold(source, i, at)
+        here = forecast(source, i, at)
         left.append(np.nan_to_num(source.measured(i) - here))
         beside = source.shift_slopes(i, at, here) if shifted is None else shifted[k]
         columns.append(np.concatenate([source.slopes(i, at, here), beside], axis=2))
@@ -62,14 +62,14 @@ def differences(source: Source, i: int, at: ModelPoint, here: Array) -> Array:
         size = SMALL * max(abs(at.values[k]), source.size(p, x))
         step = size if at.values[k] + size <= source.bounds(p, x)[1] else -size
         moved = replace(at, values=at.values + step * np.eye(len(at.values))[k])
-        own.append((foretold(source, i, moved) - here) / step)
+        own.append((forecast(source, i, moved) - here) / step)
     return np.stack(own, axis=2) if own else np.zeros((*here.shape, 0))
 
 
 def shift_differences(source: Source, i: int, at: ModelPoint, here: Array) -> Array:
-    """The same by the shifts (n, c, S)."""
+    """Derivatives by the shifts (n, c, S), by differences of one deviation."""
     units = np.eye(len(at.shifts))
-    return np.stack([foretold(source, i, replace(at, shifts=at.shifts + u)) - here for u in units], axis=2)
+    return np.stack([forecast(source, i, replace(at, shifts=at.shifts + u)) - here for u in units], axis=2)
 
 
 def shift_columns(linear: Linearisation) -> list[Array]:

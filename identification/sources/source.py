@@ -1,4 +1,4 @@
-"""One interface for a kind of recording: what was measured, what values foretell of it, and what else can act.
+"""One interface for a kind of recording: what was measured, what values predict of it, and what else can act.
 
 A kind is one package that offers a `Source`; fit, evidence, search and confirmation see nothing else of it. Letters: n
 samples of a recording, c channels, P free parameters of effects, S shifts.
@@ -127,15 +127,15 @@ class Source(Protocol):
         ...
 
     def predicted(self, i: int, at: ModelPoint) -> Array | None:
-        """The same foretold; None where it cannot be."""
+        """Channels as the model predicts them (n, c); None where it cannot."""
         ...
 
     def refused(self, i: int) -> InputError:
-        """What is wrong where nothing can be foretold."""
+        """What is wrong with a recording that the model cannot predict."""
         ...
 
     def slopes(self, i: int, at: ModelPoint, here: Array) -> Array:
-        """Derivatives (n, c, P) by the free parameters about what is foretold ``here``."""
+        """Derivatives (n, c, P) by the free parameters about what is predicted ``here``."""
         ...
 
     def shift_slopes(self, i: int, at: ModelPoint, here: Array) -> Array:
@@ -171,17 +171,17 @@ class Source(Protocol):
         ...
 
     def columns(self, i: int, at: ModelPoint, v: GridPoint) -> Array:
-        """What an effect adds beside those that are there (n, c, k); not a number where it cannot be foretold."""
+        """What an effect adds beside those that are there (n, c, k); not a number where it cannot be predicted."""
         ...
 
     def curves(self, numbers: Sequence[int]) -> Mapping[tuple[int, str], list[Array]]:
         """Nameless curves by channel and what they run over in words: columns (n, k) for each recording."""
         ...
 
-    def hangs(
+    def noise_channels(
         self, numbers: Sequence[int], linear: Linearisation, could: Sequence[Sequence[Array]]
     ) -> list[list[NoiseChannel]]:
-        """What the noise of every channel of every recording hangs on; ``could`` (n, k) by channel and recording: what
+        """What the noise of every channel of every recording depends on; ``could`` (n, k) by channel and recording: what
         could explain the residuals."""
         ...
 

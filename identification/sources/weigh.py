@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from ...models.model import PlacedEffect
 from ..deciding import DISCREPANCY, LAW_ERROR
 from ..evidence.arm import WeighedRecordings, principal
-from ..evidence.beside import NuisanceColumns
 from ..evidence.evidence import Evidence, ResidualChannel
 from ..evidence.hypotheses import pool
+from ..evidence.nuisance_columns import NuisanceColumns
 from ..evidence.pool import CandidateColumns, Item
 from ..evidence.projected import ProjectedEvidence
 from ..evidence.search import Search
@@ -76,7 +76,7 @@ def weigh(
         return principal(parts, STRONGEST)
 
     beside_laws = [could(c, True) for c in range(len(scale))] if known is None else []
-    runs = source.hangs(numbers, linear, beside_laws) if known is None else known.runs
+    runs = source.noise_channels(numbers, linear, beside_laws) if known is None else known.runs
 
     def noise(c: int, beside: Sequence[Array]) -> Noise:
         n = len(source.train)

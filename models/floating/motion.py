@@ -103,7 +103,7 @@ class FloatingMotion:
 
     @property
     def units(self) -> dict[str, str]:
-        """The same parameters' units, in pint's spelling."""
+        """Units of the `parameters`, in pint's spelling."""
         return dict(self._law.units)
 
     def check(self, values: Mapping[str, float]) -> None:

@@ -162,7 +162,7 @@ class SnareModel:
         self._move(0, pose)
 
     def move_target(self, pose: Pose) -> None:
-        """The same for a target with support ``moved``."""
+        """Say where a target with support ``moved`` will be, and how it will move, at the end of the next step."""
         self._move(1, pose)
 
     def _move(self, body: int, pose: Pose) -> None:

@@ -1,4 +1,4 @@
-"""The same capture in one Exudyn system, read as the co-simulated one is."""
+"""A capture in one Exudyn system, read as the co-simulated one is."""
 
 import numpy as np
 

@@ -11,7 +11,7 @@ from ...models.effects import get_effect
 from ...models.model import PlacedEffect, places
 from ...models.rig.rig import Rig
 from ...report.words import percent
-from .alike import StandIns, compare
+from .stand_ins import StandIns, compare
 from .study import Friction
 
 Array = NDArray[np.float64]

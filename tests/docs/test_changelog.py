@@ -46,7 +46,7 @@ def test_a_file_that_is_no_fragment_is_named_and_nothing_written(make, tmp_path,
 
 def test_an_empty_fragment_is_none_and_a_release_has_one(make, tmp_path):
     root = tree(tmp_path, law_added=" \n")
-    with pytest.raises(ValueError, match="law.added.md is no fragment"):
+    with pytest.raises(ValueError, match=r"law\.added\.md is no fragment"):
         make["release"](root, "0.2.0", "2026-12-01")
     (root / "changelog.d" / "law.added.md").unlink()
     with pytest.raises(ValueError, match="holds no fragment"):

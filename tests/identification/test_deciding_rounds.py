@@ -59,7 +59,7 @@ def test_how_much_of_a_motion_may_be_driven_is_what_the_search_asks_for(monkeypa
 
 
 def attempts(monkeypatch) -> float:
-    """How well the best attempt foretells, where each foretells better than the last and none is whole."""
+    """How well the best attempt predicts, where each predicts better than the last and none is whole."""
     density = iter(range(99))
     name = SimpleNamespace(placed=SimpleNamespace(key="a"))
     monkeypatch.setattr(deciding_all, "search", lambda *_, **__: None)
@@ -67,10 +67,10 @@ def attempts(monkeypatch) -> float:
     monkeypatch.setattr(
         deciding_all,
         "confirm",
-        lambda *_: SimpleNamespace(rejected=(name,), found=None, foretold=SimpleNamespace(density=next(density))),
+        lambda *_: SimpleNamespace(rejected=(name,), found=None, forecast=SimpleNamespace(density=next(density))),
     )
     model: Any = None
-    return deciding_all.decide(model, None, {}, [], []).best.foretold.density
+    return deciding_all.decide(model, None, {}, [], []).best.forecast.density
 
 
 def test_what_was_not_confirmed_is_looked_for_again_twice(monkeypatch):

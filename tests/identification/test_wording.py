@@ -71,8 +71,8 @@ def test_the_rivals_experiment_is_proposed_where_it_is_another(own, other, text)
 )
 def test_evidence_tells_what_is_explained_where_and_what_happens_without(channels, where):
     assert evidence_sentence(placed("joint1", ""), channels, 0.08, 0.1) == (
-        f"Friction that rubs: it explains 36 % of what the model without it leaves over on {where}; "
-        "taking it out again raises the error on the held-out recording from 8.0 % to 10 %."
+        f"Friction that rubs: it explains 36 % of the remaining residual of {where}. "
+        "Without it, the error on the held-out recording rises from 8.0 % to 10 %."
     )
 
 
@@ -102,7 +102,7 @@ def test_without_a_name_it_is_the_worst_channel_that_is_told():
     )
     assert verdict_sentence([], FITS, "") == (
         "The model is adequate: nothing larger than the limits listed is left out. "
-        "What it leaves over on the held-out recording is 30 % of tau.joint1."
+        "The remaining residual on the held-out recording is 30 % of tau.joint1."
     )
     told = verdict_sentence([], FITS, "", {"tau.joint1": "5 N·m from sample to sample", "tau.joint2": "none"})
     assert told.endswith("is 30 % of tau.joint1. It is noise: 5 N·m from sample to sample.")
@@ -189,6 +189,6 @@ def test_what_is_less_likely_than_not_is_said_last_and_so():
 
 
 def test_nothing_explains_more_than_all():
-    assert "it explains all of what the model without it leaves over on a;" in evidence_sentence(
+    assert "it explains all of the remaining residual of a." in evidence_sentence(
         placed("joint1", ""), ["a"], 0.001, 0.26
     )

@@ -16,7 +16,6 @@ from snarelab.models.model_file import load_model
 from snarelab.models.rig.rig import built_in_rig
 from snarelab.models.rigid_body import RigidBody
 from snarelab.recordings.write import write_recording
-from snarelab.studies.zero_g_rig.alike import compare
 from snarelab.studies.zero_g_rig.explain import (
     DRIFT,
     PAYLOAD,
@@ -35,6 +34,7 @@ from snarelab.studies.zero_g_rig.friction import SlideFrictionCurve
 from snarelab.studies.zero_g_rig.motion import JointMoves, Move
 from snarelab.studies.zero_g_rig.scene import rig_scene
 from snarelab.studies.zero_g_rig.score import coverage, score
+from snarelab.studies.zero_g_rig.stand_ins import compare
 from snarelab.studies.zero_g_rig.study import MODEL, Friction, friction_study
 
 LAW = {

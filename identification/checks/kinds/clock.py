@@ -12,7 +12,7 @@ UNEVEN = 0.05
 """Share of the period by which stamps must be off an even clock to be doubted."""
 
 SMOOTHER = 9.0
-"""Ratio of mean squared errors of foretold steps of position from which on an even clock is the one."""
+"""Ratio of mean squared errors of predicted steps of position from which on an even clock is the one."""
 
 ABOUT = 25
 """Samples to either side over which a joint's speed is taken."""
@@ -47,7 +47,7 @@ def _clock(case: CheckCase, dataset: xr.Dataset) -> CheckFinding | None:
         "time",
         0.99,
         f"{name}: the time stamps are not when samples were taken: they are {off:.2g} periods off an even clock, "
-        f"and over an even one steps of position are foretold {np.sqrt(np.median(ratios)):.2g} times better",
+        f"and over an even one steps of position are predicted {np.sqrt(np.median(ratios)):.2g} times better",
         f'"time" = {{ rate = {1 / mean:.9g} }}',
     )
 

@@ -31,7 +31,7 @@ def find(case: CheckCase) -> list[CheckFinding]:
 
 
 def jumps(dataset: xr.Dataset, name: str) -> list[tuple[float, float]]:
-    """(time [s], how far) of every step of a position that its neighbours do not foretell, largest first.
+    """(time [s], how far) of every step of a position that its neighbours do not predict, largest first.
 
     What is held against the steps about it is the step less what they move meanwhile. A spike that comes back at once
     is no jump.
@@ -45,7 +45,7 @@ def jumps(dataset: xr.Dataset, name: str) -> list[tuple[float, float]]:
     period = float(np.median(wait))
     speed = step / wait
     usual = median_filter(speed, 2 * ABOUT + 1, mode="nearest")
-    unforeseen = np.abs(speed - usual) * np.minimum(wait, 1.5 * period)
+    unexpected = np.abs(speed - usual) * np.minimum(wait, 1.5 * period)
     about = _largest_about(np.abs(speed - usual) * period)
     quantum = np.unique(np.round(np.abs(step[step != 0]), 12))
     count = float(quantum[0]) if len(quantum) else 0.0
@@ -53,7 +53,7 @@ def jumps(dataset: xr.Dataset, name: str) -> list[tuple[float, float]]:
     bar = np.maximum(TIMES * about, COUNTS * noise)
     bar = np.maximum(bar, TIMES * np.median(np.abs(speed)) * period)
     found = []
-    for i in np.flatnonzero((unforeseen > bar) & (wait < 1.5 * period)):
+    for i in np.flatnonzero((unexpected > bar) & (wait < 1.5 * period)):
         before, after = x[max(0, i - 3) : i + 1], x[i + 1 : i + 5]
         if len(after) < 4 or abs(float(np.median(after) - np.median(before))) < 0.5 * abs(step[i]):
             continue

@@ -73,7 +73,7 @@ def diagnosed(folder, made, text, runs, held):
 
 
 HEAVY = pytest.mark.xfail(
-    reason="a load far beside a link may be read as an encoder's zero or another unit: none is foreseen"
+    reason="a load far beside a link may be read as an encoder's zero or another unit: none is expected"
 )
 
 

@@ -91,7 +91,7 @@ def test_a_name_stays_if_it_is_missed_by_more_than_its_scatter(monkeypatch, gain
     done: Any = confirmed(monkeypatch, names(1), lambda *_: missed_by(gain, "fit without", scattered), told)
     assert (len(done.names), len(done.rejected)) == ((1, 0) if stays else (0, 1))
     assert done.fit == (frozenset([0]) if stays else "fit without")
-    assert done.foretold.density == (0.0 if stays else 1.0)  # what is left foretells anew
+    assert done.forecast.density == (0.0 if stays else 1.0)  # what is left predicts anew
     assert len(told) == (1 if stays else 2)
 
 

@@ -215,7 +215,7 @@ def test_a_step_is_the_bounded_minimum_of_the_damped_quadratic(scale, damping, l
 
 def test_the_curvature_learnt_explains_the_last_step_and_is_sized_to_it():
     """Dennis, Gay and Welsch: afterwards it turns the step into what the normal matrix left of the gradient's change.
-    Along the third axis, of which the step says nothing, it is scaled by |3| / |20|, what it foretold."""
+    Along the third axis, of which the step says nothing, it is scaled by |3| / |20|, what it predicted."""
     matrix, move, change = np.diag([1.0, 2.0, 5.0]), np.array([1.0, 1.0, 0.0]), np.array([4.0, 2.0, 0.0])
     for bend, third in ((np.zeros((3, 3)), 0.0), (10.0 * np.eye(3), 1.5), (0.1 * np.eye(3), 0.1)):
         found = _secant(bend, change, matrix, move)

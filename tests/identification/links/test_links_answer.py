@@ -14,6 +14,7 @@ from snarelab.identification.fitting.experiment import Experiment
 from snarelab.identification.links import answer
 from snarelab.identification.links.diagnose import EncoderComparison
 from snarelab.identification.links.source import Links
+from snarelab.identification.sources.decide import Decision
 from snarelab.identification.sources.source import Linearisation, ModelPoint
 
 NONE = cast(Any, None)
@@ -103,7 +104,9 @@ def answered(monkeypatch, torques, found=(), told=(1, 1), nameless=""):
     monkeypatch.setattr(answer, "_location", lambda *_: ("places",))
     monkeypatch.setattr(answer, "with_found", lambda model, at: (model, at))
     names = [SimpleNamespace(placed=placed(f.name, f.at)) for f in found]
-    decided: Any = SimpleNamespace(best=SimpleNamespace(names=names, train=SimpleNamespace(at="values")))
+    best = SimpleNamespace(names=names, train=SimpleNamespace(at="values"))
+    none: Any = None
+    decided = Decision(none, none, cast(Any, best), (), cast(Any, tuple(filter(None, [nameless]))), none)
     source: Any = SimpleNamespace(still=lambda p: p.effect.name == "sensor_bias")
     return answer.with_links(torques, cast(Any, "model"), EncoderComparison(source, decided, (), ()))
 

@@ -78,9 +78,8 @@ def test_an_effect_shares_its_probability_with_those_it_cannot_be_told_from():
     ]
     assert [r.probability for r in found.rivals] == pytest.approx([0.2, 0.008])
     assert found.evidence == (
-        "The channel lags the others by a constant time: it explains 94 % of what motor and link encoder of joint1 "
-        "differ by without it; taking it out again raises the difference left on the held-out recording from 1 mrad "
-        "to 4 mrad."
+        "The channel lags the others by a constant time: it explains 94 % of the difference of motor and link "
+        "encoder of joint1. Without it, the remaining difference on the held-out recording rises from 1 mrad to 4 mrad."
     )
 
 

@@ -226,8 +226,8 @@ def test_a_finding_tells_the_channel_that_it_made_best_and_rivals_that_count(mon
     ]
     assert [r.probability for r in found.rivals] == pytest.approx([0.09, 0.0045, 0.0009])
     assert found.evidence == (
-        "The cables rub on the pin and drag it along where they slide: it explains 60 % of what the model so far left "
-        "over; taking it out again raises the error of pos.target.x on the held-out capture from 70.7 mm to 141 mm."
+        "The cables rub on the pin and drag it along where they slide: it explains 60 % of the remaining "
+        "residual. Without it, the error of pos.target.x on the held-out capture rises from 70.7 mm to 141 mm."
     )
     assert found.parameters["coefficient"].value == pytest.approx(0.2)
     assert found.parameters["coefficient"].std == pytest.approx(np.sqrt(V) / 2)

@@ -50,7 +50,7 @@ def columns(base: Fit, placed: Sequence[PlacedEffect], experiments: Sequence[Exp
 
 
 def friction_columns(base: Fit, experiments: Sequence[Experiment], noise: Array) -> Array:
-    """The same of all that the base has fitted."""
+    """Columns of all parameters that the base has fitted."""
     return _stacked(base.assembly, base.theta, experiments, noise)
 
 

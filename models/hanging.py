@@ -24,7 +24,7 @@ CRADLE_DAMPING = 40.0
 """Of the same [N·m·s/rad], chosen: critical for the paper's 25 kg as a cube of 0.4 m."""
 
 
-def hung(target: Target, foot: ca.SX, turn: ca.SX, spin: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+def hanging_wrench(target: Target, foot: ca.SX, turn: ca.SX, spin: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
     """Wrench (6,) of line, weight and cradle on the target about its foot, in the world [N, N·m], their energy [J], and
     the power that the cradle takes [W].
 

@@ -11,10 +11,10 @@ from ..fitting.experiment import Experiment, Scales
 from ..nuisance.bursts import Bursts, ChannelResidual, bursts
 from .arm import weigh
 from .confirm import ArmConfirmation, blocks, scatter
-from .found import ArmSelection, Remainder
 from .members import Members
 from .projected import ProjectedEvidence
 from .rounds import share_of_residual
+from .selection import ArmSelection, Remainder
 from .tolerant import searched
 
 Array = NDArray[np.float64]
