@@ -35,7 +35,7 @@ _DEEP_KEY = re.compile(rf"""(?:(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){{{_
 
 
 def content(path: Path, largest: int = LARGEST_TEXT) -> bytes:
-    """The bytes of a regular file; raises InputError where it is none, cannot be read, or is larger than ``largest``."""
+    """Bytes of a regular file; raises InputError where it is none, cannot be read, or is larger than ``largest``."""
     try:
         if not path.exists():
             raise InputError(f"{path}: no such file; check the path")

@@ -51,7 +51,7 @@ STICKS = ((0.04, 0.005), (0.01, 0.001))
 """Below this share of the peak speed, or so shortly after it (share of the travel), a joint holds any torque; the
 evidence chooses one."""
 SETTLES = (0.10, 0.012)
-"""Below this share of the peak speed, or so shortly after it (share of the travel), a joint's friction still settles."""
+"""Below this share of the peak speed, or so shortly after it (share of the travel), friction still settles."""
 LEAST_LEVEL = 0.03
 """What a joint may hold at rest at least [share of the channel's RMS torque]."""
 

@@ -92,7 +92,8 @@ def verdict_sentence(
 
 def _rest(worst: ChannelFit, noise: Mapping[str, str]) -> str:
     """An adequate model's remaining residual, on the channel where it stands highest above the noise."""
-    left = f"The remaining residual on the held-out recording is {percent(worst.holdout.relative_before)} of {worst.channel}"
+    share = percent(worst.holdout.relative_before)
+    left = f"The remaining residual on the held-out recording is {share} of {worst.channel}"
     if worst.noise_floor > 0:
         left += f", {worst.holdout.rms_before / worst.noise_floor:.2g} times that channel's noise floor"
     told = f" It is noise: {noise[worst.channel]}." if worst.channel in noise else ""

@@ -194,7 +194,7 @@ def _missed(
 
 def _explained(found: ArmSelection, final: Fit, rest: Fit, held: Sequence[Experiment], c: int) -> float:
     """Share of a channel's residual energy that goes with an effect, every sample by its own variance: near rest, where
-    a joint holds any torque, little counts. A wander counts as residual, because a law without a name may look like one."""
+    a joint holds any torque, little counts. A wander counts as residual: a law without a name may look like it."""
     n, sums = found.weighed.n_train, np.zeros(2)
     for e, row in zip(held, found.weighed.evidence.channels[n:], strict=True):
         both = [f.assembly.residual(e, f.theta)[0][:, c] for f in (final, rest)]

@@ -181,8 +181,8 @@ class Source(Protocol):
     def noise_channels(
         self, numbers: Sequence[int], linear: Linearisation, could: Sequence[Sequence[Array]]
     ) -> list[list[NoiseChannel]]:
-        """What the noise of every channel of every recording depends on; ``could`` (n, k) by channel and recording: what
-        could explain the residuals."""
+        """What the noise of every channel of every recording depends on; ``could`` (n, k) by channel and recording may
+        explain the residuals."""
         ...
 
     def blocks(self, i: int, x: Array) -> Array:
