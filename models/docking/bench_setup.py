@@ -6,7 +6,6 @@ again. Keys of the table are the fields of `DockingParameters` that the test nee
 belong to an effect are refused there: an effect that the model does not list is absent.
 """
 
-import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from math import isfinite
@@ -15,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError
+from ...errors import InputError, unknown_key
 from ..effects import effects
 from ..tree import Tree
 from .groove import BALLS
@@ -156,11 +155,7 @@ def read_bench(path: Path, name: str, table: Any) -> DockingTree:
                 "under [parameters]"
             )
         if key not in (*mechanism, *bench):
-            near = difflib.get_close_matches(key, (*mechanism, *bench), 1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            raise InputError(
-                f"{path}: unknown key {key!r} in [docking]; allowed are {', '.join((*mechanism, *bench))}{hint}"
-            )
+            raise unknown_key(path, key, (*mechanism, *bench), "docking")
         if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
             raise InputError(f"{path}: [docking] {key} = {value!r}; allowed is a number")
     numbers = {key: float(value) for key, value in given.items()}
