@@ -45,7 +45,7 @@ TOLERANCES = {
 """How far numbers of the set-up may be from what they are said to be: one standard deviation, in their units; chosen as
 a workshop measures them, and for stiffness and damping of contacts as laws of contact differ."""
 FACTORS = {"breakaway": 1.0}
-"""The same of numbers that are known to a factor: one standard deviation of the logarithm; chosen, three times either
+"""Tolerances of numbers that are known to a factor: one standard deviation of the logarithm; chosen, three times either
 way. How far a contact gives way before it slides is nobody's drawing."""
 MACHINED = {f"groove_misalignment.{at}.offset": 2e-5 for at in GROOVES}
 """What a workshop's tolerance leaves of an effect: one standard deviation, in the parameter's unit; chosen. More than
