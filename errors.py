@@ -25,8 +25,17 @@ class InputError(ValueError):
         super().__init__(one_line(message))
 
 
-def nearest(name: str, known: Iterable[str]) -> str:
-    """The known name that is spelled most like ``name``; ``""`` when nothing is known."""
+def nearest(name: str, known: Iterable[str], likeness: float = 0.0) -> str:
+    """The known name that is spelled most like ``name``, of this ``likeness`` (0 to 1) at least; ``""`` for none."""
     by_spelling = {candidate.casefold(): candidate for candidate in known}
-    close = difflib.get_close_matches(name.casefold(), by_spelling, n=1, cutoff=0.0)
+    close = difflib.get_close_matches(name.casefold(), by_spelling, n=1, cutoff=likeness)
     return by_spelling[close[0]] if close else ""
+
+
+def unknown_key(path: object, key: str, allowed: Iterable[str], table: str = "") -> InputError:
+    """The fault that a file has a key which nothing reads: all that are allowed, and one that is spelled like it."""
+    allowed = list(allowed)
+    near = nearest(key, allowed, 0.6)
+    place = f" in [{table}]" if table else ""
+    hint = f"; did you mean {near!r}?" if near else ""
+    return InputError(f"{path}: unknown key {key!r}{place}; allowed are {', '.join(allowed)}{hint}")

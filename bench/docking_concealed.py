@@ -10,6 +10,7 @@ import os
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -35,13 +36,17 @@ KNOWN = {
     "carriage_friction.carriage.viscous": 200.0,
     "docking_friction.grooves.coefficient": 0.15,
 }
-SETUP = "[docking]\nrestitution = 0.8\n"
-"""MuJoCo's contacts are damped by a linear law; steel on steel."""
+SETUP = "[docking]\nrestitution = 0.8\nbreakaway = 1e-6\n"
+"""MuJoCo's contacts are damped by a linear law, steel on steel, and do not give way before they slide."""
+HELD = 1e5
+"""See `Truth.held`: a seat's friction does not creep, as steel's does not."""
 EFFECTS = ("carriage_friction", "docking_friction", "groove_misalignment", "latch_play", "preload_loss", "clean")
 PLACE, TURN, TRAVEL, FORCE, TORQUE, MOTOR, PULL = 1e-5, 3e-5, 1e-6, 0.3, 0.05, 2.0, 5.0
 """Noise of the pose [m, quaternion], the carriage's encoder [m], the target's load cell [N, N·m], the motor's force by
 its current [N], and the latches' strain gauges [N]."""
 RATE, STEP = 200.0, 2.5e-4
+HOLD = 8.0
+"""How long the preload is held once the latches close [s]: while nothing moves a fading preload shows alone."""
 _SMOOTH = 0.1
 
 
@@ -69,13 +74,13 @@ def truth_of(effect: str, rng: np.random.Generator) -> tuple[Truth, dict[str, fl
 
 def program(rng: np.random.Generator) -> tuple[Callable[[float], float], float, tuple[float, float]]:
     """Travel of a docking test by time [m], its length [s], and when its latches close [s]: out to the knob, along
-    until it sits, preload, latch, unload, and twice pushed off against the latches."""
+    until it sits, preload, latch, hold, unload, and twice pushed off against the latches."""
     pull, seat, off = rng.uniform(10, 14) * 1e-3, rng.uniform(4, 6) * 1e-3, rng.uniform(0.6, 1.0) * 1e-3
     preload, deep = 0.0573 + rng.uniform(0, 8e-4), 0.0183 + rng.uniform(0, 2e-4)
     legs = [(0.4, 0.004), (0.020 / pull, 0.024), (0.021 / seat, 0.045), (0.0123 / 5e-3, preload), (0.6, preload)]
     latch = sum(d for d, _ in legs)
     wait = rng.uniform(1.0, 3.0)
-    legs += [(1.6, preload), (2.6, 0.0215), ((0.0215 - deep) / off, deep), (0.3, deep), (0.6, 0.0215), (wait, 0.0215)]
+    legs += [(HOLD, preload), (2.6, 0.0215), ((0.0215 - deep) / off, deep), (0.3, deep), (0.6, 0.0215), (wait, 0.0215)]
     legs += [((0.0215 - deep) / off, deep), (0.3, deep), (0.6, 0.0215), (0.3, 0.0215)]
     knots = np.concatenate([[0.0], np.cumsum([d for d, _ in legs])])
     fine = np.arange(-2 * _SMOOTH, knots[-1] + 2 * _SMOOTH, 1e-3)
@@ -109,7 +114,7 @@ def record(effect: str, seed: int, folder: Path, truth: Truth | None = None) -> 
         path = folder / f"{effect}{seed}_{role}.csv"
         paths.append(path)
         if not path.exists():
-            seen = simulate(truth or drawn, travel, duration, off, turn, latch, STEP)
+            seen = simulate(replace(truth or drawn, held=HELD), travel, duration, off, turn, latch, STEP)
             write(path, seen, rng)
     return model, paths, {"at": place, **sizes}
 

@@ -6,7 +6,8 @@ boxes set back by it. MuJoCo's contact is a spring whose stiffness is normalised
 inverse mass that it compiles for the bodies, d the impedance: k is chosen for the flanks' stiffness. The mount is its
 joints' springs, the cables a tendon that bears beyond its length, a latch a tendon whose spring has a dead band, and an
 actuator for its preload. The carriage has its own mass, dry friction and position loop. Friction is MuJoCo's soft
-constraint, which creeps: its own remedy (`noslip`) makes seats jam that statics says do not.
+constraint, which creeps, by a hundredth with `held` a hundred times as large; its own remedy (`noslip`) makes seats jam
+that statics says do not.
 """
 
 from collections.abc import Callable
@@ -66,6 +67,7 @@ class Truth:
     slack: float = 0.015
     cable: tuple[float, float] = (4e5, 2000.0)
     damping: float = 0.6  # of contacts, as a ratio
+    held: float = 1e3  # how much harder friction holds than a contact (`impratio`): the more, the less it creeps
 
 
 @dataclass
@@ -255,7 +257,7 @@ def mjcf(truth: Truth, place: Array, turn: Rotation, travel: float, step: float,
         f'<general site="ball{i}" refsite="held{i}" gear="1 0 0 0 0 0" gaintype="fixed" gainprm="1"/>' for i in range(3)
     )
     return f"""<mujoco><option timestep="{step}" gravity="0 0 0" integrator="implicitfast" cone="elliptic"
- impratio="1000" iterations="50" tolerance="1e-12"/>
+ impratio="{t.held}" iterations="50" tolerance="1e-12"/>
 <default><geom condim="3" friction="{t.friction} 0 0"/></default>
 <worldbody>{"".join(lines)}
 <site name="knob" pos="{-t.knob} 0 0"/>{"".join(f'<site name="held{i}" pos="-1 0 0"/>' for i in range(3))}

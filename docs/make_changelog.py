@@ -17,9 +17,9 @@ def fragments(folder: Path) -> dict[str, list[str]]:
     for path in sorted(folder.glob("*")):
         if path.name == "README.md":
             continue
-        _, _, kind = path.name.removesuffix(".md").rpartition(".")
+        name, _, kind = path.name.removesuffix(".md").rpartition(".")
         text = path.read_text(encoding="utf-8").strip()
-        if path.suffix != ".md" or kind not in KINDS or not text:
+        if path.suffix != ".md" or not name or kind not in KINDS or not text:
             raise ValueError(
                 f"{path.name} is no fragment: NAME.KIND.md with a sentence, KIND one of {', '.join(KINDS)}"
             )

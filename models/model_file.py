@@ -1,6 +1,5 @@
 """Model files (TOML) read, with every mistake named."""
 
-import difflib
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -9,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, nearest
+from ..errors import InputError, nearest, unknown_key
 from ..files import toml_table
 from ..recordings.cuts import read_cuts
 from ..recordings.mixes import read_signal
@@ -82,9 +81,7 @@ def load_model(path: str | Path, fix: Fix = "") -> Model:
     raw = toml_table(path)
     for key in raw:
         if key not in _KEYS:
-            near = difflib.get_close_matches(key, _KEYS, 1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            raise InputError(f"{path}: unknown key {key!r}; allowed are {', '.join(_KEYS)}{hint}")
+            raise unknown_key(path, key, _KEYS)
     system = _text(path, raw, "system", "arm")
     if system not in SYSTEMS:
         raise InputError(f"{path}: system {system!r} cannot be fitted by this version; allowed: {', '.join(SYSTEMS)}")

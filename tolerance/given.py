@@ -1,23 +1,19 @@
 """Values of a study file, each checked as it is taken: InputError with the place, the value and what is allowed."""
 
-import difflib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, unknown_key
 
 
 def known(path: Path, table: str, given: Mapping[str, Any], allowed: Any) -> None:
     """Refuse keys that are not allowed (InputError), with the nearest that is."""
     for key in given:
         if key not in allowed:
-            near = difflib.get_close_matches(key, list(allowed), 1)
-            where = f"[{table}] " if table else ""
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            raise InputError(f"{path}: {where}unknown key {key!r}; allowed are {', '.join(allowed)}{hint}")
+            raise unknown_key(path, key, allowed, table)
 
 
 def table(path: Path, raw: Mapping[str, Any], key: str) -> Mapping[str, Any]:

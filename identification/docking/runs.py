@@ -10,14 +10,14 @@ from scipy.spatial.transform import Rotation
 
 from ...errors import InputError
 from ...models.docking.bench import DockingBench, DockingCommand, numbers_of
-from ...models.docking.bench_setup import MACHINED, REGISTRATION, TOLERANCES, BenchSetup
+from ...models.docking.bench_setup import FACTORS, MACHINED, REGISTRATION, TOLERANCES, BenchSetup
 from ...models.dormand_prince import StepFault
 from .recording import DockingRecording
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
-SHIFTS = (*TOLERANCES, *MACHINED, *REGISTRATION)
+SHIFTS = (*TOLERANCES, *FACTORS, *MACHINED, *REGISTRATION)
 """Numbers of the set-up that may be others than they are said to be, machining, and the pose's registration."""
 
 
@@ -51,6 +51,7 @@ class DockingRuns:
         """All that a simulation shows over each stretch of the travel; None where it fails."""
         moved = dict(zip(SHIFTS, map(float, shifts), strict=True))
         own = dict(values) | {k: self._said[k] + moved[k] * x for k, x in TOLERANCES.items() if moved[k]}
+        own |= {k: self._said[k] * float(np.exp(moved[k] * x)) for k, x in FACTORS.items() if moved[k]}
         own |= {k: values.get(k, 0.0) + moved[k] * x for k, x in MACHINED.items() if moved[k]}
         own |= {k: moved[k] * x for k, x in REGISTRATION.items() if moved[k]}
         key = number, tuple(sorted((k, float(f"{v:.12g}")) for k, v in own.items()))

@@ -6,7 +6,6 @@ again. Keys of the table are the fields of `DockingParameters` that the test nee
 belong to an effect are refused there: an effect that the model does not list is absent.
 """
 
-import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from math import isfinite
@@ -15,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError
+from ...errors import InputError, unknown_key
 from ..effects import effects
 from ..tree import Tree
 from .groove import BALLS
@@ -40,12 +39,14 @@ TOLERANCES = {
     "bumper_stiffness": 5e4,
     "damping": 100.0,
     "bumper_damping": 150.0,
-    "breakaway": 1e-5,
     "latch_stiffness": 5e6,
     "latch_preload": 50.0,
 }
 """How far numbers of the set-up may be from what they are said to be: one standard deviation, in their units; chosen as
 a workshop measures them, and for stiffness and damping of contacts as laws of contact differ."""
+FACTORS = {"breakaway": 1.0}
+"""Tolerances of numbers that are known to a factor: one standard deviation of the logarithm; chosen, three times either
+way. How far a contact gives way before it slides is nobody's drawing."""
 MACHINED = {f"groove_misalignment.{at}.offset": 2e-5 for at in GROOVES}
 """What a workshop's tolerance leaves of an effect: one standard deviation, in the parameter's unit; chosen. More than
 that is a misalignment."""
@@ -156,11 +157,7 @@ def read_bench(path: Path, name: str, table: Any) -> DockingTree:
                 "under [parameters]"
             )
         if key not in (*mechanism, *bench):
-            near = difflib.get_close_matches(key, (*mechanism, *bench), 1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            raise InputError(
-                f"{path}: unknown key {key!r} in [docking]; allowed are {', '.join((*mechanism, *bench))}{hint}"
-            )
+            raise unknown_key(path, key, (*mechanism, *bench), "docking")
         if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
             raise InputError(f"{path}: [docking] {key} = {value!r}; allowed is a number")
     numbers = {key: float(value) for key, value in given.items()}

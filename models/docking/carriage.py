@@ -32,11 +32,6 @@ def reflected_inertia(p: DockingParameters) -> float:
     return p.rotor * (2 * np.pi / p.lead) ** 2
 
 
-def force_limit(p: DockingParameters) -> float:
-    """Largest force of the motor on the carriage [N]."""
-    return 2 * np.pi * p.efficiency / p.lead * p.torque_limit
-
-
 def carriage(
     s: ca.SX, rate: ca.SX, wanted: ca.SX, speed: ca.SX, on: ca.SX, brake: ca.SX, held: ca.SX, p: dict[str, ca.SX]
 ) -> Carriage:

@@ -8,7 +8,6 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import casadi as ca
-import numpy as np
 
 from .contact import Rub, contact, damping_number
 from .groove import BALLS, axes, flank
@@ -48,11 +47,6 @@ class DockingForces(NamedTuple):
     rubbed: ca.SX
     latched: ca.SX
     grip: ca.SX
-
-
-def ball_places(p: DockingParameters) -> np.ndarray:
-    """Centres (3, 3) of the balls in the end effector's frame [m]."""
-    return np.array([p.seat * axes(i)[0] + p.radius * axes(i)[2] for i in range(BALLS)])
 
 
 def constants(p: DockingParameters) -> dict[str, float]:

@@ -103,11 +103,6 @@ class DockingMotion:
         p = constants(docking or self.parameters)
         return np.concatenate([[p[name] for name in self._names], list((self._law.start | (joints or {})).values())])
 
-    @property
-    def joint_parameters(self) -> dict[str, float]:
-        """Parameters of the joints' drive by name, with their values."""
-        return dict(self._law.start)
-
     def start(self, q: ArrayLike, qd: ArrayLike, momentum: ArrayLike) -> Array:
         """A state (n_states,): base at the world's origin, carriage at 0 and at rest, target as `Target` says.
 

@@ -4,12 +4,11 @@ A module here whose name does not start with an underscore is a member and ends 
 file; nothing else lists it.
 """
 
-import difflib
 import pkgutil
 from functools import cache
 from importlib import import_module
 
-from ...errors import InputError
+from ...errors import InputError, nearest
 from ..effect import Effect
 
 FAMILIES = (
@@ -47,6 +46,6 @@ def get_effect(name: str) -> Effect:
     known = effects()
     if name in known:
         return known[name]
-    nearest = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
-    hint = f" (nearest: {nearest[0]})" if nearest else ""
+    near = nearest(name, known, 0.5)
+    hint = f" (nearest: {near})" if near else ""
     raise InputError(f"unknown effect '{name}'{hint}; known effects: {', '.join(known)}")

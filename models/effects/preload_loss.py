@@ -25,5 +25,5 @@ EFFECT = Effect(
         Parameter("time", "s", "relaxation time", zero=5.0, low=0.5, high=1e3, grid=(1.0, 5.0, 25.0)),
     ),
     law=_law,
-    experiment="push the target off against the closed {at} at once and again later: it lifts at less force",
+    experiment="hold the preload for a while once the {at} have closed: their pull fades while nothing moves",
 )

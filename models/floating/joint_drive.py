@@ -1,6 +1,5 @@
 """What moves and brakes a joint in a simulation: a servo, or motors off, and any registered effects of a joint."""
 
-import difflib
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -10,7 +9,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...errors import InputError
+from ...errors import InputError, nearest
 from ..hidden_state import SIGNALS
 from ..model import PlacedEffect
 from ..tree import Joint
@@ -137,8 +136,8 @@ class Drive:
                 bounds[f"{placed.key}.{p.name}"] = low, np.inf if p.relative_to else p.high
         for name, value in values.items():
             if name not in known:
-                nearest = difflib.get_close_matches(name, known, n=1, cutoff=0.0)
-                raise InputError(f"{arm.tree.name}: no parameter '{name}' (nearest: {', '.join(nearest) or 'none'})")
+                near = nearest(name, known) or "none"
+                raise InputError(f"{arm.tree.name}: no parameter '{name}' (nearest: {near})")
             low, high = bounds.get(name, (0.0, np.inf))
             if not np.isfinite(value) or not low <= value <= high:
                 raise InputError(f"{arm.tree.name}: {name} is {value:g}; allowed is {low:g} to {high:g}")

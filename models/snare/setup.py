@@ -7,7 +7,6 @@ without stiffness and a rope without damping do not exist, so that the set-up's 
 list `contact_stiffness` and `cable_damping`.
 """
 
-import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -15,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError
+from ...errors import InputError, unknown_key
 from ..tree import Tree
 from .parameters import SnareParameters, wall_length
 from .target import Target
@@ -131,9 +130,7 @@ def read_setup(path: Path, name: str, table: Any, gravity: list[float]) -> Snare
                 "value under [parameters]"
             )
         if key not in _KEYS:
-            near = difflib.get_close_matches(key, _KEYS, 1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            raise InputError(f"{path}: unknown key {key!r} in [capture]; allowed are {', '.join(_KEYS)}{hint}")
+            raise unknown_key(path, key, _KEYS, "capture")
     support = given.get("target", "spring")
     if support not in SUPPORTS:
         raise InputError(f"{path}: [capture] target = {support!r}; allowed are {', '.join(SUPPORTS)}")

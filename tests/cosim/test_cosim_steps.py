@@ -84,7 +84,7 @@ def test_the_largest_magnitude_so_far_is_kept():
     assert one._step._error(outputs(one, right_force=1.2), 0.1) == pytest.approx(1.2 / 6.0 / 0.1)
 
 
-def test_what_is_foretold_follows_the_hold_through_the_last_points():
+def test_what_is_predicted_follows_the_hold_through_the_last_points():
     """Forces of -3, -1 and 5 N at equal steps: the parabola leads to 15 N, the line to 11 N."""
     for hold, forecast in (("constant", 5.0), ("linear", 11.0), ("midpoint", 11.0), ("quadratic", 15.0)):
         one = master(hold=hold, iterate=True)

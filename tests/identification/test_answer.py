@@ -93,7 +93,7 @@ def words(channel, over, share, size):
         ((name(COULOMB),), (curve(1, "load", 0.9),), "missing_physics"),
     ],
 )
-def test_the_verdict_hangs_on_names_first_and_on_nameless_curves_then(reported, names, rest, verdict):
+def test_the_verdict_depends_on_names_first_and_on_nameless_curves_then(reported, names, rest, verdict):
     made = reported(names=names, rest=rest)
     assert made.verdict == verdict
     assert bool(made.description) is bool(rest)

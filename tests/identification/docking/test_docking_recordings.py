@@ -125,6 +125,24 @@ def test_a_simulation_follows_the_test_and_is_remembered(tmp_path, model):
     np.testing.assert_allclose(moved[:, 1], once[:, 1], atol=1e-9)
 
 
+def test_presliding_is_known_to_a_factor_and_stays_above_zero(tmp_path, model, monkeypatch):
+    """A deviation is a factor of e either way: five below are still a length, where a sum would have gone below 0."""
+    given = []
+
+    class Kept:
+        def run(self, setup, values, motion):
+            given.append(values["breakaway"])
+            return np.zeros((len(motion.times) - 1, 16))
+
+    monkeypatch.setattr("snarelab.identification.docking.runs._bench", Kept)
+    runs = DockingRuns(model.tree.setup, load_records(model, [written(tmp_path, told())]))
+    one = np.eye(len(SHIFTS))[SHIFTS.index("breakaway")]
+    for shift in (1.0, -1.0, -5.0):
+        runs.seen(0, dict(model.values), shift * one)
+    said = model.tree.setup.mechanism.breakaway
+    np.testing.assert_allclose(given, said * np.exp([1.0, -1.0, -5.0]))
+
+
 def test_programs_of_the_proof_preload_and_push_off():
     travel, duration, (begun, closed) = program(np.random.default_rng(3))
     at = np.array([travel(t) for t in np.arange(0.0, duration, 0.01)])

@@ -41,7 +41,7 @@ def eager(rise) -> set[int]:
 def confirmed(monkeypatch, some, missed, told=None):
     """`confirm` with a fit that is the set of names it has, and what is missed of each given by a function."""
     densities = iter(range(100))
-    monkeypatch.setattr(module, "foretold", lambda *_: PredictiveDensity(float(next(densities)), np.zeros(4)))
+    monkeypatch.setattr(module, "forecast", lambda *_: PredictiveDensity(float(next(densities)), np.zeros(4)))
     monkeypatch.setattr(module, "_missed", missed)
     model: Any = SimpleNamespace(effects=tuple(n.placed for n in some))
     monkeypatch.setattr(module, "_without", lambda m, key: SimpleNamespace(

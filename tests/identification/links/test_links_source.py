@@ -130,7 +130,7 @@ def test_a_zero_may_be_as_large_as_the_largest_reading():
 
 
 @pytest.mark.parametrize("late", ["q", "q_link"])
-def test_what_is_foretold_is_the_sum_of_the_terms_and_the_recordings_own_zero(late):
+def test_what_is_predicted_is_the_sum_of_the_terms_and_the_recordings_own_zero(late):
     """Its slopes are those of differences, for a spring that rings and a late encoder too."""
     loads = [8 * np.sign(np.sin(4 * TIME)), 5 * np.cos(2 * TIME)]
     one = links(*(run(WAVE, WAVE, load=x, inertia=0.5) for x in loads))

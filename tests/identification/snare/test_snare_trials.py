@@ -57,7 +57,7 @@ def test_without_parameters_a_try_reaches_what_it_has():
     assert _expected([], fit_of([], [], -5.0), there)[0] == -3.0
 
 
-def test_a_try_is_foreseen_to_gain_what_the_parameters_that_were_there_make_good():
+def test_a_try_is_expected_to_gain_what_the_parameters_that_were_there_make_good():
     """Friction of 0.25 beside a pretension that is 40 N short: 1/1.01 of the way, all but (0.01/1.01)² of the gain."""
     runs = Straight({PRETENSION: RISING, FRICTION: BACK_AND_FORTH})
     captures = captures_of(runs, 140.0 * RISING + 0.3 * BACK_AND_FORTH)
@@ -80,7 +80,7 @@ def test_derivatives_are_believed_as_far_as_four_differences():
     assert _expected(captures.captures, found, there)[1] == pytest.approx([340.0])
 
 
-def test_the_most_hopeful_try_is_the_one_foreseen_highest():
+def test_the_most_hopeful_try_is_the_one_expected_highest():
     tries = [fit_of([FRICTION], [x], likelihood) for x, likelihood in ((0.1, -4.0), (0.2, -2.0), (0.3, -np.inf))]
     expected, best = _most_hopeful([], fit_of([], [], -5.0), tries)
     assert expected == -2.0
@@ -168,7 +168,7 @@ def test_a_rejected_candidate_is_tried_but_not_fitted():
 
 
 @pytest.mark.parametrize(("expected", "fitted"), [(-7.01, False), (-6.99, True), (-np.inf, False)])
-def test_the_best_three_are_fitted_if_they_are_foreseen_to_lose_less_than_two(expected, fitted, monkeypatch):
+def test_the_best_three_are_fitted_if_they_are_expected_to_lose_less_than_two(expected, fitted, monkeypatch):
     """L is -5 before; the last of four is never fitted, nor what cannot be simulated."""
     candidates = [CLEARANCE, UMBILICAL, FRICTION, PRETENSION]
     reached = dict(zip(candidates, (-1.0, -2.0, expected, expected - 0.001), strict=True))

@@ -80,7 +80,7 @@ class Slide:
     def curves(self, numbers):
         return {}
 
-    def hangs(self, numbers, linear, could):
+    def noise_channels(self, numbers, linear, could):
         none = np.zeros(N)
         return [[NoiseChannel(STEP, (slice(0, N),), none, (none,), none, 0.0)] for _ in numbers]
 
