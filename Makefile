@@ -9,7 +9,7 @@ ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
 BENCHES := torque friction_fit diagnosis joints fast floating cosim fmu snare ecos_inspection tolerance
 
-.PHONY: help demo test test-slow check studies bench accuracy fuzz kills first-hour hostile mutants proof ledger fmus docs clean $(STUDIES:%=study-%)
+.PHONY: help demo test test-slow check fix hooks studies bench accuracy fuzz kills first-hour hostile mutants proof ledger fmus docs clean $(STUDIES:%=study-%)
 
 help:            ## what can be made
 	@sed -n -e 's/^\$$(filter-out.*## /  make study-NAME\t/p' -e 's/^\([a-z-]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
@@ -30,8 +30,14 @@ test: .venv/installed ## set up, then the tests
 test-slow: .venv/installed ## the tests of whole studies and captures, which `make test` leaves out: ten minutes; CI runs them
 	$(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist loadfile -m slow
 
-check: .venv/installed ## formatting, lint and types
-	$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/pyright --pythonpath $(BIN)/python
+check: .venv/installed ## formatting, lint, words and types
+	$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/python docs/check_words.py && $(BIN)/pyright --pythonpath $(BIN)/python
+
+fix: .venv/installed ## formatting, and the lint that mends itself
+	$(BIN)/ruff check --fix --quiet . ; $(BIN)/ruff format .
+
+hooks:           ## let git run `make check` before every commit of this clone
+	git config core.hooksPath .githooks
 
 bench: .venv/installed ## ratios against named rivals, measured in one run
 	@set -e; for name in $(BENCHES); do \
@@ -63,8 +69,8 @@ mutants: .venv/installed ## change identification and cosim at random places, an
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt '.[mutants]'
 	$(BIN)/python bench/mutants.py --mutants $(MUTANTS)
 
-proof: .venv/installed ## conceal effects in another engine's recordings, let the tool name them, and score it: half an hour
-	$(BIN)/python -m proof
+proof: .venv/installed ## conceal effects in another engine's recordings, let the tool name them, and score it: half an hour; HOURS=H: what is registered, for so long, resumed
+	$(BIN)/python -m proof $(if $(HOURS),registered --hours $(HOURS))
 
 ledger: .venv/installed ## what the tool says of every recording that must not get worse, into bench/ledger.json: half an hour, resumed; OLD=FILE tells what moved
 	$(BIN)/python bench/ledger.py $(if $(OLD),--compare $(OLD))

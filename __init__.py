@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from .models.model_file import load_model
     from .recordings import read_recording
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = [
     "CheckResult",

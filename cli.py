@@ -157,7 +157,7 @@ def _complete(parser: argparse.ArgumentParser, shell: str) -> None:
 
 def _check(given: argparse.Namespace) -> None:
     one_thread()
-    from .checks.run import check_file
+    from .identification.checks.run import check_file
     from .identification.results import CheckResult
 
     demand_writable(given.json, [], given.recordings)

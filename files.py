@@ -1,7 +1,7 @@
 """Files: read within bounds, written whole or not at all.
 
 What is read may come from anywhere. Sizes are therefore checked before anything is unpacked or parsed, nothing but a
-plain file is opened (a pipe would never end), and a reader of a binary format runs under `bounded_memory`.
+regular file is opened (a pipe would never end), and a reader of a binary format runs under `bounded_memory`.
 """
 
 import glob
@@ -35,12 +35,12 @@ _DEEP_KEY = re.compile(rf"""(?:(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){{{_
 
 
 def content(path: Path, largest: int = LARGEST_TEXT) -> bytes:
-    """The bytes of a plain file; raises InputError where it is none, cannot be read, or is larger than ``largest``."""
+    """Bytes of a regular file; raises InputError where it is none, cannot be read, or is larger than ``largest``."""
     try:
         if not path.exists():
             raise InputError(f"{path}: no such file; check the path")
         if not path.is_file():
-            raise InputError(f"{path}: cannot be read: it is no plain file; name one")
+            raise InputError(f"{path}: cannot be read: it is not a regular file; name one")
         if path.stat().st_size > largest:
             raise InputError(f"{path}: has {path.stat().st_size} bytes; give a file of {largest} at most")
         return path.read_bytes()
@@ -59,13 +59,13 @@ def toml_table(path: Path) -> dict[str, Any]:
     """
     text = _text(path)
     if _DEEP_KEY.search(text):  # the parser's time grows with the square of a key's parts
-        raise InputError(f"{path}: not a TOML file: a key has more than {_DEEPEST} parts; mend that line")
+        raise InputError(f"{path}: not a TOML file: a key has more than {_DEEPEST} parts; correct that line")
     try:
         table = tomllib.loads(text)
     except RecursionError:
         raise InputError(f"{path}: not a TOML file: lies more than {_DEEPEST} deep; make it flatter") from None
     except ValueError as error:  # TOMLDecodeError, and numbers with thousands of digits
-        raise InputError(f"{path}: not a TOML file: {error}; mend that line") from None
+        raise InputError(f"{path}: not a TOML file: {error}; correct that line") from None
     _check_tree(path, table)
     return table
 

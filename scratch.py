@@ -57,7 +57,7 @@ def _swept(here: int) -> str:
 
 
 def _above(descriptor: int) -> int:
-    """The same pipe or file under a number above the standard streams'."""
+    """The pipe or file of a descriptor under a number above the standard streams'."""
     if descriptor > 2:
         return descriptor
     import fcntl

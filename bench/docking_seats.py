@@ -160,7 +160,7 @@ def start(rng: np.random.Generator) -> tuple[float, Array, Rotation]:
 def flight(
     body: DockingBody, parameters: DockingParameters, truth: Truth, place: Array, turn: Rotation
 ) -> tuple[Pushed, Pushed]:
-    """The same body in flight in both engines, from further off."""
+    """One body in flight in both engines, from further off."""
     off = place - [AWAY, 0.0, 0.0]
     own = parameters.with_values(restitution=RESTITUTION, restitution_speed=SPEED * np.sin(parameters.flank))
     run = body.run(own, FLIGHT, off, turn.as_quat(scalar_first=True), velocity=[SPEED, 0, 0], longest=1e-3)
@@ -243,7 +243,7 @@ def main() -> int:
 
 
 def flights(seed: int, count: int) -> int:
-    """The same starts in flight: with the friction drawn, and with none."""
+    """Starts in flight, with the friction drawn and with none."""
     body = DockingBody(MASS, INERTIA, 1e-6)
     for drawn, words in ((True, "friction as drawn"), (False, "no friction")):
         rng = np.random.default_rng(seed)

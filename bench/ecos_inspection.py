@@ -24,7 +24,15 @@ from scipy.spatial.transform import Rotation
 
 from bench.fmu_models import tool_environment
 from bench.results import write_result
-from snarelab.cosim.orbit_capture import DURATION, MACRO_STEP, SNARE, Capture, Passive, capture_of, co_simulate
+from snarelab.cosim.orbit_capture import (
+    DURATION,
+    MACRO_STEP,
+    SNARE,
+    JointResistance,
+    OrbitCapture,
+    capture_of,
+    co_simulate,
+)
 from snarelab.cosim.participants.fmu import Fmu
 from snarelab.cosim.setup import Setup
 from snarelab.cosim.ssp_write import write_ssp
@@ -122,7 +130,7 @@ def mean_force(times: np.ndarray, impulse: np.ndarray) -> np.ndarray:
     return np.diff(at_ends, axis=1).T / WINDOW
 
 
-def apart(table: dict[str, np.ndarray], study: Capture) -> tuple[float, float]:
+def apart(table: dict[str, np.ndarray], study: OrbitCapture) -> tuple[float, float]:
     """Largest distance between the pin's places in the end effector's frame [m], and the forces' relative RMS error."""
     there = np.column_stack([np.interp(table["time"], study.times, x) for x in study.relative.T])
     ours = mean_force(table["time"], columns(table, "snare::impulse.effector"))
@@ -139,7 +147,7 @@ def main() -> int:
         began = time.monotonic()
         table = in_ecos(ssp, MACRO_STEP, round(DURATION / MACRO_STEP), EVERY)
         seconds = time.monotonic() - began
-    study = capture_of(co_simulate(setting("inspection"), Passive()), "inspection")
+    study = capture_of(co_simulate(setting("inspection"), JointResistance()), "inspection")
     place, force = apart(table, study)
     ours, theirs = relative(table)[round(END / MACRO_STEP) // EVERY, 1:], radial_end(study)
     result = {

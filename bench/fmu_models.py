@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from bench.arm import random_arm
-from snarelab.fmu.archive import open_fmu
+from snarelab.fmi.archive import open_fmu
 from snarelab.fmu.build import write_fmu
 
 

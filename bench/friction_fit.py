@@ -33,7 +33,7 @@ from bench.lugre import Bristles, LuGre
 from bench.motion import fourier_motion
 from bench.mujoco_plant import write_csv
 from bench.results import write_result
-from snarelab.identification.fitting.assembly import Assembly
+from snarelab.identification.fitting.assembly import TorqueModel
 from snarelab.identification.fitting.experiment import Experiment, load_experiments, scales
 from snarelab.identification.fitting.fit import fit
 from snarelab.identification.fitting.problem import split
@@ -79,14 +79,14 @@ def recording(arm: Arm, rng: np.random.Generator) -> dict[str, Array]:
     return columns
 
 
-def load(folder: Path, arm: Arm, columns: dict[str, Array]) -> tuple[Assembly, Experiment]:
+def load(folder: Path, arm: Arm, columns: dict[str, Array]) -> tuple[TorqueModel, Experiment]:
     """The recording as a user's files, read and conditioned."""
     (folder / "arm.urdf").write_text(arm.urdf())
     (folder / "arm.toml").write_text('name = "arm"\nsystem = "arm"\nurdf = "arm.urdf"\neffects = ["makkar_friction"]\n')
     write_csv(folder / "run.csv", columns)
     model = load_model(folder / "arm.toml")
     experiments = load_experiments(model, [folder / "run.csv"], RigidBody(model.tree))
-    return Assembly(model.tree, model.effects, None, scales(experiments), {}), experiments[0]
+    return TorqueModel(model.tree, model.effects, None, scales(experiments), {}), experiments[0]
 
 
 def timed(solve: Callable[[], Array]) -> tuple[float, float, Array]:

@@ -32,7 +32,7 @@ import fmpy
 
 from bench.killed import Lost, alive, begin, main, rows_left, settle
 from bench.oscillator_fmu import build
-from snarelab.fmu.archive import open_fmu
+from snarelab.fmi.archive import open_fmu
 from snarelab.fmu.hosted import write_hosted
 from snarelab.models.c_library import find_compiler
 

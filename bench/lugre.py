@@ -48,7 +48,9 @@ class LuGre:
         return self.level, self.level if self.static is None else self.static, self.viscous
 
     def back(self) -> tuple[float, float, float]:
-        """The same for qd < 0; where only ``level_negative`` is given, the static level keeps its ratio to it."""
+        """Level, static level and viscous coefficient for qd < 0.
+
+        Where only ``level_negative`` is given, the static level keeps its ratio to it."""
         level, static, viscous = self.forth()
         low = level if self.level_negative is None else self.level_negative
         high = static * low / level if self.static_negative is None else self.static_negative

@@ -67,7 +67,7 @@ def ours(tree: Tree) -> Run:
 
 
 def ours_in_machine(tree: Tree) -> Run:
-    """The same in CasADi's virtual machine."""
+    """Torques in CasADi's virtual machine."""
     os.environ["SNARELAB_CC"] = "none"
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

@@ -16,7 +16,7 @@ from ..models.c_library import load_library
 from ..models.compiled import CompilerNotice
 from . import loop_source
 from .fmi_calls import CompiledCalls
-from .sweep import Plan, Sweep
+from .sweep import Sweep, SweepPlan
 from .system import Layout, System
 
 _CALLS = ("Set", "DoStep", "Get", "finite")
@@ -30,7 +30,7 @@ class CompiledLoop:
     calls : sequence of CompiledCalls
         Of every participant, in order.
     layout : Layout
-    plan : Plan
+    plan : SweepPlan
     size : float
         Macro step [s].
 
@@ -44,16 +44,16 @@ class CompiledLoop:
         self,
         calls: Sequence[CompiledCalls],
         layout: Layout,
-        plan: Plan,
+        plan: SweepPlan,
         size: float,
     ) -> None:
         """Build, or find in the cache, and lay out."""
         self._entry = load_library(loop_source.SOURCE).snarelab_cosim_run
         self._entry.restype = ctypes.c_long
         self._calls, self.n_points = calls, len(plan.end)
-        units = (loop_source.Unit * len(calls))()
+        units = (loop_source.LoopParticipant * len(calls))()
         for i, c in enumerate(calls):
-            units[i] = loop_source.Unit(
+            units[i] = loop_source.LoopParticipant(
                 c.fmi,
                 c.component,
                 c.set,
@@ -84,7 +84,7 @@ class CompiledLoop:
         self._held, self._input, self._failure = self._arrays[7:]
         pointers = [array.ctypes.data for array in self._arrays[:7]]
         self._units = units
-        self._plan = loop_source.Plan(
+        self._plan = loop_source.LoopPlan(
             ctypes.addressof(units),
             *pointers,
             len(calls),

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from ..models.docking.closed_forms import seated_share
 from ..models.docking.parameters import PRELOAD_WINDOW, RESIDUAL, RESIDUAL_ANGLE, DockingParameters
 from ..models.inertia import Array
-from .orbit_capture import Capture, column, columns
+from .orbit_capture import OrbitCapture, column, columns
 from .whole_capture import WholeRun
 
 CABLE_STRENGTH = 8000.0
@@ -19,13 +19,13 @@ LEAST_SHARE = 0.5
 
 
 @dataclass(frozen=True)
-class Docked:
+class DockingRun:
     """A whole run, n times.
 
     Parameters
     ----------
     whole : WholeRun
-    capture : Capture
+    capture : OrbitCapture
         Its frames; ``tip`` is the carriage's, on which the rings are, ``pin`` the pin's foot.
     travel, motor, tension : array (n,)
         Of the carriage [m], its motor's force [N], and the largest force of a cable on its ring [N].
@@ -40,7 +40,7 @@ class Docked:
     """
 
     whole: WholeRun
-    capture: Capture
+    capture: OrbitCapture
     travel: Array
     motor: Array
     tension: Array
@@ -60,7 +60,7 @@ class Docked:
         return np.isin(numbers, [self.whole.states.index(state) for state in states])
 
 
-def docked_of(whole: WholeRun) -> Docked:
+def docked_of(whole: WholeRun) -> DockingRun:
     """Read a run's recording."""
     table = whole.run.recording
 
@@ -75,7 +75,7 @@ def docked_of(whole: WholeRun) -> Docked:
     times = table["time"].to_numpy()
     names = [str(key).partition(" ")[0] for key in table.variables]
     joints = [name.removeprefix("q.") for name in names if name.startswith("q.")]
-    capture = Capture(
+    capture = OrbitCapture(
         times, frames("carriage"), frames("pin"), frames("base"),
         np.column_stack([column(table, f"q.{joint}") for joint in joints]),
         np.column_stack([column(table, f"qd.{joint}") for joint in joints]),
@@ -83,7 +83,7 @@ def docked_of(whole: WholeRun) -> Docked:
         float(times[touching[0]]) if len(touching) else None,
     )  # fmt: skip
     off = np.column_stack([column(table, f"effector.off.{i}.{way}") for i in (1, 2, 3) for way in ("axial", "lateral")])
-    return Docked(
+    return DockingRun(
         whole, capture, column(table, "effector.travel"), column(table, "effector.force.motor"),
         column(table, "snare.tension"), off.reshape(-1, 3, 2),
         np.column_stack([column(table, f"effector.normal.{i}") for i in range(1, 7)]),
@@ -91,7 +91,7 @@ def docked_of(whole: WholeRun) -> Docked:
     )  # fmt: skip
 
 
-def residual(d: Docked) -> tuple[float, float]:
+def residual(d: DockingRun) -> tuple[float, float]:
     """How far target and end effector are from seated at the end: radial [m], and the angle between them [rad]."""
     seat, pin = d.seat[-1], d.capture.pin[-1]
     relative = seat[3:].T @ (pin[0] - seat[0])
@@ -99,12 +99,12 @@ def residual(d: Docked) -> tuple[float, float]:
     return float(np.hypot(relative[1], relative[2])), float(turn)
 
 
-def ball_shares(d: Docked, p: DockingParameters, preload: float) -> Array:
+def ball_shares(d: DockingRun, p: DockingParameters, preload: float) -> Array:
     """Each ball's normal forces over its two even shares of the preload, at the end (3,)."""
     return d.normal[-1].reshape(3, 2).sum(axis=1) / (2 * seated_share(preload, p.flank))
 
 
-def is_latched(d: Docked, p: DockingParameters) -> tuple[bool, str]:
+def is_latched(d: DockingRun, p: DockingParameters) -> tuple[bool, str]:
     """Whether it latched as an engineer means it, and if not, why: the state that it ended in, or the bar missed."""
     if d.whole.fault:
         return False, f"{d.whole.final}: not computed to the end"
@@ -123,7 +123,7 @@ def is_latched(d: Docked, p: DockingParameters) -> tuple[bool, str]:
     return True, "LATCHED"
 
 
-def margin(d: Docked, p: DockingParameters) -> float:
+def margin(d: DockingRun, p: DockingParameters) -> float:
     """Signed distance from failure of `is_latched`, as a share of the nearest limit, in -1 to 1."""
     if d.whole.fault or d.whole.final != "LATCHED":
         return -1.0
@@ -139,13 +139,13 @@ def margin(d: Docked, p: DockingParameters) -> float:
     return float(np.clip(found, -1.0, 1.0))
 
 
-def preload(d: Docked) -> float:
+def preload(d: DockingRun) -> float:
     """Largest force of the carriage's motor while it preloads and the latches close [N]."""
     rows = d.rows_in("PRELOAD", "LATCH")
     return float(d.motor[rows].max()) if rows.any() else 0.0
 
 
-def mean_wrist(d: Docked, window: float = 0.01) -> tuple[Array, Array]:
+def mean_wrist(d: DockingRun, window: float = 0.01) -> tuple[Array, Array]:
     """Middles of windows [s] and the size of the mean force on the end effector in each (k,) [N]."""
     times = d.times
     summed = np.vstack([np.zeros(3), np.cumsum(0.5 * (d.wrist[1:] + d.wrist[:-1]) * np.diff(times)[:, None], axis=0)])
@@ -154,7 +154,7 @@ def mean_wrist(d: Docked, window: float = 0.01) -> tuple[Array, Array]:
     return edges[:-1] + window / 2, np.linalg.norm(np.diff(at, axis=0), axis=1) / window
 
 
-def momentum_drift(d: Docked) -> float:
+def momentum_drift(d: DockingRun) -> float:
     """Largest change of the linear momentum of all together over the largest impulse on the carriage."""
     table = d.whole.run.recording
     total = sum(
@@ -164,7 +164,7 @@ def momentum_drift(d: Docked) -> float:
     return float(change / max(np.linalg.norm(d.capture.impulse, axis=1).max(), 1e-300))
 
 
-def energies(d: Docked) -> dict[str, Array]:
+def energies(d: DockingRun) -> dict[str, Array]:
     """Energies (n,) since the start [J]: what both motors have put in, and where it is; ``residual`` is the rest."""
     table = d.whole.run.recording
 

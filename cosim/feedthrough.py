@@ -15,7 +15,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from ..errors import InputError
-from .iteration import Iteration, NotConverged, QuasiNewton
+from .iteration import ConvergenceError, Iteration, QuasiNewton
 from .participant import Participant, StepError
 from .system import System
 
@@ -115,9 +115,9 @@ class FeedThrough:
             found = self._solver.solve(ask_all, guess, scale)[0]
             if (largest := float(np.max(np.abs(found) / scale))) > _RUNAWAY:
                 self._solver.forget()
-                raise NotConverged(f"values ran away to {largest:.1e} of their magnitude, where rounding hides all")
+                raise ConvergenceError(f"values ran away to {largest:.1e} of their magnitude, where rounding hides all")
             outputs[members] = found
-        except NotConverged as error:
+        except ConvergenceError as error:
             names = " -> ".join(self._layout.outputs[o] for o in members)
             raise StepError(
                 f"algebraic loop {names} at {time:.9g} s: {error}; put a state between them, or a smaller gain"

@@ -15,7 +15,7 @@ from weakref import WeakValueDictionary
 import numpy as np
 
 from ..extras import needed_for
-from .fmi_variables import Slot
+from .fmi_variables import FmiVariable
 from .participant import StepError
 
 with needed_for("an FMU"):
@@ -116,7 +116,7 @@ class Instance:
         self.check("EnterInitializationMode", self._guard(lambda: self._fmu.enterInitializationMode(**start)))
         self.check("ExitInitializationMode", self._guard(self._fmu.exitInitializationMode))
 
-    def vector(self, action: str, type_: str, slots: Sequence[Slot]) -> "Vector":
+    def vector(self, action: str, type_: str, slots: Sequence[FmiVariable]) -> "Vector":
         """Variables of one type that are set or got together; ``action`` is Set or Get."""
         return Vector(self, action, type_, slots)
 
@@ -255,7 +255,7 @@ fmi2.addLoggerProxy(ctypes.byref(_LOGGER))
 class Vector:
     """Variables of one type, and the memory through which they are set or got."""
 
-    def __init__(self, instance: Instance, action: str, type_: str, slots: Sequence[Slot]) -> None:
+    def __init__(self, instance: Instance, action: str, type_: str, slots: Sequence[FmiVariable]) -> None:
         """Make every argument."""
         boolean = ctypes.c_bool if instance.major == 3 else ctypes.c_int
         if type_ == "Enumeration":

@@ -18,7 +18,7 @@ _BASE = {"kg": "kg", "m": "m", "s": "s", "A": "A", "K": "K", "mol": "mol", "cd":
 
 
 @dataclass(frozen=True)
-class Slot:
+class FmiVariable:
     """One variable of the model description, scalar or array, and the participant's scalars that it stands for."""
 
     reference: int
@@ -36,7 +36,7 @@ class Interface:
     """
 
     variables: tuple[Variable, ...]
-    slots: Mapping[Causality, tuple[Slot, ...]]
+    slots: Mapping[Causality, tuple[FmiVariable, ...]]
     unread: Mapping[str, str]
 
 
@@ -63,7 +63,7 @@ def read_interface(description: Any, path: object) -> Interface:
 def _read(description: Any, path: object) -> Interface:
     units = {unit.name: unit.baseUnit for unit in description.unitDefinitions}
     sizes = {v.valueReference: v for v in description.modelVariables}
-    groups: dict[Causality, list[Slot]] = {"input": [], "output": [], "parameter": []}
+    groups: dict[Causality, list[FmiVariable]] = {"input": [], "output": [], "parameter": []}
     variables: list[Variable] = []
     shown = [v for v in description.modelVariables if v.causality in groups]
     numbers = [v for v in shown if _is_number(v)]
@@ -73,7 +73,7 @@ def _read(description: Any, path: object) -> Interface:
     depends = _dependencies(description, names_of)
     for v in numbers:
         names = names_of[v.name]
-        groups[v.causality].append(Slot(v.valueReference, v.type, names, v.variability in (None, "continuous")))
+        groups[v.causality].append(FmiVariable(v.valueReference, v.type, names, v.variability in (None, "continuous")))
         unit = v.unit or (v.declaredType.unit if v.declaredType else None) or ""
         starts = _numbers(v.start, len(names))
         spelled, low, high = pint_unit(unit, units.get(unit)), _number(v.min, -math.inf), _number(v.max, math.inf)

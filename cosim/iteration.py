@@ -47,7 +47,7 @@ class Iteration:
             )
 
 
-class NotConverged(RuntimeError):
+class ConvergenceError(RuntimeError):
     """The iteration ended with a residual above its tolerance."""
 
 
@@ -110,7 +110,7 @@ class QuasiNewton:
             before = residual, result
             guess = result + self._correction(residual)
         self.forget()
-        raise NotConverged(f"residual {worst:.1e} of the values' magnitude after {count} evaluations")
+        raise ConvergenceError(f"residual {worst:.1e} of the values' magnitude after {count} evaluations")
 
     def _correction(self, residual: np.ndarray) -> np.ndarray | float:
         if not self._residuals:

@@ -147,7 +147,7 @@ long snarelab_cosim_run(const Plan *p, double *rows, long first, long n, double 
 """
 
 
-class Unit(ctypes.Structure):
+class LoopParticipant(ctypes.Structure):
     """One participant."""
 
     _fields_ = (
@@ -171,7 +171,7 @@ class Unit(ctypes.Structure):
     )
 
 
-class Plan(ctypes.Structure):
+class LoopPlan(ctypes.Structure):
     """The system; pointers to arrays that the caller keeps."""
 
     _fields_ = (

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..errors import InputError
 from .hold import Hold, combine, end_weights
-from .iteration import Iteration, NotConverged, QuasiNewton
+from .iteration import ConvergenceError, Iteration, QuasiNewton
 from .participant import StepError
 from .record import Event
 from .step_control import StepControl
@@ -25,7 +25,7 @@ from .sweep import Sweep
 from .system import System
 
 
-class Taken(NamedTuple):
+class AcceptedStep(NamedTuple):
     """A step that is good enough.
 
     Parameters
@@ -87,7 +87,7 @@ class MacroStep:
         self.sizes: list[float] = []  # of the steps between them
         self._largest = np.abs(outputs)
 
-    def take(self, time: float, size: float, usual: float | None = None) -> Taken:
+    def take(self, time: float, size: float, usual: float | None = None) -> AcceptedStep:
         """One macro step from a time [s], of at most this size [s], which is good enough.
 
         ``usual`` is the size [s] that this one was cut from, if it was: the next step is at least that.
@@ -99,7 +99,7 @@ class MacroStep:
             try:
                 outputs = self._trial(time, size, states, starter)
                 if self._control is None:
-                    return Taken(outputs, size, None)
+                    return AcceptedStep(outputs, size, None)
                 error = self._error(outputs, size)
             except StepError as failure:
                 if self._control is None or size <= self._control.smallest:
@@ -116,13 +116,13 @@ class MacroStep:
             if outputs is not None and (error <= 1 or size <= self._control.smallest):
                 if error > 1:
                     self.log.append(Event(time, size, f"accepted at the smallest step: {reason}"))
-                return Taken(outputs, size, wanted if usual is None else max(wanted, usual))
+                return AcceptedStep(outputs, size, wanted if usual is None else max(wanted, usual))
             self.rejected += 1
             self.log.append(Event(time, size, f"rejected: {reason}; repeated with {wanted:.3g} s"))
             self._restore(states)
             size, usual = wanted, None
 
-    def remember(self, taken: Taken) -> None:
+    def remember(self, taken: AcceptedStep) -> None:
         """The step is the last one from now on."""
         self.past.insert(0, taken.outputs)
         self.sizes.insert(0, taken.size)
@@ -141,7 +141,7 @@ class MacroStep:
         if starter is not None:
             try:
                 return self._iterated(starter, time, size, states)
-            except NotConverged as error:
+            except ConvergenceError as error:
                 self.log.append(Event(time, size, f"the start was not iterated ({error}): inputs were held"))
                 self._restore(states)
         if self._solver is None:
@@ -149,7 +149,7 @@ class MacroStep:
             return self._sweep(time, size, self.past, self.sizes)
         try:
             return self._iterated(self._solver, time, size, states)
-        except NotConverged as error:
+        except ConvergenceError as error:
             raise StepError(
                 f"{self._system.name}: the iteration of the step at {time:.9g} s did not converge ({error}); "
                 "take smaller steps"

@@ -47,7 +47,7 @@ _FRAME = [(kind, axes) for kind, axes in (("pos", "xyz"), ("quat", "wxyz"), ("ve
 
 
 @dataclass(frozen=True)
-class Passive:
+class JointResistance:
     """What resists in each joint while the motors are off.
 
     Parameters
@@ -125,11 +125,11 @@ def arrival(case: CaseName, foot: ArrayLike, turn: Rotation, speed: float = 0.0)
     return Setting(case, arm, Pose(place, turned.as_matrix(), np.zeros(3), np.zeros(3)), target, rates, -approach)
 
 
-def resistance(level: float, stiffness: float = 0.0) -> Passive:
+def resistance(level: float, stiffness: float = 0.0) -> JointResistance:
     """Joints whose whole friction is as many times the usual one as ``level`` [N·m] is the usual Coulomb level."""
     factor = level / FRICTION["coulomb_level"]
     scaled = ("coulomb_level", "stribeck_level", "viscous_coefficient")
-    return Passive({k: v * factor if k in scaled else v for k, v in FRICTION.items()}, stiffness)
+    return JointResistance({k: v * factor if k in scaled else v for k, v in FRICTION.items()}, stiffness)
 
 
 def step_control(start: Setting, tolerance: float = 3e-3, largest: float = 4e-3) -> StepControl:
@@ -151,7 +151,7 @@ def _ports(start: Setting) -> list[tuple[str, str]]:
     return [("tip", "effector"), ("mount", "pin")][: 2 if start.arm.mount else 1]
 
 
-def system(start: Setting, passive: Passive, snare: SnareParameters, accuracy: Accuracy) -> System:
+def system(start: Setting, passive: JointResistance, snare: SnareParameters, accuracy: Accuracy) -> System:
     """Snare and arm, connected: the snare follows tip and mount, the arm gets the impulses."""
     arm = start.arm
     total = momentum(arm, np.array([CAPTURE_POSE]), start.drift[None], start.rates[None])[0]  # base at the origin
@@ -180,7 +180,7 @@ def system(start: Setting, passive: Passive, snare: SnareParameters, accuracy: A
 
 def co_simulate(
     start: Setting,
-    passive: Passive | None = None,
+    passive: JointResistance | None = None,
     snare: SnareParameters | None = None,
     *,
     duration: float = DURATION,
@@ -195,7 +195,7 @@ def co_simulate(
     ``frames`` takes time and the cables' nodes (3, n_nodes, 3), fifteen times a second; ``tensions`` the largest force
     of a cable on its ring [N], at each communication point.
     """
-    coupled = system(start, passive or Passive(), snare or SNARE, Accuracy(own_step, 10, 5e-4))
+    coupled = system(start, passive or JointResistance(), snare or SNARE, Accuracy(own_step, 10, 5e-4))
     snare_model: Any = coupled.participants["snare"]
 
     def film(time: float) -> None:
@@ -210,7 +210,7 @@ def co_simulate(
 
 
 @dataclass(frozen=True)
-class Capture:
+class OrbitCapture:
     """What a capture shows, at n times, in the world frame unless said otherwise.
 
     Parameters
@@ -261,7 +261,7 @@ def columns(recording: xr.Dataset, stem: str, axes: str = "xyz") -> Array:
     return np.column_stack([column(recording, f"{stem}.{axis}") for axis in axes])
 
 
-def capture_of(run: Run, case: CaseName | Literal["ground"]) -> Capture:
+def capture_of(run: Run, case: CaseName | Literal["ground"]) -> OrbitCapture:
     """Read a run's recording."""
     table = run.recording
 
@@ -275,7 +275,7 @@ def capture_of(run: Run, case: CaseName | Literal["ground"]) -> Capture:
     times = table["time"].to_numpy()
     touching = np.flatnonzero(np.abs(columns(table, "force.pin")).max(axis=1) > 0)
     joints = range(1, 8)
-    return Capture(
+    return OrbitCapture(
         times,
         frames("tip"),
         frames("mount" if case == "inspection" else "pin"),

@@ -11,7 +11,7 @@ from .system import System
 
 
 @dataclass(frozen=True)
-class Plan:
+class SweepPlan:
     """What a compiled loop of equal steps needs beyond the layout.
 
     Parameters
@@ -120,7 +120,7 @@ class Sweep:
         self.check(time + size, outputs)
         return outputs
 
-    def plan(self, size: float) -> Plan | None:
+    def plan(self, size: float) -> SweepPlan | None:
         """What a compiled loop needs; None where it could not do the same."""
         if any(order > 0 for order in self._orders) or self._feed.loops or any(len(jumps) for jumps in self._jumps):
             return None
@@ -131,7 +131,7 @@ class Sweep:
             for nodes in (back, ahead)
         )
         visits = tuple(visit for visit in self._feed.order if isinstance(visit, int))
-        return Plan(visits, tuple(self._follow), halves, before, end_weights(back), after, self._sequential)
+        return SweepPlan(visits, tuple(self._follow), halves, before, end_weights(back), after, self._sequential)
 
     def failure(self, i: int, time: float, error: Exception) -> StepError:
         """What participant ``i`` did not manage in the step from a time [s]."""

@@ -20,7 +20,7 @@ from ..models.snare.model import Accuracy
 from ..models.snare.parameters import SnareParameters
 from ..models.snare.target import Target
 from .master import Master
-from .orbit_capture import SNARE, Passive, Setting
+from .orbit_capture import SNARE, JointResistance, Setting
 from .participant import StepError
 from .participants.control_program import ControlProgram
 from .participants.end_effector import EndEffectorParticipant
@@ -68,9 +68,13 @@ def connections() -> list[tuple[str, str]]:
 
 
 def whole_system(
-    start: Setting, passive: Passive, snare: SnareParameters, docking: DockingParameters, table: StateTable | None,
+    start: Setting,
+    passive: JointResistance,
+    snare: SnareParameters,
+    docking: DockingParameters,
+    table: StateTable | None,
     own_step: float,
-) -> System:  # fmt: skip
+) -> System:
     """Snare, arm with docking, and program, connected."""
     arm = start.arm
     total = momentum(arm, np.array([start.pose]), start.drift[None], start.rates[None])[0]  # base at the origin
@@ -113,7 +117,7 @@ class WholeRun:
 
 def co_simulate_whole(
     start: Setting,
-    passive: Passive | None = None,
+    passive: JointResistance | None = None,
     snare: SnareParameters | None = None,
     docking: DockingParameters | None = None,
     table: StateTable | None = None,
@@ -135,7 +139,9 @@ def co_simulate_whole(
     [s] where `TOUCHING` says so; ``own_step`` [s] is that inside the snare while cables touch. ``frames`` is filled as
     by `co_simulate`; ``disturb`` is called each period of the program with the time and the master.
     """
-    coupled = whole_system(start, passive or Passive(), snare or SNARE, docking or DockingParameters(), table, own_step)
+    coupled = whole_system(
+        start, passive or JointResistance(), snare or SNARE, docking or DockingParameters(), table, own_step
+    )
     program: Any = coupled.participants["program"]
     model: Any = coupled.participants["snare"]
 

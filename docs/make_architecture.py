@@ -13,8 +13,6 @@ ROOT = Path(__file__).resolve().parents[1]
 OUTSIDE = {"tests", "docs", "bench", "proof", "build", "setup.py", "__init__.py"}
 BASE = "root files"
 
-BOTH = " ⇄ "
-
 WIDTH, ROW, BOX, HIGH = 900, 92, 176, 44
 COLUMNS, APART = range(150, 751, 50), 300
 STYLE = 'text{font-family:system-ui,"Segoe UI",Roboto,Arial,sans-serif;font-size:14px;fill:#1c2329;text-anchor:middle}'
@@ -103,8 +101,8 @@ def _reach(pairs: set[tuple[str, str]]) -> dict[str, set[str]]:
 
 @cache
 def rows() -> list[list[str]]:
-    """Parts by height: each above all that it imports; those of a circle are one, with their names joined."""
-    pairs = _joined()
+    """Parts by height: each above all that it imports."""
+    pairs = arrows()
     reach = _reach(pairs)
     height: dict[str, int] = {}
     for name in sorted(reach, key=lambda n: len(reach[n])):
@@ -112,17 +110,10 @@ def rows() -> list[list[str]]:
     return [sorted(n for n, h in height.items() if h == k) for k in range(max(height.values()) + 1)]
 
 
-def _joined() -> set[tuple[str, str]]:
-    """Arrows between parts, where the parts of a circle are one."""
-    pairs = arrows()
-    whole = {name: BOTH.join(sorted(circle)) for circle in circles(pairs) for name in circle}
-    return {(whole.get(a, a), whole.get(b, b)) for a, b in pairs if whole.get(a, a) != whole.get(b, b)}
-
-
 @cache
 def drawn() -> list[tuple[str, str]]:
     """Arrows that no other way through the picture already tells."""
-    pairs = _joined()
+    pairs = arrows()
     reach = _reach(pairs)
     return sorted((a, b) for a, b in pairs if not any(x == a and b in reach[c] for x, c in pairs))
 
@@ -183,7 +174,7 @@ def table() -> str:
     """Each part, what its docstring says it is, and all that it imports; the highest first."""
     text = "| part | what it is | imports |\n| --- | --- | --- |\n"
     pairs = arrows()
-    for name in (n for row in reversed(rows()) for whole in row for n in whole.split(BOTH)):
+    for name in (n for row in reversed(rows()) for n in row):
         text += f"| `{name}` | {_said(name)} | {', '.join(f'`{b}`' for a, b in sorted(pairs) if a == name)} |\n"
     return text + "\n"
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from snarelab.identification.identify import Identified, identify
+from snarelab.identification.identify import Identification, identify
 from snarelab.identification.search.candidates import candidate_columns, library, variants
 from snarelab.models.model_file import load_model
 
@@ -28,7 +28,7 @@ def alike() -> dict[str, dict[str, float]]:
     """For each effect, those that make at least `ALIKE` of its torque, and the share, the larger of the joints'."""
     bundled = ROOT / "studies" / "bundled"
     found = identify(load_model(bundled / "arm3.toml"), [bundled / "train.csv"])
-    assert isinstance(found, Identified)  # an arm, not captures
+    assert isinstance(found, Identification)  # an arm, not captures
     assembly, (experiment,) = found.fit.assembly, found.train
     state = assembly.evaluate(experiment, found.fit.theta)
     n_joints = len(found.model.joints)

@@ -1,1 +1,1 @@
-"""Models and participants as FMUs: written for other tools, and foreign ones opened safely."""
+"""Models and participants as FMUs: written for other tools."""

@@ -5,14 +5,14 @@ from dataclasses import dataclass
 import casadi as ca
 
 from .base import Base
-from .rigid_arm import Rigid
+from .rigid_arm import RigidArm
 from .symbolic import solved_symmetric
 
 _NEWTON = 6  # friction in proportion to |load| is piecewise linear: it is met after two or three
 
 
 @dataclass(frozen=True)
-class Joints:
+class JointForces:
     """What acts at the J joints.
 
     Parameters
@@ -40,7 +40,7 @@ class Joints:
     springy: tuple[int, ...]
 
 
-def accelerations_of(now: Rigid, on_base: Base, joints: Joints) -> tuple[ca.SX, ca.SX]:
+def accelerations_of(now: RigidArm, on_base: Base, joints: JointForces) -> tuple[ca.SX, ca.SX]:
     """Accelerations (base and J,) and rigid-body torque (J,)."""
     size, base = now.inertia.shape[0], on_base.size
     n = size - base

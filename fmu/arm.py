@@ -25,20 +25,20 @@ from ..errors import InputError
 from ..models.empirical import TableLaw
 from ..models.floating.arm import FloatingArm
 from ..models.floating.tree import FloatingTree, floating_tree
-from ..models.model import Model, Placed
+from ..models.model import Model, PlacedEffect
 from ..models.rig.rig import Rig
-from .accelerations import Joints, accelerations_of
+from .accelerations import JointForces, accelerations_of
 from .base import Base
 from .equations import Equations, Ledger
 from .placed_laws import PlacedLaws, identifier, summed
-from .rigid_arm import Rigid, body_outputs, rigid
+from .rigid_arm import RigidArm, body_outputs, rigid
 from .sensors import read_sensors
 from .suspension import PLACES, rig_reach, rig_signals
 from .symbolic import root
 
 
 @dataclass(frozen=True)
-class Servo:
+class ServoGains:
     """Gains of a servo ``stiffness * (target - q) - damping * qd``, each (J,) [N·m/rad, N·m·s/rad; or N/m, N·s/m]."""
 
     stiffness: Sequence[float]
@@ -49,7 +49,7 @@ def arm_equations(
     model: Model,
     arm: FloatingArm,
     stiff: bool | None = None,
-    servo: Servo | None = None,
+    servo: ServoGains | None = None,
     start: Sequence[float] | None = None,
 ) -> Equations:
     """Equations of a model's arm.
@@ -62,7 +62,7 @@ def arm_equations(
         The model's tree on its base, and the tip; inputs and outputs ``mount`` where a floating one has a mount.
     stiff : bool or None
         Linearly implicit integrator; None: where friction or hidden states are faster than 1 ms.
-    servo : Servo or None
+    servo : ServoGains or None
         Adds inputs ``servo`` and ``target.<joint>`` to the drive torques.
     start : sequence of float or None
         Default joint positions at the start (J,) [rad or m]; None: zero.
@@ -86,7 +86,7 @@ class _Writer:
         self.units = ["m" if j.kind == "prismatic" else "rad" for j in arm.tree.joints]
         self.torque_units = ["N" if unit == "m" else "N*m" for unit in self.units]
 
-    def written(self, stiff: bool | None, servo: Servo | None, start: Sequence[float]) -> Equations:
+    def written(self, stiff: bool | None, servo: ServoGains | None, start: Sequence[float]) -> Equations:
         ledger, n, arm, tree = self.ledger, self.n, self.arm, self.model.tree
         self.tau = ca.vertcat(*self._each(ledger.input, "tau", self.torque_units, "drive torque delivered at"))
         words = f"on the tip ({arm.tree.links[arm.tip_link].name}), in the world frame"
@@ -120,7 +120,7 @@ class _Writer:
         motion, hidden = (q, qd), self._hidden(start_q, start_qd)
         on_rig, rig_rates = self._rig(q_link, qd_link, start_link, start_qd)
         friction = self._friction(motion, now, hidden)
-        on_joints = Joints(
+        on_joints = JointForces(
             friction, self.free, self.linear, self._across(springy), on_rig, self.tau, springs, tuple(springy)
         )
         accelerations, load = accelerations_of(now, base, on_joints)
@@ -174,7 +174,7 @@ class _Writer:
                 found[k].append(self.ledger.parameter(name, unit, value, words, bounds, fixed=True))
         return ca.vertcat(*found[0]), ca.vertcat(*found[1])
 
-    def _servo(self, servo: Servo, q: ca.SX, qd: ca.SX, start: Sequence[float]) -> ca.SX:
+    def _servo(self, servo: ServoGains, q: ca.SX, qd: ca.SX, start: Sequence[float]) -> ca.SX:
         """Torque (J,) of the joints' servo."""
         ledger, total = self.ledger, []
         on = ledger.input("servo", "1", "1: the servo holds the joints at their targets, 0: only tau drives them")
@@ -187,7 +187,7 @@ class _Writer:
             total.append(on * (gains[0] * (target - q[j]) - gains[1] * qd[j]))
         return ca.vertcat(*total)
 
-    def _spring(self, p: Placed, joint: int, stretch: ca.SX, rate: ca.SX) -> ca.SX:
+    def _spring(self, p: PlacedEffect, joint: int, stretch: ca.SX, rate: ca.SX) -> ca.SX:
         """Torque of a springy joint: what its law balances the load with, ``inertia * stretch'' = load - spring``."""
         names = p.effect.states
         load = ca.SX.sym("load")
@@ -197,7 +197,7 @@ class _Writer:
             raise InputError(f"{self.model.path}: {p.key} has no forward dynamics; export with --inverse")
         return -ca.substitute(found[1], load, ca.SX(0))
 
-    def _hidden(self, start_q: ca.SX, start_qd: ca.SX) -> list[tuple[Placed, dict[str, ca.SX]]]:
+    def _hidden(self, start_q: ca.SX, start_qd: ca.SX) -> list[tuple[PlacedEffect, dict[str, ca.SX]]]:
         """Joint effects with hidden states of their own, and the states' symbols."""
         found = []
         for p in self.laws.at("joint"):
@@ -226,7 +226,9 @@ class _Writer:
             taken += rig_reach(rig, p, q) @ laws.law(p, signals | states)
         return taken, rates
 
-    def _signals(self, p: Placed, motion: tuple[ca.SX, ca.SX], qdd: ca.SX, load: ca.SX, now: Rigid) -> dict[str, ca.SX]:
+    def _signals(
+        self, p: PlacedEffect, motion: tuple[ca.SX, ca.SX], qdd: ca.SX, load: ca.SX, now: RigidArm
+    ) -> dict[str, ca.SX]:
         """What a law at a joint or an axis reads, of the joints' accelerations and loads (J,)."""
         here, base = self.laws.place_of(p), self.base.size
         along = {"q": motion[0], "qd": motion[1], "qdd": qdd}
@@ -237,7 +239,7 @@ class _Writer:
         signals |= self.laws.of_others(p, *motion)
         return self.laws.signals(p) | signals
 
-    def _friction(self, motion: tuple[ca.SX, ca.SX], now: Rigid, hidden: list) -> ca.Function:
+    def _friction(self, motion: tuple[ca.SX, ca.SX], now: RigidArm, hidden: list) -> ca.Function:
         """All that effects at joints and axes take of the drives (J,), and its slopes, by acceleration and load
         (J, J) each."""
         qdd, load, taken = ca.SX.sym("qdd", self.n), ca.SX.sym("load", self.n), ca.SX(self.n, 1)
@@ -253,7 +255,7 @@ class _Writer:
         self.free = [s for s in ca.symvar(ca.veccat(taken, *slopes)) if s.name() not in _names(qdd, load)]
         return ca.Function("friction", [qdd, load, *self.free], [taken, *slopes])
 
-    def _across(self, springy: dict[int, Placed]) -> bool:
+    def _across(self, springy: dict[int, PlacedEffect]) -> bool:
         """Whether an effect acts along several joints at once; InputError beside a springy joint."""
         across = [p for p in self.laws.at("joint") if self.laws.place_of(p).alone is None]
         if across and springy:
@@ -264,7 +266,7 @@ class _Writer:
             )
         return bool(across)
 
-    def _motor(self, friction: ca.Function, j: int, p: Placed, spring: ca.SX) -> ca.SX:
+    def _motor(self, friction: ca.Function, j: int, p: PlacedEffect, spring: ca.SX) -> ca.SX:
         """Acceleration of the motor before a spring."""
         load = ca.SX(self.n, 1)
         load[j] = spring
@@ -278,7 +280,9 @@ class _Writer:
             )
         return (self.tau[j] - spring - taken[j]) / by_qdd[j, j]
 
-    def _hidden_rate(self, p: Placed, motion: tuple, qdd: ca.SX, load: ca.SX, now: Rigid, hidden: list) -> ca.SX:
+    def _hidden_rate(
+        self, p: PlacedEffect, motion: tuple, qdd: ca.SX, load: ca.SX, now: RigidArm, hidden: list
+    ) -> ca.SX:
         states = dict((q.key, s) for q, s in hidden)[p.key]
         return self.laws.rate(p, self._signals(p, motion, qdd, load, now) | states)
 

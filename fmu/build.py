@@ -1,10 +1,8 @@
 """Compile a model's sources and pack everything into one FMU file, all or nothing."""
 
 import os
-import platform
 import shlex
 import subprocess
-import sys
 import tempfile
 import zipfile
 from importlib.resources import files
@@ -12,10 +10,11 @@ from pathlib import Path
 
 from ..errors import InputError
 from ..files import written_whole
+from ..fmi.binaries import binary_folder, library_suffix
 from ..models.c_library import find_compiler
 from .c_files import source_files
-from .description import About, build_description, model_description
-from .equations import Equations, Variable
+from .description import ModelInfo, build_description, model_description
+from .equations import Equations, ModelVariable
 from .page import icon, page
 
 # -O1: straight-line code gains next to nothing from more. No contraction: the same bits on every machine.
@@ -39,7 +38,7 @@ def write_fmu(equations: Equations, path: str | Path, version: int) -> Path:
         No C compiler, or a place that cannot be written.
     """
     sources, token = source_files(equations, version)
-    about = About(
+    about = ModelInfo(
         name=equations.name,
         identifier=equations.name,
         description=equations.description,
@@ -56,8 +55,8 @@ def write_fmu(equations: Equations, path: str | Path, version: int) -> Path:
 
 
 def pack(
-    about: About,
-    variables: tuple[Variable, ...],
+    about: ModelInfo,
+    variables: tuple[ModelVariable, ...],
     sources: dict[str, str],
     resources: dict[str, str],
     path: str | Path,
@@ -117,21 +116,6 @@ def compile_library(source: Path, library: Path, libraries: tuple[str, ...]) -> 
     if run.returncode:
         complaint = (run.stderr.strip().splitlines() or ["no message"])[0]
         raise InputError(f"the C compiler failed on {shlex.join(command)}: {complaint}; name another in SNARELAB_CC")
-
-
-def library_suffix() -> str:
-    """Ending of a shared library's name on this machine."""
-    return {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
-
-
-def binary_folder(version: int) -> str:
-    """Name of this platform's folder under ``binaries``."""
-    machine = {"AMD64": "x86_64", "x86_64": "x86_64", "arm64": "aarch64"}.get(platform.machine(), platform.machine())
-    system = {"win32": "windows", "darwin": "darwin"}.get(sys.platform, "linux")
-    if version == 3:
-        return f"{machine}-{system}"
-    bits = "64" if machine in ("x86_64", "aarch64") else "32"
-    return {"windows": "win", "darwin": "darwin", "linux": "linux"}[system] + bits
 
 
 def _licence() -> str:

@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 
 from ..extras import needed_for
-from .equations import Equations, Variable
+from .equations import Equations, ModelVariable
 
 _OURS = ("instance.h", "instance.c", "calls.c")
 _OF_EQUATIONS = ("equations.h", "equations.c", "rosenbrock.c")
@@ -34,13 +34,13 @@ def source_files(equations: Equations, version: int) -> tuple[dict[str, str], st
     return {"model.h": found[0], "generated.c": generated, **copied}, found[1]
 
 
-def hosted_files(variables: tuple[Variable, ...], version: int, config: str) -> tuple[dict[str, str], str]:
+def hosted_files(variables: tuple[ModelVariable, ...], version: int, config: str) -> tuple[dict[str, str], str]:
     """As `source_files`, for a model that runs in a Python process of its own."""
     header, token = model_header(variables, {"HOSTED": 1}, config)
     return {"model.h": header, **_copied(version, _OURS + _OF_HOSTED)}, token
 
 
-def model_header(variables: tuple[Variable, ...], shapes: dict[str, int], content: str) -> tuple[str, str]:
+def model_header(variables: tuple[ModelVariable, ...], shapes: dict[str, int], content: str) -> tuple[str, str]:
     """Text of model.h, and the token: a digest of the variables and of ``content``."""
     groups = {c: [v for v in variables if v.causality == c] for c in ("input", "parameter", "output")}
     digest = hashlib.sha256("\0".join([repr(variables), repr(shapes), content]).encode()).hexdigest()

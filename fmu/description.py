@@ -8,14 +8,14 @@ from datetime import UTC, datetime
 import numpy as np
 
 from .. import __version__
-from .equations import Variable
+from .equations import ModelVariable
 from .units import DISPLAY, fmi_name, fmi_unit
 
 _LICENCE = "Apache-2.0"
 
 
 @dataclass(frozen=True)
-class About:
+class ModelInfo:
     """What the description says besides the variables.
 
     Parameters
@@ -48,7 +48,7 @@ class About:
     compiled_from: str
 
 
-def model_description(about: About, variables: tuple[Variable, ...], version: int) -> str:
+def model_description(about: ModelInfo, variables: tuple[ModelVariable, ...], version: int) -> str:
     """XML text; value references are 0 for time, then one row of inputs, parameters and outputs."""
     ordered = [v for causality in ("input", "parameter", "output") for v in variables if v.causality == causality]
     root = ET.Element(
@@ -78,7 +78,7 @@ def model_description(about: About, variables: tuple[Variable, ...], version: in
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
 
 
-def build_description(about: About) -> str:
+def build_description(about: ModelInfo) -> str:
     """sources/buildDescription.xml of FMI 3.0."""
     root = ET.Element("fmiBuildDescription", {"fmiVersion": "3.0"})
     configuration = ET.SubElement(root, "BuildConfiguration", {"modelIdentifier": about.identifier})
@@ -89,7 +89,7 @@ def build_description(about: About) -> str:
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
 
 
-def _interface2(root: ET.Element, about: About) -> None:
+def _interface2(root: ET.Element, about: ModelInfo) -> None:
     element = ET.SubElement(
         root,
         "CoSimulation",
@@ -108,7 +108,7 @@ def _interface2(root: ET.Element, about: About) -> None:
     ET.SubElement(ET.SubElement(element, "SourceFiles"), "File", {"name": about.compiled_from})
 
 
-def _interface3(root: ET.Element, about: About) -> None:
+def _interface3(root: ET.Element, about: ModelInfo) -> None:
     ET.SubElement(
         root,
         "CoSimulation",
@@ -140,7 +140,7 @@ def _units(root: ET.Element, used: Iterable[str]) -> None:
             ET.SubElement(element, "DisplayUnit", {"name": name, "factor": repr(factor)})
 
 
-def _quantity(v: Variable) -> dict[str, str]:
+def _quantity(v: ModelVariable) -> dict[str, str]:
     """Unit, display unit and bounds."""
     found = {}
     if v.unit not in ("1", ""):
@@ -156,7 +156,7 @@ def _quantity(v: Variable) -> dict[str, str]:
     return found
 
 
-def _kind(v: Variable) -> dict[str, str]:
+def _kind(v: ModelVariable) -> dict[str, str]:
     """Causality, variability and initial."""
     if v.causality == "parameter":
         return {"causality": "parameter", "variability": "fixed" if v.fixed else "tunable", "initial": "exact"}
@@ -165,7 +165,7 @@ def _kind(v: Variable) -> dict[str, str]:
     return {"causality": "output", "variability": "continuous", "initial": "calculated"}
 
 
-def _variables2(root: ET.Element, ordered: list[Variable]) -> None:
+def _variables2(root: ET.Element, ordered: list[ModelVariable]) -> None:
     listed = ET.SubElement(root, "ModelVariables")
     independent = {"name": "time", "valueReference": "0", "causality": "independent", "variability": "continuous"}
     element = ET.SubElement(listed, "ScalarVariable", independent | {"description": "simulation time"})
@@ -189,7 +189,7 @@ def _variables2(root: ET.Element, ordered: list[Variable]) -> None:
         structure.remove(outputs)
 
 
-def _variables3(root: ET.Element, ordered: list[Variable]) -> None:
+def _variables3(root: ET.Element, ordered: list[ModelVariable]) -> None:
     listed = ET.SubElement(root, "ModelVariables")
     independent = {"name": "time", "valueReference": "0", "causality": "independent", "variability": "continuous"}
     ET.SubElement(listed, "Float64", independent | {"description": "simulation time", "unit": "s"})

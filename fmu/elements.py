@@ -12,7 +12,7 @@ from ..models.floating.arm import FloatingArm
 from ..models.floating.ets_vii import ets_vii
 from ..models.floating.space_arm import CAPTURE_POSE, space_arm, space_arm_drive
 from ..models.model import Model
-from .arm import Servo, arm_equations
+from .arm import ServoGains, arm_equations
 from .equations import Equations, Ledger
 
 #: Friction laws of the joint element, in this order.
@@ -106,7 +106,7 @@ def station_arm(arm: FloatingArm | None = None, stiff: bool | None = None) -> Eq
     model = Model(
         Path(arm.tree.name), "space_arm", "free_floating_arm", None, arm.tree, "fixed", effects, {}, None, values
     )
-    servo = Servo(np.asarray(drive.stiffness).tolist(), np.asarray(drive.damping).tolist())
+    servo = ServoGains(np.asarray(drive.stiffness).tolist(), np.asarray(drive.damping).tolist())
     return arm_equations(model, arm, stiff, servo, CAPTURE_POSE)
 
 

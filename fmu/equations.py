@@ -17,7 +17,7 @@ from ..errors import InputError
 
 
 @dataclass(frozen=True)
-class Variable:
+class ModelVariable:
     """One scalar of an FMU.
 
     Parameters
@@ -61,7 +61,7 @@ class Equations:
         A C identifier.
     description : str
         One sentence.
-    variables : tuple of Variable
+    variables : tuple of ModelVariable
         Inputs, then parameters, then outputs.
     functions : mapping of str to casadi.Function
         ``initial`` (t, u, p), ``output`` (t, x, u, p), ``derivative`` (t, x, u, p, du, dp) and ``rate`` or ``advance``;
@@ -71,7 +71,7 @@ class Equations:
 
     name: str
     description: str
-    variables: tuple[Variable, ...]
+    variables: tuple[ModelVariable, ...]
     functions: Mapping[str, ca.Function]
     n_states: int
 
@@ -85,7 +85,7 @@ class Equations:
         """Whether the integrator is linearly implicit and error-controlled, or explicit with fixed steps."""
         return "jacobian" in self.functions
 
-    def of(self, causality: str) -> tuple[Variable, ...]:
+    def of(self, causality: str) -> tuple[ModelVariable, ...]:
         """Variables of one causality, in order."""
         return tuple(v for v in self.variables if v.causality == causality)
 
@@ -99,15 +99,15 @@ class Ledger:
     """Collects a model's variables and states while its equations are written down."""
 
     time: ca.SX = field(default_factory=lambda: ca.SX.sym("t"))
-    _inputs: list[tuple[Variable, ca.SX]] = field(default_factory=list)
-    _parameters: list[tuple[Variable, ca.SX]] = field(default_factory=list)
-    _outputs: list[tuple[Variable, ca.SX]] = field(default_factory=list)
+    _inputs: list[tuple[ModelVariable, ca.SX]] = field(default_factory=list)
+    _parameters: list[tuple[ModelVariable, ca.SX]] = field(default_factory=list)
+    _outputs: list[tuple[ModelVariable, ca.SX]] = field(default_factory=list)
     _states: list[ca.SX] = field(default_factory=list)
     _initial: list[ca.SX] = field(default_factory=list)
 
     def input(self, name: str, unit: str, description: str, start: float = 0.0) -> ca.SX:
         """A new input and its symbol."""
-        return self._added(self._inputs, Variable(name, "input", unit, start, description))
+        return self._added(self._inputs, ModelVariable(name, "input", unit, start, description))
 
     def parameter(
         self,
@@ -123,12 +123,12 @@ class Ledger:
         A fixed one says where the motion starts: beyond a joint's limits, the model's equations hold as well.
         """
         low, high = bounds if bounds[0] <= start <= bounds[1] else (-np.inf, np.inf)
-        made = Variable(name, "parameter", unit, start, description, low, high, fixed, refuses=not fixed)
+        made = ModelVariable(name, "parameter", unit, start, description, low, high, fixed, refuses=not fixed)
         return self._added(self._parameters, made)
 
     def output(self, name: str, unit: str, expression: ca.SX, description: str) -> None:
         """A new output."""
-        self._outputs.append((Variable(name, "output", unit, 0.0, description), expression))
+        self._outputs.append((ModelVariable(name, "output", unit, 0.0, description), expression))
 
     def vector(self, name: str, unit: str, expression: ca.SX, description: str, axes: str = "xyz") -> None:
         """Outputs ``name.x``, ``name.y``, ...."""
@@ -206,13 +206,13 @@ class Ledger:
             raise InputError(f"{name}: two variables would be called {twice!r}; rename the joint or link")
         return Equations(name, description, variables, functions, x.numel())
 
-    def _added(self, where: list[tuple[Variable, ca.SX]], variable: Variable) -> ca.SX:
+    def _added(self, where: list[tuple[ModelVariable, ca.SX]], variable: ModelVariable) -> ca.SX:
         symbol = ca.SX.sym(variable.name)
         where.append((variable, symbol))
         return symbol
 
 
-def _column(entries: list[tuple[Variable, ca.SX]]) -> ca.SX:
+def _column(entries: list[tuple[ModelVariable, ca.SX]]) -> ca.SX:
     return _stacked([symbol for _, symbol in entries])
 
 

@@ -22,8 +22,8 @@ from typing import Any
 from ..errors import InputError
 from .build import pack
 from .c_files import hosted_files
-from .description import About
-from .equations import Variable
+from .description import ModelInfo
+from .equations import ModelVariable
 
 _PARTICIPANTS = "snarelab.cosim.participants"
 
@@ -98,7 +98,7 @@ def write_hosted_class(cls: type, arguments: dict[str, Any], path: str | Path, v
         raise InputError(f"{name}: FMUs with Python inside are built on Linux only; export it there")
     participant = cls(**arguments)
     variables = tuple(
-        Variable(
+        ModelVariable(
             v.name,
             v.causality,
             v.unit,
@@ -124,7 +124,7 @@ def write_hosted_class(cls: type, arguments: dict[str, Any], path: str | Path, v
     participant.close()
     sources, token = hosted_files(variables, version, json.dumps(config))
     description = " ".join((inspect.getdoc(cls) or name).split("\n\n")[0].replace("`", "").split())
-    about = About(
+    about = ModelInfo(
         name=name,
         identifier=name,
         description=description,

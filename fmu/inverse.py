@@ -17,7 +17,7 @@ import numpy as np
 from ..models.axes import Place
 from ..models.empirical import TableLaw
 from ..models.hidden_state import ros2
-from ..models.model import Model, Placed
+from ..models.model import Model, PlacedEffect
 from ..models.rig.rig import Rig
 from ..models.rigid_body import symbolic_torque
 from .base_motion import BaseMotion
@@ -88,7 +88,7 @@ class _Follower:
             first = self.base.start(u)
             states["memory"] = memory = ca.vertcat(*(ledger.state(x) for x in ca.vertsplit(first)))
 
-        def at_rest(p: Placed, signals: list[_Signals]) -> list[ca.SX]:
+        def at_rest(p: PlacedEffect, signals: list[_Signals]) -> list[ca.SX]:
             found = self.laws.steady(p, signals[0])
             states[p.key] = ca.vertcat(*(ledger.state(x) for x in ca.vertsplit(found)))
             return [found]
@@ -118,7 +118,7 @@ class _Follower:
         h, before = ca.SX.sym("h"), ca.SX.sym("before", u.numel())
         later: dict[str, ca.SX] = {}
 
-        def stepped(p: Placed, signals: list[_Signals]) -> list[ca.SX]:
+        def stepped(p: PlacedEffect, signals: list[_Signals]) -> list[ca.SX]:
             here, there = signals
             later[p.key] = self._stepped(p, states[p.key], here, there, h)
             return [states[p.key], later[p.key]]
@@ -133,7 +133,7 @@ class _Follower:
         return ca.Function("model_advance", [t, h, x, before, u, ledger.parameters()[0]], [ca.cse(ca.densify(found))])
 
     def _torque(
-        self, ends: list[tuple[ca.SX, ca.SX, ca.SX]], states_at: Callable[[Placed, list[_Signals]], list[ca.SX]]
+        self, ends: list[tuple[ca.SX, ca.SX, ca.SX]], states_at: Callable[[PlacedEffect, list[_Signals]], list[ca.SX]]
     ) -> list[ca.SX]:
         """Readings (base and J,) at each (time, inputs, base's memory); ``states_at`` gives an effect's states there.
 
@@ -186,7 +186,7 @@ class _Follower:
                 readings[k] = readings[k] + change
         return readings
 
-    def _signals(self, p: Placed, t: ca.SX, u: ca.SX, memory: ca.SX) -> _Signals:
+    def _signals(self, p: PlacedEffect, t: ca.SX, u: ca.SX, memory: ca.SX) -> _Signals:
         """What an effect may read of time, inputs and the base's memory."""
         n, here = self.n, ca.vertcat(self.ledger.time, self.ledger.inputs())
         own = {name: ca.substitute(x, here, ca.vertcat(t, u)) for name, x in self.laws.signals(p).items()}
@@ -196,14 +196,14 @@ class _Follower:
         own |= self.laws.of_others(p, u[:n], u[n : 2 * n])
         return own | {name: summed(along, u[k * n : (k + 1) * n]) for k, name in enumerate(("q", "qd", "qdd"))}
 
-    def _direction(self, p: Placed) -> Place:
+    def _direction(self, p: PlacedEffect) -> Place:
         """The joint or axis whose motion an effect reads."""
         if p.effect.at in ("joint", "sensor"):
             return self.laws.place_of(p)
         one = np.eye(self.n)[self.laws.joint_of(p)]
         return Place(p.at, one, one, "revolute")
 
-    def _carried(self, p: Placed, j: int, load: ca.SX, by_qdd: ca.SX) -> _Signals:
+    def _carried(self, p: PlacedEffect, j: int, load: ca.SX, by_qdd: ca.SX) -> _Signals:
         """Load and inertia that a joint's law, or a sensor's, reads."""
         if p.effect.at not in ("joint", "sensor"):
             return {"load": load[j], "inertia": by_qdd[j, j]}
@@ -211,7 +211,7 @@ class _Follower:
         across = ca.vertcat(*(summed(back, own[k, :].T) for k in range(self.n)))
         return {"load": summed(back, load[self.first :]), "inertia": summed(back, across)}
 
-    def _stepped(self, p: Placed, x: ca.SX, here: _Signals, there: _Signals, h: ca.SX) -> ca.SX:
+    def _stepped(self, p: PlacedEffect, x: ca.SX, here: _Signals, there: _Signals, h: ca.SX) -> ca.SX:
         """One step, as `snarelab.models.hidden_state` takes it between samples."""
         if p.effect.advance:
             return self.laws.advanced(p, here | _named(p, x), there, h)
@@ -224,5 +224,5 @@ class _Follower:
         return ros2(lambda x, u: f(x, u, parameters), x, first, last, h)
 
 
-def _named(p: Placed, x: ca.SX) -> _Signals:
+def _named(p: PlacedEffect, x: ca.SX) -> _Signals:
     return dict(zip(p.effect.states, ca.vertsplit(x) if x.numel() else [], strict=True))

@@ -9,21 +9,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import __version__
-from .equations import Variable
+from .equations import ModelVariable
 
 if TYPE_CHECKING:
-    from .description import About
+    from .description import ModelInfo
 
 STYLE = """:root{color-scheme:light dark}
 body{font:15px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem}
 table{border-collapse:collapse;width:100%;margin-bottom:1.5rem}th,td{text-align:left;padding:.25rem .6rem;border-bottom:
 1px solid #8888;vertical-align:top}td.b{white-space:nowrap}td.n{text-align:right;font-variant-numeric:tabular-nums}
-code{font-size:.95em}h1{font-size:1.5rem}h2{font-size:1.1rem;margin-top:2rem}"""
+code{font-size:.95em}h1{font-size:1.5rem}h2{font-size:1.1rem;margin-top:2rem}
+@media screen and (max-width:40rem){body{overflow-wrap:anywhere}tr{display:flex;flex-wrap:wrap;padding:.3rem 0;
+border-bottom:1px solid #8888}th,td{border:0;padding:0 1rem 0 0}
+:is(th,td):is(:first-child,:last-child){flex-basis:100%}}"""
 
 _HEADINGS = {"input": "Inputs", "parameter": "Parameters", "output": "Outputs"}
 
 
-def page(about: "About", variables: tuple[Variable, ...], version: int) -> str:
+def page(about: "ModelInfo", variables: tuple[ModelVariable, ...], version: int) -> str:
     """HTML: what the model is, what it can do, and every variable."""
     abilities = {
         "saves, restores and serialises its state, exactly": about.saves,
@@ -63,7 +66,7 @@ def _unit(text: str) -> str:
     return text.replace("**", "^").replace("*", "·")
 
 
-def _bounds(v: Variable) -> str:
+def _bounds(v: ModelVariable) -> str:
     if not np.isfinite([v.minimum, v.maximum]).any():
         return ""
     low = "−∞" if v.minimum == -np.inf else f"{v.minimum:.4g}"

@@ -9,7 +9,7 @@ import numpy as np
 from ..models.axes import Place, place
 from ..models.effect import Parameter, written_unit
 from ..models.hidden_state import reads
-from ..models.model import Model, Placed
+from ..models.model import Model, PlacedEffect
 from ..models.rig.kinematics import sling_of
 from ..models.rig.points import far_end
 from ..models.rig.rig import Rig
@@ -57,11 +57,11 @@ class PlacedLaws:
             if "temperature" in read and j not in self._temperatures:
                 self._temperatures[j] = ledger.input(f"temp.{self._name(p)}", "degC", f"temperature of {self._name(p)}")
 
-    def at(self, *kinds: str) -> list[Placed]:
+    def at(self, *kinds: str) -> list[PlacedEffect]:
         """Placed effects that act at joints, links, sensors, ..., in the model's order."""
         return [p for p in self._model.effects if p.effect.at in kinds]
 
-    def joint_of(self, p: Placed) -> int:
+    def joint_of(self, p: PlacedEffect) -> int:
         """Index among the arm's joints of the one that an effect's place belongs to; -1 for a floating base."""
         if p.effect.at == "sling":
             assert isinstance(self._model.tree, Rig)
@@ -70,19 +70,19 @@ class PlacedLaws:
             return self._link_of(p) - self._model.tree.carriers
         return int(self.place_of(p).channels[0])
 
-    def place_of(self, p: Placed) -> Place:
+    def place_of(self, p: PlacedEffect) -> Place:
         """The joint or axis, among the arm's joints, that an effect acts at or whose channel it reads."""
         found = place(self._model.tree, p.at.removeprefix("tau.").removeprefix("q.").removeprefix("q_link."))
         first = self._model.tree.carriers
         return replace(found, along=found.along[first:], back=found.back[first:])
 
-    def _link_of(self, p: Placed) -> int:
+    def _link_of(self, p: PlacedEffect) -> int:
         return [link.name for link in self._model.tree.links].index(p.at)
 
-    def _name(self, p: Placed) -> str:
+    def _name(self, p: PlacedEffect) -> str:
         return self._joints[self.joint_of(p)].name
 
-    def _own(self, p: Placed) -> str:
+    def _own(self, p: PlacedEffect) -> str:
         """Name of the joint, or the axis, whose speed an effect refers to."""
         return p.at if any(axis.name == p.at for axis in self._model.tree.axes) else self._name(p)
 
@@ -90,7 +90,7 @@ class PlacedLaws:
         """A unit with the joint's torque, position and channel units written out."""
         return written_unit(unit, self._joints[joint].kind, channel)
 
-    def signals(self, p: Placed | None = None) -> dict[str, ca.SX]:
+    def signals(self, p: PlacedEffect | None = None) -> dict[str, ca.SX]:
         """Signals that depend on the place alone: time, temperature, speed scale."""
         found = {"time": self._ledger.time}
         if p is None:
@@ -101,7 +101,7 @@ class PlacedLaws:
             found["temperature"] = self._temperatures[self.joint_of(p)]
         return found
 
-    def of_others(self, p: Placed, q: ca.SX, qd: ca.SX) -> dict[str, ca.SX]:
+    def of_others(self, p: PlacedEffect, q: ca.SX, qd: ca.SX) -> dict[str, ca.SX]:
         """What an effect reads of other joints, of the arm's positions and rates (J,)."""
         at = [[joint.name for joint in self._joints].index(name) for name in p.effect.others]
         return {f"{name}_of_{k}": x[j] for k, j in enumerate(at, 1) for name, x in (("q", q), ("qd", qd))}
@@ -111,21 +111,21 @@ class PlacedLaws:
         words = f"1 while a coordinate of the empirical law at {at} lies outside its data: its end value is held"
         self._ledger.output(f"held.{at}", "1", outside, words)
 
-    def law(self, p: Placed, signals: Mapping[str, ca.SX]) -> ca.SX:
+    def law(self, p: PlacedEffect, signals: Mapping[str, ca.SX]) -> ca.SX:
         """What the effect gives for signals (and states by name)."""
         return ca.vertcat(p.effect.law(signals, self._parameters[p.key]))
 
-    def rate(self, p: Placed, signals: Mapping[str, ca.SX]) -> ca.SX:
+    def rate(self, p: PlacedEffect, signals: Mapping[str, ca.SX]) -> ca.SX:
         """Rates of the effect's hidden states."""
         assert p.effect.rate is not None
         return ca.vertcat(*p.effect.rate(signals, self._parameters[p.key]))
 
-    def advanced(self, p: Placed, signals: Mapping[str, ca.SX], later: Mapping[str, ca.SX], h: ca.SX) -> ca.SX:
+    def advanced(self, p: PlacedEffect, signals: Mapping[str, ca.SX], later: Mapping[str, ca.SX], h: ca.SX) -> ca.SX:
         """Hidden states h seconds on, of an effect that gives its closed solution."""
         assert p.effect.advance is not None
         return ca.vertcat(*p.effect.advance(signals, later, self._parameters[p.key], h))
 
-    def steady(self, p: Placed, signals: Mapping[str, ca.SX]) -> ca.SX:
+    def steady(self, p: PlacedEffect, signals: Mapping[str, ca.SX]) -> ca.SX:
         """Hidden states with zero rate at given signals, or zero where they accumulate."""
         if p.effect.from_zero:
             return ca.SX.zeros(len(p.effect.states))
@@ -146,7 +146,7 @@ class PlacedLaws:
             found[k] = found[k] + self.law(p, {"phi": nominal[k], "tip": tip}) - nominal[k]
         return found
 
-    def _parameter(self, p: Placed, x: Parameter) -> ca.SX:
+    def _parameter(self, p: PlacedEffect, x: Parameter) -> ca.SX:
         name, joint = f"{p.key}.{x.name}", self.joint_of(p)
         scale = self._model.values.get(f"speed_scale.{self._own(p)}") if x.relative_to == "speed" else None
         known = not x.relative_to or scale is not None

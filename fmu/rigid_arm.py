@@ -16,7 +16,7 @@ from .equations import Ledger
 
 
 @dataclass(frozen=True, eq=False)
-class Rigid:
+class RigidArm:
     """Inertia M (N, N), terms c (N,) [N·m; N at a slide], and the tip, at a state.
 
     N counts the tree's joints, of which the first six carry a floating base.
@@ -35,7 +35,7 @@ def rigid(
     qd: ca.SX,
     base: Base | None = None,
     at_tip: ca.SX | None = None,
-) -> Rigid:
+) -> RigidArm:
     """M and c at a state: M times accelerations plus c is what drives, and what effects do, must add up to.
 
     Parameters
@@ -72,7 +72,7 @@ def rigid(
         terms = terms - symbolic_torque(tree, position, none, none, gravity, ca.SX(tree.phi))
     if base is not None and n_base:
         terms = terms - ca.vertcat(base.given, ca.SX(q.numel(), 1))
-    return Rigid(inertia, terms, end)
+    return RigidArm(inertia, terms, end)
 
 
 def body_outputs(ledger: Ledger, arm: FloatingArm, base: Base, end: Tip, qd: ca.SX) -> None:

@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 
 from ..models.inertia import Array
-from ..models.model import Placed
+from ..models.model import PlacedEffect
 from ..models.rig.kinematics import sling_of
 from ..models.rig.points import far_end, symbolic_point
 from ..models.rig.rig import Rig
@@ -16,7 +16,7 @@ PLACES = ("sling", "slide", "boom")
 """Kinds of place that only a rig has."""
 
 
-def rig_signals(rig: Rig, p: Placed, q: ca.SX, qd: ca.SX) -> dict[str, ca.SX]:
+def rig_signals(rig: Rig, p: PlacedEffect, q: ca.SX, qd: ca.SX) -> dict[str, ca.SX]:
     """What a law at a sling or a boom reads of the arm at q, qd (J,); one at a slide reads its joint's signals."""
     if p.effect.at == "sling":
         sling = sling_of(rig, p.at)
@@ -27,7 +27,7 @@ def rig_signals(rig: Rig, p: Placed, q: ca.SX, qd: ca.SX) -> dict[str, ca.SX]:
     return {}
 
 
-def rig_reach(rig: Rig, p: Placed, q: ca.SX) -> ca.SX:
+def rig_reach(rig: Rig, p: PlacedEffect, q: ca.SX) -> ca.SX:
     """Torque that every drive must add, per number that the law gives: a matrix (J, m)."""
     if p.effect.at == "sling":
         sling = sling_of(rig, p.at)

@@ -24,7 +24,7 @@ DISPLAY = {
 
 
 @dataclass(frozen=True)
-class Unit:
+class FmiUnit:
     """A unit's name in FMI's habit (``N.m.s/rad``), exponents of base units, and ``SI = factor * value + offset``."""
 
     name: str
@@ -38,11 +38,11 @@ def fmi_name(unit: str) -> str:
     return re.sub(r"\^|\*\*", "", unit.replace("**", "^").replace("*", "."))
 
 
-def fmi_unit(unit: str) -> Unit:
+def fmi_unit(unit: str) -> FmiUnit:
     """Definition of a unit in pint's spelling."""
     units = registry()
     if unit == "degC":
-        return Unit("degC", {"K": 1}, 1.0, 273.15)
+        return FmiUnit("degC", {"K": 1}, 1.0, 273.15)
     base = units.Quantity(1.0, units.parse_units(unit)).to_base_units()
     exponents = {_BASE[str(name)]: round(float(str(power))) for name, power in base.unit_items()}
-    return Unit(fmi_name(unit), exponents, float(base.magnitude))
+    return FmiUnit(fmi_name(unit), exponents, float(base.magnitude))

@@ -9,22 +9,35 @@ from numpy.typing import NDArray
 
 from ..models.floating.tree import channel
 from ..models.model import Model
-from .diagnosis import Candidate, ChannelFit, Diagnosis, Estimate, Finding, Limit, Misfit, Moved, Rival, Step, Trace
-from .evidence.diagnose import Decided
-from .evidence.found import Name
+from ..report.words import percent
+from .diagnosis import (
+    Candidate,
+    ChannelFit,
+    Diagnosis,
+    Estimate,
+    Finding,
+    Limit,
+    Misfit,
+    ParameterShift,
+    Rival,
+    Step,
+    Trace,
+)
+from .evidence.diagnose import ArmDecision
+from .evidence.selection import ArmNaming
 from .fitting.experiment import Experiment
 from .fitting.fit import Fit, channel_rms
 from .fitting.floating_terms import momentum_floor
 from .reliability import of_name
 from .search.locate import locate
-from .wording import evidence_sentence, experiment_sentence, foremost, listed, noise_words, percent, verdict_sentence
+from .wording import evidence_sentence, experiment_sentence, foremost, listed, noise_words, verdict_sentence
 
 Array = NDArray[np.float64]
 
 
 def report_on(
     model: Model,
-    decided: Decided,
+    decided: ArmDecision,
     final: Fit,
     steps: tuple[Step, ...],
     train: Sequence[Experiment],
@@ -36,7 +49,7 @@ def report_on(
     ----------
     model : Model
         Baseline.
-    decided : Decided
+    decided : ArmDecision
         Verdict, names, nameless curves, and what was not confirmed.
     final : Fit
         With the confirmed effects.
@@ -65,7 +78,9 @@ def report_on(
     ]
     description = "; ".join(said)
     if findings:
-        remainder = f" Part of what is left on {listed([channels[c] for c in loud])} has no name." if loud else ""
+        remainder = (
+            f" Part of the remaining residual of {listed([channels[c] for c in loud])} has no name." if loud else ""
+        )
     else:
         remainder = f" {description[:1].upper()}{description[1:]}." if description else ""
     noise = {
@@ -76,7 +91,7 @@ def report_on(
     notes = [f"{Path(e.motion.path).name}: {note}" for e in (*train, *held) for note in e.motion.notes]
     notes += [
         f"{n.placed.effect.name} at {n.placed.at} passed on the training recordings, but the held-out ones are "
-        f"foretold no better with it: not named"
+        f"predicted no better with it: not named"
         for n in decided.rejected
         if n.placed.key not in named
     ]
@@ -123,7 +138,7 @@ def _explained(first: Fit, final: Fit, experiment: Experiment) -> Array:
     return experiment.motion.to_band(change)
 
 
-def _finding(n: Name, decided: Decided, final: Fit, every: Sequence[str]) -> Finding:
+def _finding(n: ArmNaming, decided: ArmDecision, final: Fit, every: Sequence[str]) -> Finding:
     placed = n.placed
     parameters = {
         final.assembly.slots[i].name: Estimate(
@@ -160,7 +175,7 @@ def _finding(n: Name, decided: Decided, final: Fit, every: Sequence[str]) -> Fin
     )
 
 
-def _limits(decided: Decided, final: Fit) -> tuple[Limit, ...]:
+def _limits(decided: ArmDecision, final: Fit) -> tuple[Limit, ...]:
     """What would have been named beside all that was, had it been there."""
     return tuple(
         Limit(t.placed.effect.name, t.placed.at, p.name, t.smallest[p.name], final.assembly.unit(t.placed, p))
@@ -215,11 +230,11 @@ def _noise_floor(experiments: Sequence[Experiment], final: Fit) -> Array:
     return np.min(floors, axis=0)
 
 
-def moved(first: Fit, final: Fit) -> tuple[Moved, ...]:
+def moved(first: Fit, final: Fit) -> tuple[ParameterShift, ...]:
     """Parameters of the baseline before and after."""
     after = {s.key: (v, d) for s, v, d in zip(final.assembly.slots, final.theta, final.std, strict=True)}
     return tuple(
-        Moved(s.key, s.unit, float(v), float(after[s.key][0]), float(after[s.key][1]))
+        ParameterShift(s.key, s.unit, float(v), float(after[s.key][0]), float(after[s.key][1]))
         for s, v in zip(first.assembly.slots, first.theta, strict=True)
         if s.key in after
     )

@@ -24,13 +24,13 @@ BENDS = (0.15, 0.4)
 DISCREPANCY = 0.001
 """Small curves beside every explanation [share of the channel's RMS torque] (Kennedy and O'Hagan 2001)."""
 LAW_ERROR = 0.02
-"""The same over what each law of the model runs over [share of what the law does]."""
+"""Small curves over what each law of the model runs over [share of the law's torque]."""
 BASELINE = 0.2
 """How far the baseline may move beside an explanation [share of the channel's RMS torque] ..."""
 BASELINE_OWN = 0.5
 """... beyond this share of each parameter's own value; linear laws."""
 BASELINE_SHAPE = 0.3
-"""The same of a parameter that the torque is not linear in: no further than its slope holds."""
+"""How far a parameter may move that the torque is not linear in [share of its value]: as far as its slope holds."""
 TOLERANCES = (0.001, 0.003, 0.01, 0.03)
 """How exactly a model's masses may be known [share]; the evidence chooses one."""
 ROUNDS = 4
@@ -51,7 +51,7 @@ STICKS = ((0.04, 0.005), (0.01, 0.001))
 """Below this share of the peak speed, or so shortly after it (share of the travel), a joint holds any torque; the
 evidence chooses one."""
 SETTLES = (0.10, 0.012)
-"""The same for where its friction still settles."""
+"""Below this share of the peak speed, or so shortly after it (share of the travel), friction still settles."""
 LEAST_LEVEL = 0.03
 """What a joint may hold at rest at least [share of the channel's RMS torque]."""
 

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ..checks.run import early_checks, run_checks
 from ..models.docking.bench_setup import DockingTree
 from ..models.effects import effects
 from ..models.hidden_state import prepare
@@ -14,11 +13,12 @@ from ..models.model import Model
 from ..models.rigid_body import RigidBody
 from ..models.snare.setup import SnareTree
 from .answer import report_on
+from .checks.run import early_checks, run_checks
 from .data_fault import contradict, data_fault
 from .diagnosis import Diagnosis, Step
 from .empirical import empirical_laws
 from .empirical_answer import with_laws
-from .evidence.diagnose import Decided, decide
+from .evidence.diagnose import ArmDecision, decide
 from .fitting.base_parameters import base_parameters
 from .fitting.constants import notes_on, settled, with_constants
 from .fitting.experiment import Experiment, load_experiments, scales, with_silence
@@ -130,7 +130,9 @@ def diagnose(
     return Answer(replace(diagnosis, checks=checks, notes=notes, curves=curves), settled(after))
 
 
-def _steps(decided: Decided, final: Fit, train: Sequence[Experiment], locked: Sequence[Experiment]) -> tuple[Step, ...]:
+def _steps(
+    decided: ArmDecision, final: Fit, train: Sequence[Experiment], locked: Sequence[Experiment]
+) -> tuple[Step, ...]:
     """Relative misfit after each effect is added, all parameters fitted again on the training recordings."""
 
     def line(label: str, own: Fit) -> Step:

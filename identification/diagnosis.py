@@ -7,7 +7,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks.finding import Finding as Check
+from .checks.finding import CheckFinding
+from .verdict import Verdict
 
 Array = NDArray[np.float64]
 
@@ -120,7 +121,7 @@ class Limit:
 
 
 @dataclass(frozen=True)
-class Moved:
+class ParameterShift:
     """A baseline parameter before and after the missing physics was added."""
 
     name: str
@@ -243,7 +244,7 @@ class Diagnosis:
         Baseline first, then one line an effect added.
     candidates : tuple of Candidate
         Each effect at each place by itself on top of the model as given, best first.
-    moved : tuple of Moved
+    moved : tuple of ParameterShift
     traces : tuple of Trace
     limits : tuple of Limit
         What would have been seen, had it been there.
@@ -251,7 +252,7 @@ class Diagnosis:
         Conditioning and excitation, in words.
     band : float
         Analysis band's edge [Hz].
-    checks : tuple of Check
+    checks : tuple of CheckFinding
         What of the recordings and the model is not as it should be; a ``data_fault`` where they contradict each other.
     curves : tuple of FrictionCurve
         Friction of each joint over its speed, of the laws that depend on speed alone, with its deviation.
@@ -261,7 +262,7 @@ class Diagnosis:
         What stands for physics without a name; in the model beside all that has one.
     """
 
-    verdict: Literal["data_fault", "missing_physics", "adequate", "unknown_effect"]
+    verdict: Verdict
     sentence: str
     description: str
     model: str
@@ -270,12 +271,12 @@ class Diagnosis:
     fit: tuple[ChannelFit, ...]
     steps: tuple[Step, ...]
     candidates: tuple[Candidate, ...]
-    moved: tuple[Moved, ...]
+    moved: tuple[ParameterShift, ...]
     traces: tuple[Trace, ...]
     limits: tuple[Limit, ...]
     notes: tuple[str, ...]
     band: float
-    checks: tuple[Check, ...] = ()
+    checks: tuple[CheckFinding, ...] = ()
     curves: tuple[FrictionCurve, ...] = ()
     foremost: str = ""
     empirical: tuple[EmpiricalTable, ...] = ()
@@ -338,7 +339,7 @@ def _finding(finding: Finding) -> dict[str, Any]:
 
 
 def _finite(content: Any) -> Any:
-    """The same with null in place of numbers that are none."""
+    """Content for JSON, with null in place of numbers that are not finite."""
     if isinstance(content, dict):
         return {key: _finite(x) for key, x in content.items()}
     if isinstance(content, list | tuple):

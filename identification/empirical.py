@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, cholesky, eigh
 
 from ..models.empirical import NAME, placed_tables, read_along, tables_of
-from ..models.model import Placed
+from ..models.model import PlacedEffect
 from ..models.table import MOST, Table, read_words
 from .deciding import GATE
 from .evidence.confirm import blocks, scatter
-from .evidence.diagnose import Decided
-from .fitting.assembly import Assembly
+from .evidence.diagnose import ArmDecision
+from .fitting.assembly import TorqueModel
 from .fitting.experiment import Experiment
 from .fitting.fit import Fit, fit
 from .fitting.problem import gather
@@ -57,7 +57,7 @@ class _Chosen:
 
 
 def empirical_laws(
-    decided: Decided, final: Fit, train: Sequence[Experiment], held: Sequence[Experiment]
+    decided: ArmDecision, final: Fit, train: Sequence[Experiment], held: Sequence[Experiment]
 ) -> tuple[Fit, tuple[EmpiricalLaw, ...]]:
     """The fit with a table for each nameless curve that can be one and that the held-out recordings confirm."""
     carriers, joints = final.assembly.tree.carriers, final.assembly.tree.joints
@@ -79,7 +79,7 @@ def empirical_laws(
 
 
 def _tables(
-    decided: Decided, final: Fit, train: Sequence[Experiment], c: int, wanted: Sequence[tuple[tuple[str, ...], str]]
+    decided: ArmDecision, final: Fit, train: Sequence[Experiment], c: int, wanted: Sequence[tuple[tuple[str, ...], str]]
 ) -> tuple[tuple[Table, ...], dict[str, float]]:
     """Tables over the coordinates wanted, with their values and deviations by key."""
     assembly, at = final.assembly, final.assembly.tree.joints[c].name
@@ -155,7 +155,7 @@ def _evidence(matrix: Array, score: Array, size: float) -> Array:
     return np.sum(0.5 * own * (turn.T @ score) ** 2 / spread - 0.5 * np.log(spread), axis=1)
 
 
-def _read(assembly: Assembly, e: Experiment, load: Array, c: int, over: tuple[str, ...], times: str) -> list[Array]:
+def _read(assembly: TorqueModel, e: Experiment, load: Array, c: int, over: tuple[str, ...], times: str) -> list[Array]:
     """Coordinates of a table at a joint along a recording, each (n,), and last its factor, as the law reads them."""
     m, names = e.motion, [j.name for j in assembly.tree.joints]
     steps = np.abs(m.qd[:, c]) * m.period
@@ -169,17 +169,17 @@ def _read(assembly: Assembly, e: Experiment, load: Array, c: int, over: tuple[st
     return [np.asarray(x, float).ravel() for x in (*(found[f"x{k}"] for k in range(len(over))), found["factor"])]
 
 
-def _refitted(final: Fit, placed: Placed, values: Mapping[str, float], train: Sequence[Experiment]) -> Fit:
+def _refitted(final: Fit, placed: PlacedEffect, values: Mapping[str, float], train: Sequence[Experiment]) -> Fit:
     """All laws fitted again beside a table that is held."""
     before = final.assembly
     known = before.values(final.theta) | {k: v for k, v in values.items() if not k.startswith("std.")}
-    made = Assembly(before.tree, (*before.placed, placed), before.base, before.scales, known)
+    made = TorqueModel(before.tree, (*before.placed, placed), before.base, before.scales, known)
     made.phi = before.phi
     return fit(made, fitted(made, train), start=carry(final, made), multi_start=False)
 
 
 def _confirmed(
-    decided: Decided, before: Fit, after: Fit, train: Sequence[Experiment], held: Sequence[Experiment], c: int
+    decided: ArmDecision, before: Fit, after: Fit, train: Sequence[Experiment], held: Sequence[Experiment], c: int
 ) -> tuple[float, float]:
     """Log density that the held-out recordings gain on a channel, and that in its standard errors over blocks."""
     rows, parts = decided.best.found.weighed.evidence.channels[len(train) :], []
@@ -191,7 +191,7 @@ def _confirmed(
     return float(every.sum()), float(every.sum()) / max(scatter(every), 1e-12)
 
 
-def beyond(assembly: Assembly, e: Experiment, theta: Array) -> list[str]:
+def beyond(assembly: TorqueModel, e: Experiment, theta: Array) -> list[str]:
     """For each table that a motion leaves the data of: one line that says so, and that it is held there."""
     said = []
     for p in assembly.placed:

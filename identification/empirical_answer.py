@@ -13,7 +13,7 @@ from ..models.tree import Joint
 from .answer import channel_fits, moved, traces
 from .diagnosis import Diagnosis, EmpiricalTable, Estimate, Finding, Step
 from .empirical import EmpiricalLaw
-from .evidence.diagnose import Decided
+from .evidence.diagnose import ArmDecision
 from .fitting.experiment import Experiment
 from .fitting.fit import Fit, channel_rms
 from .reliability import of_name
@@ -23,7 +23,7 @@ from .wording import from_to, listed
 def with_laws(
     diagnosis: Diagnosis,
     model: Model,
-    decided: Decided,
+    decided: ArmDecision,
     named: Fit,
     final: Fit,
     laws: Sequence[EmpiricalLaw],

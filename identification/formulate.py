@@ -16,6 +16,7 @@ from ..errors import InputError
 from ..models.empirical import NAME, table_values, tables_of
 from ..models.model import Model
 from ..models.table import Table
+from ..report.words import percent
 
 Array = NDArray[np.float64]
 
@@ -74,7 +75,7 @@ class Term:
 
 
 @dataclass(frozen=True)
-class Formula:
+class TableFormula:
     """Terms with their coefficients, the share of the table's energy they explain [0 to 1], and their distance from the
     table in its own standard errors (RMS)."""
 
@@ -93,18 +94,18 @@ class Formula:
 
 
 @dataclass(frozen=True)
-class Formulated:
+class FormulaChoice:
     """A table's best formula and its rivals, which the table cannot tell from it."""
 
     at: str
     table: Table
-    best: Formula
-    rivals: tuple[Formula, ...]
+    best: TableFormula
+    rivals: tuple[TableFormula, ...]
 
     def to_json(self) -> dict[str, Any]:
         """The published form."""
 
-        def one(f: Formula) -> dict[str, Any]:
+        def one(f: TableFormula) -> dict[str, Any]:
             return {"formula": f.words(self.table), "share": f.share, "error": f.error}
 
         return {"at": self.at, "over": self.table.words, **one(self.best), "rivals": [one(r) for r in self.rivals]}
@@ -113,13 +114,13 @@ class Formulated:
         """What the command prints."""
         lines = [
             f"{NAME} at {self.at} over {self.table.words}:",
-            f"  {self.best.words(self.table)}   {100 * self.best.share:.1f} % of it",
+            f"  {self.best.words(self.table)}   {percent(self.best.share, 3)} of it",
         ]
-        lines += [f"  or, within its error: {r.words(self.table)}   {100 * r.share:.1f} %" for r in self.rivals]
+        lines += [f"  or, within its error: {r.words(self.table)}   {percent(r.share, 3)}" for r in self.rivals]
         return "\n".join(lines)
 
 
-def formulate(model: Model, at: str | None = None) -> list[Formulated]:
+def formulate(model: Model, at: str | None = None) -> list[FormulaChoice]:
     """Formulas for the tables of a model, or for those at one joint.
 
     Raises
@@ -143,14 +144,14 @@ def formulate(model: Model, at: str | None = None) -> list[Formulated]:
     return found
 
 
-def formulate_table(at: str, table: Table, values: Array, std: Array | None) -> Formulated:
+def formulate_table(at: str, table: Table, values: Array, std: Array | None) -> FormulaChoice:
     """A formula for one table: values and deviations in its shape."""
     grid = np.meshgrid(*(np.array(k) for k in table.knots), indexing="ij")
     x, v = [g.ravel() for g in grid], values.ravel()
     least = LEAST_ERROR * max(float(np.sqrt(np.mean(v**2))), 1e-300)
     error = np.maximum(np.zeros_like(v) if std is None else std.ravel(), least)
     every = list(_dictionary(table))
-    best = Formula((), (), 0.0, float(np.sqrt(np.mean((v / error) ** 2))))
+    best = TableFormula((), (), 0.0, float(np.sqrt(np.mean((v / error) ** 2))))
     for _ in range(MOST_TERMS):
         tried = [_fitted((*best.terms, t), x, v, error) for t in every if t not in best.terms]
         next_one = min(tried, key=lambda f: _criterion(f, len(v)))
@@ -159,7 +160,7 @@ def formulate_table(at: str, table: Table, values: Array, std: Array | None) -> 
         best = next_one
     if not best.terms:
         best = _fitted((Term("constant", 0),), x, v, error)
-    rivals: dict[frozenset[tuple[str, int]], Formula] = {}
+    rivals: dict[frozenset[tuple[str, int]], TableFormula] = {}
     own = frozenset((t.kind, t.of) for t in best.terms)
     for k in range(len(best.terms)):
         for t in every:
@@ -167,7 +168,7 @@ def formulate_table(at: str, table: Table, values: Array, std: Array | None) -> 
             key = frozenset((y.kind, y.of) for y in other.terms)
             if key != own and other.error <= max(1.0, best.error):
                 rivals[key] = min(rivals.get(key, other), other, key=lambda f: f.error)
-    return Formulated(at, table, best, tuple(sorted(rivals.values(), key=lambda f: f.error)[:5]))
+    return FormulaChoice(at, table, best, tuple(sorted(rivals.values(), key=lambda f: f.error)[:5]))
 
 
 def _dictionary(table: Table) -> Iterator[Term]:
@@ -188,17 +189,17 @@ def _dictionary(table: Table) -> Iterator[Term]:
             yield from (Term("wave", -1, span / w), Term("difference", -2, span / w))
 
 
-def _fitted(terms: tuple[Term, ...], x: Sequence[Array], v: Array, error: Array) -> Formula:
+def _fitted(terms: tuple[Term, ...], x: Sequence[Array], v: Array, error: Array) -> TableFormula:
     parts = [t.columns(x) for t in terms]
     whole = np.concatenate(parts, axis=1)
     found = np.asarray(np.linalg.lstsq(whole / error[:, None], v / error)[0], float)
     left = (v - whole @ found) / error
     share = 1 - float(np.sum(left**2) / max(np.sum((v / error) ** 2), 1e-300))
     cuts = np.cumsum([p.shape[1] for p in parts])[:-1]
-    return Formula(terms, tuple(np.split(found, cuts)), share, float(np.sqrt(np.mean(left**2))))
+    return TableFormula(terms, tuple(np.split(found, cuts)), share, float(np.sqrt(np.mean(left**2))))
 
 
-def _criterion(f: Formula, n: int) -> float:
+def _criterion(f: TableFormula, n: int) -> float:
     """Bayesian information criterion of values with known errors; a shape counts as a parameter."""
     parameters = sum(len(v) + (t.shape != 0) for t, v in zip(f.terms, f.values, strict=True))
     return n * f.error**2 + parameters * float(np.log(n))

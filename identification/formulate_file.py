@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..files import written_whole
 from ..models.table import TIMES, UNITS, Table
-from .formulate import Formulated, Term
+from .formulate import FormulaChoice, Term
 
 Array = NDArray[np.float64]
 
@@ -16,7 +16,7 @@ _SIGNALS = {"position": 's["q"]', "speed": 'ca.fabs(s["qd"])', "load": 's["load"
 _FACTORS = {"": "", "direction": " * direction(s)", "speed": ' * s["qd"] / s["speed_scale"]'}
 
 
-def write_effect(found: Formulated, path: Path) -> None:
+def write_effect(found: FormulaChoice, path: Path) -> None:
     """Write a formula as a one-file effect; raises InputError where its law cannot be one."""
     table, name = found.table, path.stem
     if not name.isidentifier() or path.suffix != ".py":

@@ -10,12 +10,12 @@ from typing import TypeAlias
 import pandas as pd
 import xarray as xr
 
-from ..checks import run as checking
 from ..models.model import Model
 from ..models.model_file import load_model
 from . import diagnose as diagnosing
 from . import identify as identifying
 from . import simulate as simulating
+from .checks import run as checking
 from .in_memory import RecordingLike, as_files
 from .results import CheckResult, DiagnosisResult, IdentificationResult, ParameterEstimate
 

@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..checks.finding import Finding as Check
-from ..checks.run import early_checks, run_checks
 from ..errors import InputError
 from ..models.docking.bench_setup import DockingTree
 from ..models.floating.tree import channel
@@ -16,7 +14,9 @@ from ..models.inertia import Array
 from ..models.model import Model
 from ..models.rigid_body import RigidBody
 from ..models.snare.setup import SnareTree
-from .fitting.assembly import Assembly
+from .checks.finding import CheckFinding
+from .checks.run import early_checks, run_checks
+from .fitting.assembly import TorqueModel
 from .fitting.base_parameters import INERTIAL, BaseParameters, base_parameters
 from .fitting.consistent_inertia import ConsistentInertia, consistent_inertia
 from .fitting.constants import notes_on, settled, with_constants
@@ -27,12 +27,12 @@ from .fitting.held_out import demand_apart
 from .fitting.recorded import read_all, with_recorded_joints
 
 if TYPE_CHECKING:
-    from .docking.identify import IdentifiedDockings
-    from .snare.identify import IdentifiedCaptures
+    from .docking.identify import DockingIdentification
+    from .snare.identify import CaptureIdentification
 
 
 @dataclass(frozen=True)
-class Identified:
+class Identification:
     """A fit, the model with its values, and the recordings.
 
     ``inertia`` holds the physically consistent links where inertia was identified; ``base`` what was identified.
@@ -44,7 +44,7 @@ class Identified:
     holdout: tuple[Experiment, ...]
     base: BaseParameters | None
     inertia: ConsistentInertia | None
-    checks: tuple[Check, ...] = ()
+    checks: tuple[CheckFinding, ...] = ()
     notes: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
@@ -115,7 +115,7 @@ def identify(
     progress: Callable[[str], None] = lambda _: None,
     seed: int = 0,
     jobs: int | None = None,
-) -> "Identified | IdentifiedCaptures | IdentifiedDockings":
+) -> "Identification | CaptureIdentification | DockingIdentification":
     """Fit all parameters of a model to all recordings jointly.
 
     Parameters
@@ -164,13 +164,13 @@ def identify(
     locked = with_silence(load_experiments(model, holdout, body, band, datasets=held)) if holdout else []
     checks = run_checks(model, read, [*train, *locked], checks, progress)
     base = base_parameters(body) if model.inertia == "free" else None
-    assembly = Assembly(model.tree, model.effects, base, scales(train), model.values)
+    assembly = TorqueModel(model.tree, model.effects, base, scales(train), model.values)
     found = fit(assembly, train, progress=progress, seed=seed)
     found, inertia = physical(found, train)
     values = {**model.values, **assembly.values(found.theta), **inertial_values(model, inertia)}
     model = settled(replace(model, values=values))
     notes = (*said, *notes_on(found))
-    return Identified(model, found, tuple(train), tuple(locked), base, inertia, checks, notes)
+    return Identification(model, found, tuple(train), tuple(locked), base, inertia, checks, notes)
 
 
 def demand_one_process(model: Model, jobs: int | None) -> None:
@@ -192,7 +192,7 @@ def physical(found: Fit, experiments: Sequence[Experiment]) -> tuple[Fit, Consis
     nearest = consistent_inertia(assembly.base, found.theta[:n], information, assembly.phi)
     if not nearest.changed:
         return found, nearest
-    held = Assembly(assembly.tree, assembly.placed, assembly.base, assembly.scales, assembly.values(found.theta))
+    held = TorqueModel(assembly.tree, assembly.placed, assembly.base, assembly.scales, assembly.values(found.theta))
     held.low[:n] = held.high[:n] = nearest.beta_consistent
     start: Array = np.concatenate([nearest.beta_consistent, found.theta[n:]])
     again = fit(held, experiments, start=start, multi_start=False)

@@ -5,16 +5,16 @@ from typing import Any
 
 import numpy as np
 
-from ..models.model import Placed
+from ..models.model import PlacedEffect
 from .diagnosis import Estimate
 
 
-def parameter_list(placed: Sequence[Placed], made: Mapping[str, Mapping[str, Estimate]]) -> list[dict[str, Any]]:
+def parameter_list(placed: Sequence[PlacedEffect], made: Mapping[str, Mapping[str, Estimate]]) -> list[dict[str, Any]]:
     """Every parameter of the effects, in order, with its deviation; null where the recordings do not carry it.
 
     Parameters
     ----------
-    placed : sequence of Placed
+    placed : sequence of PlacedEffect
     made : mapping
         Estimates by the effects' keys, then by parameter.
     """

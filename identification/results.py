@@ -10,18 +10,18 @@ from typing import Any
 import pandas as pd
 
 from .. import __version__
-from ..checks.finding import Finding as Check
 from ..errors import InputError
 from ..models.model import Model
 from ..models.model_write import save_model
 from ..report.html import folded, paragraph, table
+from ..report.words import number, percent, unit_words, with_std, words
+from .checks.finding import CheckFinding
 from .data_fault import contradict
 from .diagnosis import ChannelFit, Diagnosis, Finding, Step
 from .report.figures import before_and_after
 from .report.findings import STATUS, missing
 from .report.fit import changes, most_changed
 from .report.page import write_report
-from .report.words import number, percent, unit_words, with_std, words
 from .summary import check_lines, parameter_table, printed
 
 # Colours come from the notebook, so that a result reads on its light page and on its dark one.
@@ -86,7 +86,7 @@ class DiagnosisResult:
         return self.diagnosis.effects
 
     @property
-    def checks(self) -> tuple[Check, ...]:
+    def checks(self) -> tuple[CheckFinding, ...]:
         """What of the recordings and the model is not as it should be, each with the line that mends it."""
         return self.diagnosis.checks
 
@@ -141,7 +141,7 @@ class DiagnosisResult:
     __repr__ = __str__
 
     def _repr_html_(self) -> str:
-        rows = [[escape(step.label), percent(step.train), percent(step.holdout)] for step in self.steps]
+        rows = [[escape(step.label), percent(step.train, 3), percent(step.holdout, 3)] for step in self.steps]
         _, heading, cards = missing(self.diagnosis)
         return _shown(
             f'<span class="status">{STATUS[self.diagnosis.verdict]}</span>\n'
@@ -158,7 +158,7 @@ class CheckResult:
     """What `check` found: ``checks`` on the recordings of ``model``, those of contradiction first."""
 
     model: str
-    checks: tuple[Check, ...]
+    checks: tuple[CheckFinding, ...]
 
     @property
     def sound(self) -> bool:
@@ -257,7 +257,7 @@ class IdentificationResult:
             cells = (words(p.effect), p.at, words(p.name), value, f"± {std}", unit_words(p.unit), remark)
             parameters.append([escape(cell) for cell in cells])
         misfits = [
-            [escape(channel), role, f"{number(rms)} {escape(unit_words(unit))}", percent(relative)]
+            [escape(channel), role, f"{number(rms)} {escape(unit_words(unit))}", percent(relative, 3)]
             for channel, role, rms, relative, unit in self._misfits()
         ]
         heads = ["Effect", "At", "Parameter", "Value", "Std", "Unit", ""]

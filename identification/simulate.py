@@ -13,7 +13,7 @@ from ..models.model import Model
 from ..models.rigid_body import RigidBody
 from ..models.snare.setup import SnareTree
 from .empirical import beyond
-from .fitting.assembly import Assembly
+from .fitting.assembly import TorqueModel
 from .fitting.base_parameters import INERTIAL
 from .fitting.experiment import load_experiments, scales
 from .simulate_floating import simulate_floating
@@ -59,7 +59,7 @@ def simulate(model: Model, motion: str | Path | None) -> xr.Dataset:
     if isinstance(tree, FloatingTree):
         return simulate_floating(model, tree, motion)
     (experiment,) = read
-    assembly = Assembly(model.tree, model.effects, None, scales([experiment]), model.values)
+    assembly = TorqueModel(model.tree, model.effects, None, scales([experiment]), model.values)
     recorded = experiment.motion
     # As they are: bounds refer to the recordings that the values came from, not to this motion.
     tau = assembly.torque(experiment, np.array([model.values[s.key] for s in assembly.slots]))

@@ -14,14 +14,14 @@ from scipy.spatial.transform import Rotation
 
 from ..errors import InputError
 from ..models.dormand_prince import StepFault
-from ..models.floating.carried_base import CarriedBase, Followed, JointPath
+from ..models.floating.carried_base import BaseTrajectory, CarriedBase, JointPath
 from ..models.floating.tree import CARRIERS, FloatingTree, arm_on
 from ..models.hidden_state import evaluate_law
 from ..models.model import Model
 from ..models.rig.points import far_end
 from ..models.rigid_body import RigidBody
 from ..recordings.condition import Motion, condition
-from .fitting.assembly import Assembly
+from .fitting.assembly import TorqueModel
 from .fitting.experiment import Experiment, scales, without_torque
 from .fitting.floating_terms import outside, told, wheel_impulse, with_base, with_twist
 from .fitting.recorded import read_motion
@@ -68,7 +68,7 @@ def simulate_floating(model: Model, tree: FloatingTree, motion: str | Path) -> x
             "floats; cut the recording there"
         )
     path = _path(dataset, followed, tree)
-    first = Assembly(model.tree, model.effects, None, scales([_experiment(followed, tree)]), model.values)
+    first = TorqueModel(model.tree, model.effects, None, scales([_experiment(followed, tree)]), model.values)
     theta = np.array([model.values[s.key] for s in first.slots])
     laws = [(p.effect, first.parameters(k, theta)) for k, p in enumerate(first.placed) if p.effect.at == "base"]
     base = CarriedBase(arm_on(tree, _inertia(first, theta)), laws)
@@ -102,7 +102,7 @@ def _path(dataset: xr.Dataset, motion: Motion, tree: FloatingTree) -> JointPath:
     return JointPath(motion.time, q, qd, qdd, given, wheels, wheel_impulse(dataset, motion))
 
 
-def _inertia(assembly: Assembly, theta: Array) -> Array:
+def _inertia(assembly: TorqueModel, theta: Array) -> Array:
     """Inertial parameters of all links (10 L,), with what effects at links add."""
     phi, tree = assembly.phi.copy(), assembly.tree
     for k, p in enumerate(assembly.placed):
@@ -125,7 +125,7 @@ def _pose(dataset: xr.Dataset, tree: FloatingTree, row: int, recorded: bool) -> 
     return place, np.array([float(dataset[f"quat.{tree.body}.{axis}"][row]) for axis in "wxyz"])
 
 
-def _with_base(motion: Motion, found: Followed) -> Motion:
+def _with_base(motion: Motion, found: BaseTrajectory) -> Motion:
     """The motion with the base's own in its carriers; nothing acts on them but what effects give."""
     q, qd, qdd, tau = (x.copy("F") for x in (motion.q, motion.qd, motion.qdd, motion.tau))
     x, y, z = found.twist[:, 3:].T
@@ -137,7 +137,7 @@ def _with_base(motion: Motion, found: Followed) -> Motion:
 
 
 def _table(
-    model: Model, tree: FloatingTree, path: JointPath, found: Followed, tau: Array, motion: Motion
+    model: Model, tree: FloatingTree, path: JointPath, found: BaseTrajectory, tau: Array, motion: Motion
 ) -> xr.Dataset:
     columns = {}
     for name, x in (("q", path.q), ("qd", path.qd), ("qdd", path.qdd), ("tau", tau[:, CARRIERS:])):

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from math import inf
 from typing import Any
 
+from ..report.words import chance, measured, percent, unit_words, words
 from .diagnosis import Diagnosis, Finding, Step
-from .report.words import chance, measured, unit_words, words
 
 _LABEL = 60
 
@@ -37,7 +37,7 @@ def parameter_table(result: Mapping[str, Any]) -> str:
                 f = fit[role]
                 lines.append(
                     f"{channel} {said}: RMS residual {f['rms']:.4g} {unit_words(fit['unit'])}, "
-                    f"{100 * f['relative']:.2f} % of the measured"
+                    f"{percent(f['relative'], 3)} of the measured"
                 )
     lines.append(f"condition number {result['condition']:.3g}")
     return "\n".join([*lines, *check_lines(result.get("checks", ()))])
@@ -47,7 +47,7 @@ def check_lines(checks: Sequence[Mapping[str, Any]]) -> list[str]:
     """Published findings of the checks: what and where, and below it the lines for the model file."""
     lines = []
     for c in checks:
-        lines.append(f"{c['name']} at {c['at']} ({100 * c['probability']:.0f} %): {c['message']}")
+        lines.append(f"{c['name']} at {c['at']} ({chance(c['probability'])}): {c['message']}")
         lines += [f"    {line}" for line in c["mend"].splitlines()]
     return lines
 
@@ -69,7 +69,7 @@ def indistinguishable(findings: Sequence[Finding]) -> list[tuple[Finding, str, s
 
 def _steps(steps: Sequence[Step]) -> list[str]:
     return [
-        f"  {step.label:<{_LABEL}} training {100 * step.train:6.2f} %   held-out {100 * step.holdout:6.2f} %"
+        f"  {step.label:<{_LABEL}} training {percent(step.train, 3):>8}   held-out {percent(step.holdout, 3):>8}"
         for step in steps
     ]
 

@@ -5,19 +5,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..models.model import Placed
+from ..models.model import PlacedEffect
+from ..report.words import chance, percent, words
 from .diagnosis import ChannelFit, Finding
 from .nuisance.noise import Noise
-from .report.words import chance, words
 
 LIKELY = 0.5
 """Probability [1] from which an effect is said to be there; below it, another explanation is likelier."""
-
-
-def percent(share: float, digits: int = 2) -> str:
-    """A share (0 to 1) in per cent, to so many digits below a hundred."""
-    value = 100 * share
-    return f"{value:.{digits}g} %" if abs(value) < 10 else f"{value:.{digits - 2}f} %"
 
 
 def from_to(before: float, after: float) -> str:
@@ -26,15 +20,17 @@ def from_to(before: float, after: float) -> str:
     return f"from {percent(before, digits)} to {percent(after, digits)}"
 
 
-def evidence_sentence(placed: Placed, channels: Sequence[str], relative_with: float, relative_without: float) -> str:
+def evidence_sentence(
+    placed: PlacedEffect, channels: Sequence[str], relative_with: float, relative_without: float
+) -> str:
     """What an effect explains, and what happens on the held-out recording when it is taken out again."""
     where = " and ".join(channels) if len(channels) < 3 else f"{len(channels)} channels"
     what = placed.effect.sentence
     explained = 1 - (relative_with / relative_without) ** 2 if relative_without > relative_with else 0.0
-    told = f"it explains {_part(explained)} what the model without it leaves over on {where}"
+    told = f"it explains {_part(explained)} the remaining residual of {where}"
     return (
-        f"{what[:1].upper()}{what[1:]}: {told}; "
-        f"taking it out again raises the error on the held-out recording {from_to(relative_with, relative_without)}."
+        f"{what[:1].upper()}{what[1:]}: {told}. "
+        f"Without it, the error on the held-out recording rises {from_to(relative_with, relative_without)}."
     )
 
 
@@ -43,7 +39,7 @@ def _part(share: float) -> str:
     return "all of" if share > 0.995 else f"{percent(share)} of"
 
 
-def experiment_sentence(placed: Placed, rival: Placed) -> str:
+def experiment_sentence(placed: PlacedEffect, rival: PlacedEffect) -> str:
     """The motion or measurement that would tell two effects apart."""
     own, other = placed.effect.experiment, rival.effect.experiment
     joint = rival.at.removeprefix("tau.").removeprefix("q.")
@@ -95,10 +91,9 @@ def verdict_sentence(
 
 
 def _rest(worst: ChannelFit, noise: Mapping[str, str]) -> str:
-    """What an adequate model leaves over on the channel where that stands highest above the noise."""
-    left = (
-        f"What it leaves over on the held-out recording is {percent(worst.holdout.relative_before)} of {worst.channel}"
-    )
+    """An adequate model's remaining residual, on the channel where it stands highest above the noise."""
+    share = percent(worst.holdout.relative_before)
+    left = f"The remaining residual on the held-out recording is {share} of {worst.channel}"
     if worst.noise_floor > 0:
         left += f", {worst.holdout.rms_before / worst.noise_floor:.2g} times that channel's noise floor"
     told = f" It is noise: {noise[worst.channel]}." if worst.channel in noise else ""

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Axis:
+class JointAxis:
     """An axis by the names of its joints.
 
     Parameters
@@ -87,10 +87,10 @@ class _Tree(Protocol):
     @property
     def joints(self) -> Sequence[_Joint]: ...
     @property
-    def axes(self) -> Sequence[Axis]: ...
+    def axes(self) -> Sequence[JointAxis]: ...
 
 
-def neighbours(tree: _Tree, first: int = 0) -> tuple[Axis, ...]:
+def neighbours(tree: _Tree, first: int = 0) -> tuple[JointAxis, ...]:
     """Sum and difference of every two joints of one kind of which one carries the other, from joint ``first`` on."""
     found = []
     for joint in tree.joints[first:]:
@@ -100,7 +100,7 @@ def neighbours(tree: _Tree, first: int = 0) -> tuple[Axis, ...]:
         for word, sign in (("+", 1.0), ("-", -1.0)):
             along = {other: 1.0, joint.name: sign}
             back = {name: x / 2 for name, x in along.items()}
-            found.append(Axis(f"{other}{word}{joint.name}", along, back, joint.kind))
+            found.append(JointAxis(f"{other}{word}{joint.name}", along, back, joint.kind))
     return tuple(found)
 
 
@@ -117,7 +117,7 @@ def place(tree: _Tree, at: str) -> Place:
     return Place(at, along, back, axis.kind)
 
 
-def read_axes(path: Path, raw: Mapping[str, Any], joints: Sequence[_Joint]) -> tuple[Axis, ...]:
+def read_axes(path: Path, raw: Mapping[str, Any], joints: Sequence[_Joint]) -> tuple[JointAxis, ...]:
     """The key ``axes`` of a model file; raises InputError where an entry is no combination of joints that move."""
     table = raw.get("axes", {})
     if not isinstance(table, dict):
@@ -125,7 +125,7 @@ def read_axes(path: Path, raw: Mapping[str, Any], joints: Sequence[_Joint]) -> t
     return tuple(_axis(path, name, entry, joints) for name, entry in table.items())
 
 
-def _axis(path: Path, name: str, entry: Any, joints: Sequence[_Joint]) -> Axis:
+def _axis(path: Path, name: str, entry: Any, joints: Sequence[_Joint]) -> JointAxis:
     kinds: dict[str, Literal["revolute", "prismatic"]] = {joint.name: joint.kind for joint in joints}
     if name in kinds:
         raise InputError(f"{path}: [axes] {name!r} is a joint's name; give the axis one of its own")
@@ -144,4 +144,4 @@ def _axis(path: Path, name: str, entry: Any, joints: Sequence[_Joint]) -> Axis:
         raise InputError(f"{path}: [axes] {name} adds angles and lengths; combine joints of one kind")
     along = {joint: float(x) for joint, x in entry.items() if x}
     size = sum(x**2 for x in along.values())
-    return Axis(name, along, {joint: x / size for joint, x in along.items()}, kinds[next(iter(along))])
+    return JointAxis(name, along, {joint: x / size for joint, x in along.items()}, kinds[next(iter(along))])

@@ -18,7 +18,7 @@ from ..errors import InputError
 from .axes import neighbours
 from .effect import Effect, Parameter, Symbols
 from .effects._direction import direction
-from .model import Placed
+from .model import PlacedEffect
 from .table import FEWEST, MOST, OTHERS, OWN, TIMES, Table, cardinal, is_coordinate
 from .tree import Tree
 
@@ -127,10 +127,10 @@ def read_along(over: tuple[str, ...], times: str) -> ca.Function:
     return ca.Function("read", list(s.values()), law.read(s), names, [*(f"x{k}" for k in range(len(over))), "factor"])
 
 
-def placed_tables(at: str, tables: Sequence[Table]) -> Placed:
+def placed_tables(at: str, tables: Sequence[Table]) -> PlacedEffect:
     """An effect of some tables at a joint; its values are held in fits, for a smooth curve can mimic most laws."""
     effect = empirical_effect(tables)
-    return Placed(effect, at, tuple(p.name for p in effect.parameters))
+    return PlacedEffect(effect, at, tuple(p.name for p in effect.parameters))
 
 
 def tables_of(effect: Effect) -> tuple[Table, ...]:
@@ -146,7 +146,7 @@ def table_values(table: Table, at: str, known: Mapping[str, float], what: str = 
 
 def read_empirical(
     path: Path, raw: Mapping[str, Any], tree: Tree, system: str
-) -> tuple[tuple[Placed, ...], dict[str, float]]:
+) -> tuple[tuple[PlacedEffect, ...], dict[str, float]]:
     """The key ``empirical`` of a model file: effects, and their values by key, with deviations as ``std.<key>``.
 
     Raises
@@ -238,7 +238,7 @@ def _size(shape: Sequence[int]) -> str:
     return " x ".join(map(str, shape))
 
 
-def empirical_tables(placed: Iterable[Placed], known: Mapping[str, float]) -> list[dict[str, Any]]:
+def empirical_tables(placed: Iterable[PlacedEffect], known: Mapping[str, float]) -> list[dict[str, Any]]:
     """The entries ``[[empirical]]`` of a model file, for effects and the values known of them."""
     made = []
     for p in placed:

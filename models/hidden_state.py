@@ -73,7 +73,7 @@ class _Built(NamedTuple):
     step: SampleFunction | None  # (X, *signals, *signals a sample later, [p; h]) -> X a sample later
 
 
-class Evaluation(NamedTuple):
+class LawEvaluation(NamedTuple):
     """A law along samples.
 
     Parameters
@@ -134,7 +134,7 @@ def evaluate_law(
     dt: float | None = None,
     *,
     bare: bool = False,
-) -> Evaluation:
+) -> LawEvaluation:
     """Values of an effect's law along samples, with derivatives.
 
     Parameters
@@ -168,7 +168,7 @@ def evaluate_law(
         p = np.tile(p, (len(next(iter(inputs.values()))), 1))
     values, *slopes = built.law(*signals, carried, p)
     by_parameter = np.zeros((*values.shape[:2], 0)) if bare else slopes.pop(0)
-    return Evaluation(values[:, :, 0], by_parameter, slopes[0] if slopes else None)
+    return LawEvaluation(values[:, :, 0], by_parameter, slopes[0] if slopes else None)
 
 
 @cache

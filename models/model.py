@@ -21,7 +21,7 @@ from .tree import Tree
 
 
 @dataclass(frozen=True)
-class Placed:
+class PlacedEffect:
     """An effect and the one place it acts at: a joint, an axis, a link, a sling, or a channel such as ``tau.joint1``.
 
     Parameters named in ``hold`` are not identified: the recordings did not ask for them, or another effect carries
@@ -54,7 +54,7 @@ class Model:
         ``free_floating_arm``, whose first six joints carry the base; a `SnareTree` without joints for
         ``snare_capture``, a `DockingTree` for ``docking``.
     inertia : "fixed" or "free"
-    effects : tuple of Placed
+    effects : tuple of PlacedEffect
         Physics that the model has, one entry a place.
     signals : mapping of str to Signal
         Where a recording with columns of its own has each signal.
@@ -78,7 +78,7 @@ class Model:
     urdf: Path | None
     tree: Tree
     inertia: str
-    effects: tuple[Placed, ...]
+    effects: tuple[PlacedEffect, ...]
     signals: Mapping[str, Signal]
     bandwidth: float | None
     values: Mapping[str, float]
@@ -92,7 +92,7 @@ class Model:
         """Joint names in order."""
         return tuple(j.name for j in self.tree.joints)
 
-    def with_effects(self, added: Sequence[Placed], values: Mapping[str, float]) -> "Model":
+    def with_effects(self, added: Sequence[PlacedEffect], values: Mapping[str, float]) -> "Model":
         """The model with more effects, and with parameters that a fit found."""
         return replace(self, effects=(*self.effects, *added), values={**self.values, **values})
 
@@ -131,7 +131,7 @@ def places(effect: Effect, tree: Tree) -> tuple[str, ...]:
 
 
 def all_places(effect: Effect, tree: Tree) -> tuple[str, ...]:
-    """The same, and axes that are not one joint's own: an effect acts there only where it is asked for by name."""
+    """`places`, and axes of several joints, where an effect acts only if the model file names them."""
     own = places(effect, tree)
     if effect.at != "joint" or effect.acts_on != "torque" or isinstance(tree, SnareTree | DockingTree):
         return own

@@ -21,7 +21,7 @@ from .effects import get_effect
 from .empirical import read_empirical
 from .floating.tree import UNNAMED, read_floating
 from .holding import Holding, read_holding
-from .model import Model, Placed, places
+from .model import Model, PlacedEffect, places
 from .published_inertia import Fix
 from .rig.file import read_slings
 from .rig.rig import Rig, built_in_rig
@@ -231,10 +231,10 @@ def _numbers(path: Path, value: Any, key: str, count: int) -> list[float]:
     return [float(v) for v in value]
 
 
-def _placed(path: Path, entries: Any, tree: Tree) -> tuple[Placed, ...]:
+def _placed(path: Path, entries: Any, tree: Tree) -> tuple[PlacedEffect, ...]:
     if not isinstance(entries, list):
         raise InputError(f"{path}: effects = {entries!r}; allowed is a list of effect names")
-    found: list[Placed] = []
+    found: list[PlacedEffect] = []
     for entry in entries:
         name = entry.get("name") if isinstance(entry, dict) else entry
         if not isinstance(name, str):
@@ -264,7 +264,7 @@ def _placed(path: Path, entries: Any, tree: Tree) -> tuple[Placed, ...]:
         names = [p.name for p in effect.parameters]
         if not isinstance(hold, list) or any(h not in names for h in hold):
             raise InputError(f"{path}: {name} hold = {hold!r}; allowed is a list of {', '.join(names)}")
-        found += [Placed(effect, place, tuple(hold)) for place in ((at,) if at else everywhere)]
+        found += [PlacedEffect(effect, place, tuple(hold)) for place in ((at,) if at else everywhere)]
     for key, count in Counter(p.key for p in found).items():
         if count > 1:
             raise InputError(f"{path}: {key} is listed twice in effects; keep one")

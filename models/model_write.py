@@ -12,7 +12,7 @@ from .effects import get_effect
 from .empirical import NAME, empirical_tables, tables_of
 from .floating.tree import FloatingTree
 from .holding import Holding
-from .model import Model, Placed, places
+from .model import Model, PlacedEffect, places
 from .model_comments import with_comments
 from .rig.file import sling_table
 from .rig.rig import Rig
@@ -28,7 +28,7 @@ def save_model(model: Model, path: str | Path, note: str) -> None:
     where it acts at every place, as ``{ name, at, hold }`` where it does not.
     """
     path = Path(path)
-    by_name: dict[str, list[Placed]] = {}
+    by_name: dict[str, list[PlacedEffect]] = {}
     tables = empirical_tables(model.effects, model.values)
     for placed in [p for p in model.effects if not tables_of(p.effect)]:
         by_name.setdefault(placed.effect.name, []).append(placed)

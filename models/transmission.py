@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..recordings.signals import JointKind
-from .axes import Axis
+from .axes import JointAxis
 from .tree import Joint
 
 Array = NDArray[np.float64]
@@ -33,7 +33,7 @@ class Transmission:
     joints: tuple[str, ...]
     matrix: Array
 
-    def axes(self, joints: Sequence[Joint]) -> tuple[Axis, ...]:
+    def axes(self, joints: Sequence[Joint]) -> tuple[JointAxis, ...]:
         """Each motor as a place for effects."""
         kind: JointKind = next(joint.kind for joint in joints if joint.name == self.joints[0])
 
@@ -41,7 +41,7 @@ class Transmission:
             return {joint: float(x) for joint, x in zip(self.joints, row, strict=True) if x}
 
         ways = zip(self.motors, np.linalg.inv(self.matrix), self.matrix.T, strict=True)
-        return tuple(Axis(motor, by_joint(along), by_joint(back), kind) for motor, along, back in ways)
+        return tuple(JointAxis(motor, by_joint(along), by_joint(back), kind) for motor, along, back in ways)
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """A recording of motors as one of joints; what is recorded of the joints themselves stays.

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from ..errors import InputError
-from .axes import Axis
+from .axes import JointAxis
 from .inertia import Array
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ class Tree:
     followers: tuple[Follower, ...] = field(default=(), kw_only=True)
     notes: tuple[str, ...] = field(default=(), kw_only=True)
     weightless: tuple[str, ...] = field(default=(), kw_only=True)
-    axes: tuple[Axis, ...] = field(default=(), kw_only=True)
+    axes: tuple[JointAxis, ...] = field(default=(), kw_only=True)
 
     def __post_init__(self) -> None:
         """Refuse what the recursions could not run through."""

@@ -4,7 +4,7 @@ Cases of the proof's own generator are drawn as the proof's are, from seeds that
 diagnosed; what is done is kept under ``build/calibration``. To these come the lines that ``python -m proof.drives
 score`` kept. A name is right as ``proof/judge.py`` and ``proof/drives/judge.py`` say: it, or one that the recordings
 cannot tell from it, is concealed at its place. The result is the logistic map of names of torques in
-``identification/reliability.json`` (`counting`), with how well each generator is foretold by a map that leaves it out.
+``identification/reliability.json`` (`counting`), with how well each generator is predicted by a map that leaves it out.
 The curve over margins, of link encoders and captures, stays there as it was counted.
 """
 

@@ -47,7 +47,7 @@ class Counted:
 
 
 def counted(rows: Sequence[Row]) -> Counted:
-    """The map over all rows, and how well each generator is foretold by the others.
+    """The map over all rows, and how well each generator is predicted by the others.
 
     Raises
     ------

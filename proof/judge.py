@@ -51,7 +51,7 @@ class Scored:
 
     @property
     def closure_to_floor(self) -> float | None:
-        """The same with the floor for an oracle, which is disturbance and noise alone."""
+        """This case with an oracle's floor, which is disturbance and noise alone."""
         return self._closed(1.0)
 
     def _closed(self, least: float) -> float | None:

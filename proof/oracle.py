@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from snarelab.identification.fitting.assembly import Assembly
+from snarelab.identification.fitting.assembly import TorqueModel
 from snarelab.identification.fitting.experiment import load_experiments, scales
 from snarelab.identification.fitting.fit import channel_rms, fit
 from snarelab.identification.search.rest import fitted
@@ -56,7 +56,7 @@ def run(wanted: Wanted) -> dict[str, Any]:
             train = load_experiments(model, [folder / "train.csv"], body, wide)
             band = train[0].motion.band
             held = load_experiments(model, [folder / "hold.csv"], body, band)
-            assembly = Assembly(model.tree, model.effects, None, scales(train), model.values)
+            assembly = TorqueModel(model.tree, model.effects, None, scales(train), model.values)
             theta = fit(assembly, fitted(assembly, train)).theta
             left = channel_rms(assembly, held, theta)[0] / band_rms(lowest, RATE, band)
             found.append(dict(zip((f"tau.{joint}" for joint in model.joints), left.tolist(), strict=True)))

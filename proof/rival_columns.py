@@ -1,7 +1,7 @@
 """The torque columns that the rivals choose from: the textbook law of every effect, at every place of an arm.
 
 Conditioning as in textbook identification (Gautier 1997): positions through a zero-phase low-pass, central differences,
-the torque and every column through the same filter, then one sample in ten. The rigid body is the package's, which all
+the torque and every column through the same filter, then thinned to 25 Hz. The rigid body is the package's, which all
 methods are given alike.
 """
 
@@ -20,7 +20,8 @@ from snarelab.models.rigid_body import RigidBody
 
 CUTOFF = 8.0
 """Low-pass on positions and torque [Hz]; figures are compared below it."""
-STRIDE = 10
+RATE = 25.0
+"""To which filtered samples are thinned [Hz]."""
 TRAVELS = (2e-4, 5e-4, 1e-3, 2e-3, 5e-3)
 """Travel over which a joint's known friction turns round [rad]: which, the baseline's fit chooses."""
 
@@ -30,7 +31,8 @@ Column = tuple[str, str, int]
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """One recording, conditioned: motion at full rate, each (n, J); torque filtered and thinned (m, J)."""
+    """One recording, conditioned: motion at full rate, each (n, J); torque filtered, and one sample in ``stride``
+    (m, J)."""
 
     time: NDArray
     q: NDArray
@@ -38,6 +40,7 @@ class Recording:
     qdd: NDArray
     tau: NDArray
     rate: float
+    stride: int
     model: Model
     body: RigidBody
 
@@ -53,11 +56,11 @@ class Recording:
 
     def band(self, values: NDArray) -> NDArray:
         """Filtered as the torque is, and thinned."""
-        return _low_pass(values, self.rate)[::STRIDE]
+        return low_pass(values, self.rate)[:: self.stride]
 
 
-def read(folder: Path, name: str) -> Recording:
-    """Read and condition a case's recording."""
+def read(folder: Path, name: str, *, predict: bool = False) -> Recording:
+    """Read and condition a case's recording; ``predict``: it has no torque, and columns are wanted at every row."""
     model = load_model(folder / "arm.toml")
     with (folder / name).open() as file:
         heads = file.readline().strip().split(",")
@@ -65,14 +68,17 @@ def read(folder: Path, name: str) -> Recording:
     values = dict(zip(heads, table.T, strict=True))
     time = values["time"]
     rate = (len(time) - 1) / (time[-1] - time[0])
-    q = _low_pass(np.stack([values[f"q.{j}"] for j in model.joints], axis=1), rate)
+    q = low_pass(np.stack([values[f"q.{j}"] for j in model.joints], axis=1), rate)
     qd = np.gradient(q, 1.0 / rate, axis=0)
-    tau = np.stack([values[f"tau.{j}"] for j in model.joints], axis=1)
+    tau = np.zeros_like(q) if predict else np.stack([values[f"tau.{j}"] for j in model.joints], axis=1)
     qdd = np.gradient(qd, 1.0 / rate, axis=0)
-    return Recording(time - time[0], q, qd, qdd, _low_pass(tau, rate)[::STRIDE], rate, model, RigidBody(model.tree))
+    stride = 1 if predict else max(round(rate / RATE), 1)
+    tau = low_pass(tau, rate)[::stride]
+    return Recording(time - time[0], q, qd, qdd, tau, rate, stride, model, RigidBody(model.tree))
 
 
-def _low_pass(values: NDArray, rate: float) -> NDArray:
+def low_pass(values: NDArray, rate: float) -> NDArray:
+    """Values (n, ...) sampled at a rate [Hz], without what is faster than `CUTOFF`, and without lag."""
     return np.asarray(sosfiltfilt(butter(4, CUTOFF, fs=rate, output="sos"), values, axis=0))
 
 

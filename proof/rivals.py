@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .rival_columns import CUTOFF, STRIDE, TRAVELS, Column, Recording, baseline, fixed, library, read
+from .rival_columns import CUTOFF, TRAVELS, Column, Recording, baseline, fixed, library, read
 
 NAMES = ("joint_bic", "pysindy", "gaussian_process")
 MOST = 8
@@ -37,14 +37,14 @@ Columns = Mapping[Column, NDArray]
 class Task:
     """What all rivals start from: both recordings, the frozen baseline's residuals (m, J), the columns."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, names: tuple[str, str] = ("train.csv", "hold.csv")) -> None:
         """Read, condition, fit the baseline."""
-        self.train, self.hold = read(folder, "train.csv"), read(folder, "hold.csv")
+        self.train, self.hold = (read(folder, name) for name in names)
         self.library, self.library_hold = library(self.train), library(self.hold, self.train)
         self.target, self.target_hold = self.train.tau - fixed(self.train), self.hold.tau - fixed(self.hold)
         self.scale = np.ones(self.target.shape[1])
-        travels = self._travels()
-        self.base, self.base_hold = baseline(self.train, travels), baseline(self.hold, travels)
+        self.travels = self._travels()
+        self.base, self.base_hold = baseline(self.train, self.travels), baseline(self.hold, self.travels)
         self.scale = self._left_over(self.base)
         self.theta = self.fit(self.base)
         self.residual = self.target - self.base @ self.theta
@@ -92,6 +92,16 @@ def run(folder: Path) -> dict[str, Any]:
 
 def joint_bic(task: Task) -> dict[str, Any]:
     """Forward selection by BIC; stops where no effect lowers it."""
+    chosen, effects = selected(task)
+    base, held = (
+        np.concatenate([b, *(lib[key] for key in chosen)], axis=2)
+        for b, lib in ((task.base, task.library), (task.base_hold, task.library_hold))
+    )
+    return task.answer(effects, task.target_hold - held @ task.fit(base))
+
+
+def selected(task: Task) -> tuple[list[Column], list[dict[str, Any]]]:
+    """Columns that forward selection by BIC takes, and the effects that they are of."""
     chosen: list[Column] = []
     effects = []
     matrix, y = task.flat(task.base), (task.target / task.scale).ravel()
@@ -113,12 +123,7 @@ def joint_bic(task: Task) -> dict[str, Any]:
         chosen.append(best)
         effects.append(_weighed(best, gains))
         matrix = np.concatenate([matrix, flats[best]], axis=1)
-    both = [
-        np.concatenate([b, *(lib[key] for key in chosen)], axis=2)
-        for b, lib in ((task.base, task.library), (task.base_hold, task.library_hold))
-    ]
-    theta = task.fit(both[0])
-    return task.answer(effects, task.target_hold - both[1] @ theta)
+    return chosen, effects
 
 
 def _weighed(best: Column, gains: Mapping[Column, float]) -> dict[str, Any]:
@@ -212,4 +217,4 @@ def gaussian_process(task: Task) -> dict[str, Any]:
 
 def _inputs(r: Recording, k: int) -> NDArray:
     signals: Sequence[NDArray] = (r.q, r.qd, r.qdd, r.load)
-    return np.stack([x[::STRIDE, k] for x in signals], axis=1)
+    return np.stack([x[:: r.stride, k] for x in signals], axis=1)

@@ -77,5 +77,5 @@ def point_inertia(mass: float, arm: NDArray) -> NDArray:
 
 
 def by_joint(arm: Arm, value: float) -> Mapping[str, float]:
-    """The same number for every joint."""
+    """One number for every joint."""
     return dict.fromkeys(arm.joints, value)

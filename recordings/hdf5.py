@@ -42,12 +42,12 @@ def datasets(path: Path, matlab: bool = False) -> dict[str, np.ndarray]:
 
     Links to other files are not followed, and data that lies in other files is left as None. MATLAB 7.3 stores arrays
     transposed and text as integers: ``matlab`` undoes the first and marks the second. A process of its own reads the
-    file, see `hdf5_apart`; the first sight of it costs a quarter of a second.
+    file, see `hdf5_process`; the first sight of it costs a quarter of a second.
     """
     with needed_for(f"{path}: an HDF5 file"):
         if find_spec("h5py") is None:
             raise ModuleNotFoundError(name="h5py")
-    script = str(Path(__file__).with_name("hdf5_apart.py"))
+    script = str(Path(__file__).with_name("hdf5_process.py"))
     command = [sys.executable, "-P", script, str(path.resolve()), str(LARGEST), *(["matlab"] if matlab else [])]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, stdin=subprocess.DEVNULL)
     watch = threading.Timer(PATIENCE + path.stat().st_size / 4e6, process.kill)

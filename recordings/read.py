@@ -139,7 +139,7 @@ def _load(path: Path, signals: Mapping[str, Signal]) -> Columns:
         raise InputError(f"{path}: there is no such file; check the path")
     suffix = path.suffix.lower()
     if not (path.is_dir() or path.is_file()):
-        raise InputError(f"{path}: is no plain file; give a file, or the folder of a ROS 2 bag")
+        raise InputError(f"{path}: is not a regular file; give a file, or the folder of a ROS 2 bag")
     if path.is_dir() or suffix in _BAGS:
         from . import ros_bag  # an extra brings what it is read with
 

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from .strips import Drawn, drawn, keep_whole
+from .strips import StripDrawing, drawn, keep_whole
 from .time_axes import is_over_time, over_time, with_time_axes
 
 Array = NDArray[np.float64]
@@ -69,7 +69,7 @@ def drawing() -> Iterator[None]:
         yield
 
 
-def svg(figure: Figure) -> Drawn:
+def svg(figure: Figure) -> StripDrawing:
     """The figure as SVG with its time axes named, without a date: the same diagnosis draws the same picture."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="svg", dpi=_DOTS_PER_INCH, metadata={"Date": None, "Creator": None})

@@ -68,11 +68,10 @@ summary{cursor:pointer;color:var(--accent)}
 code{font-size:.92em}
 .card>h3{margin-bottom:.25rem}
 footer{margin:3rem auto 2rem;color:var(--quiet);font-size:.85rem}
-@media screen and (max-width:40rem){.names .n{text-align:left}.names thead{display:none}
-.names tr,.names th,.names td{display:block;border:0;padding:0}
-.names tr{border-bottom:1px solid var(--line);padding:.4rem 0}
-.names .n{display:inline-block;margin-right:1.2rem}.names td:nth-child(3)::before{content:"probability "}
-.names td:nth-child(4)::before{content:"share "}}
+@media screen and (max-width:40rem){.stacks :is(table,caption,tbody,tr,th){display:block}.stacks thead{display:none}
+.stacks tr{border-bottom:1px solid var(--line);padding:.4rem 0}.stacks :is(th,td){border:0;padding:0}
+.stacks td{display:inline-block;margin-right:1.2rem;text-align:left}.stacks :is(th,td):empty{display:none}
+.stacks td::before{content:attr(data-head) " ";color:var(--quiet)}}
 @media (max-width:40rem){.bar{display:none}th,td{padding-right:.7rem}.wide td:not(.n),tbody th{min-width:0}
 .facts{grid-template-columns:1fr}.facts dd{margin-bottom:.4rem}}
 @media print{:root{--paper:#fff;--ink:#000;--quiet:#444;--line:#bbb;--card:#fff;--accent:#000;--plate:#fff}
@@ -96,6 +95,9 @@ padding-top:.3rem}h3{font-size:10pt}.card{margin:.5rem 0}.card h4{font-size:9pt;
 section:not(#answer) :is(th,td){padding-top:.1rem;padding-bottom:.1rem}figure,.scroll,p{margin:.35rem 0}
 figcaption,.quiet{font-size:8pt}.plot img{max-height:52mm;width:auto;max-width:100%}footer{margin:.6rem auto}}
 """
+
+_STACKS = 4
+"""Columns from which on a table does not fit on a phone."""
 
 _FOLDED = '<p class="on-paper">Parts that are folded on the screen are not printed: open them, and print again.</p>'
 
@@ -159,20 +161,27 @@ def _kept(text: str) -> str:
 def table(
     caption: str, heads: Sequence[str], rows: Sequence[Sequence[str]], numeric: Sequence[int] = (), wide: bool = True
 ) -> str:
-    """A table of markup cells; the first of each row is its header, columns in ``numeric`` stand to the right."""
+    """A table of markup cells; the first of each row is its header, columns in ``numeric`` stand to the right.
+
+    One of `_STACKS` columns and more becomes a list on a phone, in which each cell says the head of its column.
+    """
+    stacks = len(heads) >= _STACKS
 
     def cells(row: Sequence[str], tag: str, scope: str) -> str:
+        row = [cell.replace(" %", "\u202f%") for cell in row]
         return "".join(
             f'<th scope="{scope}"{_class("n" if i in numeric else "")}>{cell}</th>'
             if (tag == "th" and cell) or i == 0
-            else f"<td{_class('n' if i in numeric else '')}>{cell}</td>"
+            else f"<td{_class('n' if i in numeric else '')}{said[i]}>{cell}</td>"
             for i, cell in enumerate(row)
         )
 
+    said = [f' data-head="{escape(head)}"' if stacks and head else "" for head in heads]
     top = cells([escape(head) for head in heads], "th", "col")
     body = "\n".join(f"<tr>{cells(row, 'td', 'row')}</tr>" for row in rows)
+    kind = "scroll" + (" wide" if wide else "") + (" stacks" if stacks else "")
     return (
-        f'<div class="scroll{" wide" if wide else ""}"><table><caption>{escape(caption)}</caption>'
+        f'<div class="{kind}"><table><caption>{escape(caption)}</caption>'
         f"<thead><tr>{top}</tr></thead>\n<tbody>{body}</tbody></table></div>\n"
     )
 
@@ -184,7 +193,7 @@ def figure(svg: bytes, alternative: str, caption: str, small: bool = False, zoom
         f'<figure><div class="plate{" small" if small else ""}">'
         f'<div class="plot"{time_axes(svg)}><img src="data:image/svg+xml;base64,{data}" alt="{escape(alternative)}">'
         f"</div></div>{zoom}"
-        f"<figcaption>{escape(caption)}</figcaption></figure>\n"
+        f"<figcaption>{_kept(caption)}</figcaption></figure>\n"
     )
 
 
@@ -198,7 +207,7 @@ def bar(share: float, text: str) -> str:
     width = 100 * min(max(share, 0.0), 1.0) if share == share else 0.0
     return (
         f'<span class="share"><span class="bar" aria-hidden="true"><i style="width:{width:.1f}%"></i></span>'
-        f"{escape(text)}</span>"
+        f"{_kept(text)}</span>"
     )
 
 

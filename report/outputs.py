@@ -28,7 +28,7 @@ def demand_writable(numbers: str | None, outputs: Sequence[str | None], recordin
         if not (place.parent.is_dir() and os.access(place.parent, os.W_OK)):
             raise InputError(f"{path}: its folder does not exist or cannot be written; make it first")
         if place.exists() and not place.is_file():
-            raise InputError(f"{path}: is there and no plain file; name a file")
+            raise InputError(f"{path}: exists and is not a regular file; name a file")
         if place in taken:
             raise InputError(f"{path}: is also {taken[place]}; write somewhere else")
         taken[place] = "another output"

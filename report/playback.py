@@ -22,7 +22,6 @@ Array = NDArray[np.float64]
 Shape = Box | Capsule | Cylinder | Sphere
 """Drake's shapes [m], centred in the body's frame; a cylinder's or capsule's axis is z."""
 
-_TOP, _BOTTOM = (0.97, 0.97, 0.98), (0.84, 0.87, 0.90)
 _STRETCH = 0.01
 """Relative change of length [1] up to which a curve's piece keeps its first length: too little to be seen."""
 
@@ -50,13 +49,23 @@ font:14px/1 system-ui,sans-serif;box-sizing:border-box}
     animator.seek(Number(slider.value));
     rest();
   };
-  // A page that frames this one is told the time, and may set it; what stands still it gets as a picture, for paper.
+  // The sky is dark where the page is dark; its top and its bottom, red, green and blue.
+  const skies = {light: [[0.97, 0.97, 0.98], [0.84, 0.87, 0.90]], dark: [[0.08, 0.09, 0.11], [0.17, 0.20, 0.23]]};
+  const night = matchMedia("(prefers-color-scheme:dark)");
+  const paint = sky => ["top_color", "bottom_color"].forEach((end, k) =>
+    viewer.set_property(["Background", "<object>"], end, skies[sky][k]));
+  const paintAsPage = () => paint(night.matches ? "dark" : "light");
+  // A page that frames this one is told the time, and may set it; what stands still it gets as a picture, for paper,
+  // which is light.
   const framed = parent !== window;
   let resting;
   const still = () => {
+    paint("light");
     viewer.render();
     parent.postMessage({playbackStill: viewer.renderer.domElement.toDataURL("image/jpeg", 0.9),
       time: Number(slider.value)}, "*");
+    paintAsPage();
+    viewer.render();
   };
   const rest = () => {
     clearTimeout(resting);
@@ -83,6 +92,8 @@ font:14px/1 system-ui,sans-serif;box-sizing:border-box}
     if (typeof viewer === "undefined") { label.value = "no WebGL"; return; }
     animator = viewer.animator;
     if (!animator.actions.length) { requestAnimationFrame(wait); return; }
+    paintAsPage();
+    night.addEventListener("change", paintAsPage);
     animator.play();  // Without this its actions would not follow the slider.
     animator.pause();
     slider.max = animator.duration;
@@ -136,8 +147,6 @@ class Playback:
         self._names: set[str] = set()
         for hidden in ("/Grid", "/Axes"):
             self._meshcat.SetProperty(hidden, "visible", False)
-        self._meshcat.SetProperty("/Background/<object>", "top_color", list(_TOP))
-        self._meshcat.SetProperty("/Background/<object>", "bottom_color", list(_BOTTOM))
 
     def body(self, name: str, shape: Shape, colour: str, opacity: float = 1.0) -> None:
         """Add a rigid shape; ``colour`` as #rrggbb. It stands at the origin until it is moved."""

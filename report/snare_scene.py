@@ -19,7 +19,7 @@ _RING_THICKNESS = 0.003
 
 
 @dataclass(frozen=True)
-class Seen:
+class SceneData:
     """What there is to see of a capture.
 
     Parameters
@@ -41,18 +41,18 @@ class Seen:
     contact_points: Sequence[np.ndarray] = ()
 
     @classmethod
-    def of(cls, history: SnareHistory) -> "Seen":
+    def of(cls, history: SnareHistory) -> "SceneData":
         """Of a run of the snare alone."""
         h = history
         return cls(h.times, h.target_position, h.target_quaternion, h.cables, h.contact_points)
 
 
-def snare_scene(seen: Seen, parameters: SnareParameters) -> Playback:
+def snare_scene(seen: SceneData, parameters: SnareParameters) -> Playback:
     """The scene, with a snare that stands at the world's origin; its axis points along x.
 
     Parameters
     ----------
-    seen : Seen
+    seen : SceneData
     parameters : SnareParameters
     """
     scene, times, p = Playback(), seen.times, parameters
@@ -74,7 +74,7 @@ def snare_scene(seen: Seen, parameters: SnareParameters) -> Playback:
     return scene
 
 
-def _add_pin(scene: Playback, seen: Seen, p: SnareParameters) -> None:
+def _add_pin(scene: Playback, seen: SceneData, p: SnareParameters) -> None:
     # A cylinder's axis is z, the pin's −x: a quarter turn about y, after which the body is shifted along the pin.
     quarter = np.array([np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0])
     turns = _product(seen.target_quaternion, quarter)
@@ -89,7 +89,7 @@ def _add_pin(scene: Playback, seen: Seen, p: SnareParameters) -> None:
         scene.move(name, seen.times, seen.target_position - 0.5 * (low + high) * axis, turns)
 
 
-def _add_contacts(scene: Playback, seen: Seen) -> None:
+def _add_contacts(scene: Playback, seen: SceneData) -> None:
     """One mark for each contact that there is at once; hidden, where it was last, while there are fewer."""
     counts = np.array([len(points) for points in seen.contact_points], int)
     for mark in range(counts.max(initial=0)):

@@ -42,7 +42,7 @@ class Strip:
     recording: str = ""
 
 
-class Drawn(bytes):
+class StripDrawing(bytes):
     """A picture as SVG, with what its axes over time show; no strips where a page could not show all of it."""
 
     strips: tuple[Strip, ...] = ()
@@ -53,9 +53,9 @@ def keep_whole(line: Line2D, time: Array, values: Array) -> None:
     _WHOLE[line] = (np.asarray(time, float), np.asarray(values, float))
 
 
-def drawn(svg: bytes, figure: Figure) -> Drawn:
+def drawn(svg: bytes, figure: Figure) -> StripDrawing:
     """The picture with its strips: none unless all axes run over time, and hold lines and shaded windows only."""
-    picture = Drawn(svg)
+    picture = StripDrawing(svg)
     strips = [_strip(axes) for axes in figure.axes]
     known = [strip for strip in strips if strip is not None and strip.curves]
     if len(known) == len(strips):

@@ -1,7 +1,7 @@
 """A position servo with a pendulum (BAM, XL330): what Coulomb and viscous friction leave out, from its positions alone.
 
 Twelve recordings at controller gains of 100, 200 and 800 are fitted; the four at gain 400 are locked away, and the
-position is foretold there in closed loop. Recordings: Duclusaud et al. (2025), looked for in ``$SNARELAB_RECORDINGS``,
+position is predicted there in closed loop. Recordings: Duclusaud et al. (2025), looked for in ``$SNARELAB_RECORDINGS``,
 beside the project, and at their publisher.
 """
 
@@ -18,13 +18,14 @@ from ..errors import InputError
 from ..exit_status import status_of
 from ..models.effect import written_unit
 from ..models.effects import effects
-from ..models.model import Placed
+from ..models.model import PlacedEffect
 from ..models.model_file import load_model
 from ..models.model_write import save_model
 from ..recordings import find_recording
 from ..recordings.find import SHA256
+from ..report.words import percent
 from .bam_figures import explained, positions
-from .bam_naming import START, Fitted, Round, Tried, Values, fit, name_missing, rms
+from .bam_naming import START, LawTrial, Round, ServoFit, Values, fit, name_missing, rms
 from .bam_servo import DUTY, MOTOR, ServoRun, position_error, read_run
 from .outcome import FOLDER, Quantity, table, write_result
 from .page import Picture, Section, write_page
@@ -65,7 +66,7 @@ def main() -> int:
     print("  Coulomb and viscous friction", flush=True)
     base = fit(train, START)
     rounds: list[Round] = []
-    named: list[Tried] = []
+    named: list[LawTrial] = []
     final, refused = base, None
     for r in name_missing(train, base, lambda text: print(f"  {text}", flush=True)):
         rounds.append(r)
@@ -85,12 +86,12 @@ def main() -> int:
     return 0
 
 
-def confirmed(before: Fitted, after: Fitted, held: Sequence[ServoRun]) -> bool:
+def confirmed(before: ServoFit, after: ServoFit, held: Sequence[ServoRun]) -> bool:
     """Whether a step makes the held-out recordings better too: without it, their squared error is 5 % higher."""
     return rms(held, before.values) ** 2 >= (1 + PROVED) * rms(held, after.values) ** 2
 
 
-def sentence(base: Fitted, named: Sequence[Tried], held: Sequence[ServoRun]) -> str:
+def sentence(base: ServoFit, named: Sequence[LawTrial], held: Sequence[ServoRun]) -> str:
     """The verdict."""
     before = position_error(held, base.values)
     if not named:
@@ -99,16 +100,16 @@ def sentence(base: Fitted, named: Sequence[Tried], held: Sequence[ServoRun]) -> 
     names = " and ".join(t.name.replace("_", " ") for t in named)
     return (
         f"The model leaves out {names}. With that added, the position error at the gain that the fit never saw falls "
-        f"from {1e3 * before:.1f} to {1e3 * after:.1f} mrad, by {100 * (1 - after / before):.0f} %."
+        f"from {1e3 * before:.1f} to {1e3 * after:.1f} mrad, by {percent(1 - after / before)}."
     )
 
 
 def numbers(
     train: Sequence[ServoRun],
     held: Sequence[ServoRun],
-    base: Fitted,
+    base: ServoFit,
     rounds: Sequence[Round],
-    named: Sequence[Tried],
+    named: Sequence[LawTrial],
 ) -> list[Quantity]:
     """Held-out position errors beside the check's, and what was named.
 
@@ -155,7 +156,7 @@ def unit(name: str) -> str:
 
 
 def steps(
-    train: Sequence[ServoRun], held: Sequence[ServoRun], base: Fitted, named: Sequence[Tried]
+    train: Sequence[ServoRun], held: Sequence[ServoRun], base: ServoFit, named: Sequence[LawTrial]
 ) -> list[dict[str, str | float]]:
     """Mean absolute position error [rad] after each law, fitted and held out."""
     lines = [("Coulomb and viscous", base), *((f"+ {t.name}", t.fit) for t in named)]
@@ -166,13 +167,13 @@ def steps(
 
 
 def as_lines(r: Round) -> list[dict[str, Any]]:
-    """A round's candidates for scripts; foretold shares and score are null where a law explained too little to try."""
+    """A round's candidates for scripts; predicted shares and score are null where a law explained too little to try."""
     return [
         {
             "name": t.name,
             "explained": t.explained,
-            "foretold": {f"{gain:g}": share for gain, share in t.foretold.items()} or None,
-            "score": t.score if t.foretold else None,
+            "foretold": {f"{gain:g}": share for gain, share in t.forecast.items()} or None,
+            "score": t.score if t.forecast else None,
             "passes": t.passes,
         }
         for t in r.tried
@@ -180,21 +181,21 @@ def as_lines(r: Round) -> list[dict[str, Any]]:
 
 
 def sections(
-    held: Sequence[ServoRun], base: Fitted, final: Fitted, rounds: Sequence[Round], refused: Tried | None
+    held: Sequence[ServoRun], base: ServoFit, final: ServoFit, rounds: Sequence[Round], refused: LawTrial | None
 ) -> list[Section]:
     """What is drawn, and what was not named."""
     words = [
         "Bars: share of the squared position error at gains 100, 200 and 800. Dots: the same at one of these gains, "
-        "foretold by fits to the other two. A law is named when it explains at least 5 %, foretells more than chance "
-        "over all gains, and no dot is below -5 %; of several, the one that foretells most for its number of "
+        "predicted by fits to the other two. A law is named when it explains at least 5 %, predicts more than chance "
+        "over all gains, and no dot is below -5 %; of several, the one that predicts most for its number of "
         "parameters, and where that is a tie, the simplest."
     ]
     for t in rounds[0].tried:
-        if t.foretold and not (rounds[0].named and t.name == rounds[0].named.name):
-            worst = min(t.foretold, key=lambda gain: t.foretold[gain])
+        if t.forecast and not (rounds[0].named and t.name == rounds[0].named.name):
+            worst = min(t.forecast, key=lambda gain: t.forecast[gain])
             words.append(
-                f"{t.name.replace('_', ' ').capitalize()} explains {100 * t.explained:.0f} % of what is fitted; at "
-                f"gain {worst:.0f}, foretold from the others, {100 * t.foretold[worst]:.0f} %; score {t.score:.0f}."
+                f"{t.name.replace('_', ' ').capitalize()} explains {percent(t.explained)} of what is fitted; at "
+                f"gain {worst:.0f}, predicted from the others, {percent(t.forecast[worst])}; score {t.score:.0f}."
             )
     if rounds[0].named:
         words.append(
@@ -235,7 +236,7 @@ def save(values: Values, note: str) -> None:
     placed = list(model.effects)
     for name in dict.fromkeys(key.partition(".")[0] for key in values if "." in key):
         if name not in [p.effect.name for p in placed]:
-            placed.append(Placed(effects()[name], "servo"))
+            placed.append(PlacedEffect(effects()[name], "servo"))
     own = {key.replace(".", ".servo."): float(value) for key, value in values.items() if "." in key}
     own["rotor_inertia.servo.inertia"] = float(values["rotor_inertia"])
     save_model(replace(model, effects=tuple(placed), values=own), FOLDER / "bam" / "model.toml", note)

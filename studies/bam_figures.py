@@ -7,12 +7,12 @@ from matplotlib.figure import Figure
 
 from ..report.drawing import AFTER, BEFORE, GREY, MEASURED, drawing, line, margins, svg
 from ..report.time_axes import over_time
-from .bam_naming import Tried, Values
+from .bam_naming import LawTrial, Values
 from .bam_servo import ServoRun, simulate
 
 
 def positions(runs: Sequence[ServoRun], before: Values, after: Values) -> bytes:
-    """Position of every run: measured, and as two models foretell it in closed loop."""
+    """Position of every run: measured, and as two models predict it in closed loop."""
     with drawing():
         figure = Figure(figsize=(10.0, 6.2))
         panels = figure.subplots(2, 2).ravel()
@@ -31,8 +31,8 @@ def positions(runs: Sequence[ServoRun], before: Values, after: Values) -> bytes:
         return svg(figure)
 
 
-def explained(tried: Sequence[Tried]) -> bytes:
-    """Share of the squared position error that each law explains, fitted to all gains and foretold for each."""
+def explained(tried: Sequence[LawTrial]) -> bytes:
+    """Share of the squared position error that each law explains, fitted to all gains and predicted for each."""
     with drawing():
         figure = Figure(figsize=(8.0, 0.9 + 0.42 * len(tried)))
         axes = figure.subplots()
@@ -40,9 +40,9 @@ def explained(tried: Sequence[Tried]) -> bytes:
         places = np.arange(len(tried))
         axes.barh(places, [100 * t.explained for t in tried], 0.6, color=GREY, label="fitted to all gains")
         for place, t in zip(places, tried, strict=True):
-            foretold = [100 * x for x in t.foretold.values()]
-            axes.plot(foretold, [place] * len(foretold), "o", color=AFTER, markersize=5)
-        axes.plot([], [], "o", color=AFTER, markersize=5, label="a gain foretold from the others")
+            forecast = [100 * x for x in t.forecast.values()]
+            axes.plot(forecast, [place] * len(forecast), "o", color=AFTER, markersize=5)
+        axes.plot([], [], "o", color=AFTER, markersize=5, label="a gain predicted from the others")
         axes.set_yticks(places, [t.name.replace("_", " ") for t in tried])
         axes.invert_yaxis()
         axes.axvline(0, color=GREY, linewidth=0.6)

@@ -3,8 +3,8 @@
 A servo that sticks most of the time tells inverse dynamics little: while it sticks, any torque up to the level will
 do. In its own closed loop, where it sticks is the best witness. Each law of the vocabulary is added in turn, everything
 is fitted again, and a law is named when it explains a share of the squared position error worth a name, and, fitted
-without each controller gain in turn, foretells the recordings left out better, and those of no gain worse by such a
-share. Among those that do, the best score wins: log-likelihood foretold less ½ log(samples) for each parameter,
+without each controller gain in turn, predicts the recordings left out better, and those of no gain worse by such a
+share. Among those that do, the best score wins: log-likelihood predicted less ½ log(samples) for each parameter,
 clusters of half a second as samples; of scores as good as equal, that with the fewest parameters.
 
 Sticking makes slopes unreliable: fits go down by Gauss-Newton with coarse steps, and the best are finished without
@@ -68,7 +68,7 @@ START = {
 
 
 @dataclass(frozen=True)
-class Fitted:
+class ServoFit:
     """Values, and the RMS position error of the recordings that they were fitted to [rad]."""
 
     values: Values
@@ -76,28 +76,28 @@ class Fitted:
 
 
 @dataclass(frozen=True)
-class Tried:
+class LawTrial:
     """A law added to a model: the fit, the share of the squared error it explains, the same share of each controller
-    gain's recordings foretold by fits to the others (empty where that was not tried), and the score of that."""
+    gain's recordings predicted by fits to the others (empty where that was not tried), and the score of that."""
 
     name: str
-    fit: Fitted
+    fit: ServoFit
     explained: float
-    foretold: Mapping[float, float] = field(default_factory=dict)
+    forecast: Mapping[float, float] = field(default_factory=dict)
     score: float = -np.inf
 
     @property
     def passes(self) -> bool:
-        """Whether it is worth a name, and what was left out was foretold better, for no gain much worse."""
-        return self.explained > WORTH and self.score > 0 and min(self.foretold.values()) > -WORTH
+        """Whether it is worth a name, and what was left out was predicted better, for no gain much worse."""
+        return self.explained > WORTH and self.score > 0 and min(self.forecast.values()) > -WORTH
 
 
 @dataclass(frozen=True)
 class Round:
     """Candidates, those that explain most first, and the one that was named."""
 
-    tried: tuple[Tried, ...]
-    named: Tried | None
+    tried: tuple[LawTrial, ...]
+    named: LawTrial | None
 
 
 def rms(runs: Sequence[ServoRun], values: Values) -> float:
@@ -105,7 +105,7 @@ def rms(runs: Sequence[ServoRun], values: Values) -> float:
     return float(np.sqrt(np.mean(_errors(runs, values) ** 2)))
 
 
-def fit(runs: Sequence[ServoRun], start: Values, evaluations: int = EVALUATIONS, seed: int = 0) -> Fitted:
+def fit(runs: Sequence[ServoRun], start: Values, evaluations: int = EVALUATIONS, seed: int = 0) -> ServoFit:
     """Fit all values given, by Gauss-Newton with coarse slopes, then by CMA-ES.
 
     Parameters
@@ -137,7 +137,7 @@ def fit(runs: Sequence[ServoRun], start: Values, evaluations: int = EVALUATIONS,
         further = evolve(cost, x, low, evaluations, seed)
         if cost(further) < best:
             best, x = cost(further), further
-    return Fitted(dict(zip(names, (x * size).tolist(), strict=True)), best)
+    return ServoFit(dict(zip(names, (x * size).tolist(), strict=True)), best)
 
 
 def candidates(have: Values) -> dict[str, list[Values]]:
@@ -158,7 +158,7 @@ def candidates(have: Values) -> dict[str, list[Values]]:
 
 
 def name_missing(
-    runs: Sequence[ServoRun], base: Fitted, progress: Callable[[str], None] = lambda _: None
+    runs: Sequence[ServoRun], base: ServoFit, progress: Callable[[str], None] = lambda _: None
 ) -> Iterator[Round]:
     """Add laws to a model, one a round, until none passes.
 
@@ -166,7 +166,7 @@ def name_missing(
     ----------
     runs : sequence of ServoRun
         Training recordings, of several controller gains.
-    base : Fitted
+    base : ServoFit
     progress : callable
         Told in a few words what is under way.
     """
@@ -176,7 +176,7 @@ def name_missing(
             progress(f"round {number}: {name.replace('_', ' ')}")
             fits = [fit(runs, {**base.values, **point}, 0) for point in points]
             lowest = min(fits, key=lambda f: f.error)
-            tried.append(Tried(name, lowest, 1 - (lowest.error / base.error) ** 2))
+            tried.append(LawTrial(name, lowest, 1 - (lowest.error / base.error) ** 2))
         tried.sort(key=lambda t: -t.explained)
         if tried and tried[0].explained > WORTH:
             progress(f"round {number}: leaving out one controller gain after another")
@@ -195,14 +195,14 @@ def name_missing(
             return
 
 
-def best(tried: Sequence[Tried]) -> Tried | None:
+def best(tried: Sequence[LawTrial]) -> LawTrial | None:
     """The candidate to name: of those that pass, the best score; of scores as good as equal, the fewest parameters."""
     passing = [t for t in tried if t.passes]
     likely = [t for t in passing if t.score > max(p.score for p in passing) - TIE]
     return min(likely, key=lambda t: (len(t.fit.values), -t.score), default=None)
 
 
-def _left_out(runs: Sequence[ServoRun], model: Fitted) -> dict[float, float]:
+def _left_out(runs: Sequence[ServoRun], model: ServoFit) -> dict[float, float]:
     """RMS position error of each gain's recordings, the model fitted to the other gains [rad]."""
     found = {}
     for gain in sorted({r.gain for r in runs}):
@@ -211,14 +211,14 @@ def _left_out(runs: Sequence[ServoRun], model: Fitted) -> dict[float, float]:
     return found
 
 
-def _judged(runs: Sequence[ServoRun], base: Fitted, tried: Tried, before: Mapping[float, float]) -> Tried:
-    """Foretold shares, and the score: each gain's error has a variance of its own."""
+def _judged(runs: Sequence[ServoRun], base: ServoFit, tried: LawTrial, before: Mapping[float, float]) -> LawTrial:
+    """Predicted shares, and the score: each gain's error has a variance of its own."""
     after = _left_out(runs, tried.fit)
     seconds = {gain: sum(float(np.ptp(r.time)) for r in runs if r.gain == gain) for gain in before}
     gained = sum(seconds[gain] / CLUSTER * np.log(before[gain] / after[gain]) for gain in before)
     added = len(tried.fit.values) - len(base.values)
     score = float(gained - 0.5 * added * np.log(sum(seconds.values()) / CLUSTER))
-    return replace(tried, foretold={gain: 1 - (after[gain] / before[gain]) ** 2 for gain in before}, score=score)
+    return replace(tried, forecast={gain: 1 - (after[gain] / before[gain]) ** 2 for gain in before}, score=score)
 
 
 def _errors(runs: Sequence[ServoRun], values: Values) -> Array:

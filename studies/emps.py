@@ -21,6 +21,7 @@ from ..models.model_write import save_model
 from ..progress import stages
 from ..recordings import find_recording
 from ..report.provenance import provenance
+from ..report.words import percent
 from .outcome import FOLDER, Quantity, write_json, write_result
 
 HERE = Path(__file__).parent
@@ -103,7 +104,7 @@ def _published(train: Path, holdout: Path) -> list[Quantity]:
 def _table(found: Diagnosis) -> str:
     """The README's table."""
     lines = ["| model | error, training | error, held-out |", "| --- | ---: | ---: |"]
-    lines += [f"| {s.label} | {100 * s.train:.2f} % | {100 * s.holdout:.2f} % |" for s in found.steps]
+    lines += [f"| {s.label} | {percent(s.train, 3)} | {percent(s.holdout, 3)} |" for s in found.steps]
     return "\n".join(lines)
 
 

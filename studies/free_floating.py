@@ -28,10 +28,11 @@ from ..models.floating.dynamics import (
 from ..models.floating.ets_vii import ets_vii
 from ..models.floating.joint_drive import Drive
 from ..models.floating.motion import FloatingMotion
-from ..models.floating.plant import FloatingPlant, Run
+from ..models.floating.plant import FloatingPlant, PlantRun
 from ..models.inertia import Array, to_central
 from ..report.drawing import AFTER, BEFORE, MEASURED, drawing, line, margins, svg
 from ..report.playback import Playback
+from ..report.words import percent
 from .outcome import Quantity, table, write_result
 from .page import Picture, Section, write_page
 
@@ -60,7 +61,7 @@ def main() -> int:
     found = (
         f"Six joints that move by up to 0.6 rad turn the base at up to {1e3 * n['peak_base_rate']:.2f}·10⁻³ rad/s, "
         f"in proportion to the servo's bandwidth (here {OMEGA:g} rad/s); leaving the base's motion out would put the "
-        f"tip's velocity wrong by {100 * n['tip_error_without_base']:.1f} %."
+        f"tip's velocity wrong by {percent(n['tip_error_without_base'])}."
     )
     write_page(STUDY, "ETS-VII, six joints, base floating", found, quantities, _sections(arm, run), _playback(arm, run))
     path = write_result(STUDY, quantities, time.monotonic() - begun, {"found": found, "published_as_is": True})
@@ -74,13 +75,13 @@ def gains(arm: FloatingArm, omega: float = OMEGA) -> tuple[Array, Array]:
     return omega**2 * own, 2 * omega * own
 
 
-def simulate(arm: FloatingArm, omega: float = OMEGA, longest: float = LONGEST, tolerance: float = 1e-8) -> Run:
+def simulate(arm: FloatingArm, omega: float = OMEGA, longest: float = LONGEST, tolerance: float = 1e-8) -> PlantRun:
     """The published run at the steps taken, first sample included."""
     motion = FloatingMotion(arm, Drive(*gains(arm, omega)), tolerance)
     return _logged(motion, longest)
 
 
-def measure(arm: FloatingArm, run: Run) -> list[Quantity]:
+def measure(arm: FloatingArm, run: PlantRun) -> list[Quantity]:
     """The study's numbers."""
     stiffness, damping = gains(arm)
     q, _ = run.at([24.0])
@@ -110,12 +111,12 @@ def measure(arm: FloatingArm, run: Run) -> list[Quantity]:
     ]
 
 
-def peak_base_rate(arm: FloatingArm, run: Run) -> float:
+def peak_base_rate(arm: FloatingArm, run: PlantRun) -> float:
     """Largest size of the base's angular velocity [rad/s], between the steps as well."""
     return _largest(_base_rate(arm, run)[1])
 
 
-def drift(arm: FloatingArm, run: Run) -> float:
+def drift(arm: FloatingArm, run: PlantRun) -> float:
     """Largest change of the total momentum over the largest momentum of the base alone; linear or angular, the worse.
 
     Worked out from the poses and velocities of all bodies, about the world's origin.
@@ -127,7 +128,7 @@ def drift(arm: FloatingArm, run: Run) -> float:
     return max(_largest(change[:, :3]) / _largest(own[0]), _largest(change[:, 3:]) / _largest(own[1]))
 
 
-def tip_difference(arm: FloatingArm, run: Run, other: Run) -> float:
+def tip_difference(arm: FloatingArm, run: PlantRun, other: PlantRun) -> float:
     """Distance [m] between the tips of two runs at their end."""
     places = [
         r.position[-1] + in_world(r.quaternion[[-1]], tip_pose(arm, r.q[[-1]]).translation)[0] for r in (run, other)
@@ -135,17 +136,19 @@ def tip_difference(arm: FloatingArm, run: Run, other: Run) -> float:
     return float(np.linalg.norm(places[0] - places[1]))
 
 
-def _logged(motion: FloatingMotion, longest: float) -> Run:
+def _logged(motion: FloatingMotion, longest: float) -> PlantRun:
     start = motion.start()
     inputs = np.concatenate([np.zeros(6), TARGET])
     log = motion.advance(0.0, start, DURATION, 0.01, inputs, longest=longest, log=True).log
     states = np.vstack([start, log[:, 1:]])
     seen, (q, qd) = motion.observe(states), motion.joints(states)
     twist = seen.base_twist
-    return Run(np.append(0.0, log[:, 0]), seen.base_position, seen.base_quaternion, twist[:, :3], twist[:, 3:], q, qd)
+    return PlantRun(
+        np.append(0.0, log[:, 0]), seen.base_position, seen.base_quaternion, twist[:, :3], twist[:, 3:], q, qd
+    )
 
 
-def _factor(run: Callable[[], Run]) -> float:
+def _factor(run: Callable[[], PlantRun]) -> float:
     """Simulated over processor time, median of seven, each step logged."""
     spent = []
     for _ in range(8):
@@ -155,7 +158,7 @@ def _factor(run: Callable[[], Run]) -> float:
     return DURATION / float(np.median(spent[1:]))
 
 
-def _base_rate(arm: FloatingArm, run: Run) -> tuple[Array, Array]:
+def _base_rate(arm: FloatingArm, run: PlantRun) -> tuple[Array, Array]:
     """Times (n,) [s] and the base's rate (n, 3) in its frame [rad/s], at zero momentum between the steps as well."""
     times = np.arange(0.0, DURATION + SAMPLE / 2, SAMPLE)
     return times, base_twist(arm, *run.at(times))[:, 3:]
@@ -165,7 +168,7 @@ def _largest(vectors: Array) -> float:
     return float(np.linalg.norm(vectors, axis=1).max())
 
 
-def _sections(arm: FloatingArm, run: Run) -> list[Section]:
+def _sections(arm: FloatingArm, run: PlantRun) -> list[Section]:
     times, base = _base_rate(arm, run)
     q, qd = run.at(times)
     joints = (0, 2, 4), (1, 3, 5)
@@ -248,7 +251,7 @@ def _name(i: int, n_groups: int) -> str:
     return f"joint {i + 1}" if n_groups > 1 else "xyz"[i]
 
 
-def _playback(arm: FloatingArm, run: Run) -> str:
+def _playback(arm: FloatingArm, run: PlantRun) -> str:
     """Base and arm in the world."""
     times = np.arange(0.0, DURATION, 1 / 15)
     nearest = np.searchsorted(run.time, times)

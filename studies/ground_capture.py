@@ -18,7 +18,7 @@ from ..models.snare.history import SnareHistory
 from ..models.snare.model import SnareModel
 from ..models.snare.parameters import WIDE_RING, SnareParameters
 from ..models.snare.target import Target
-from ..report.snare_scene import Seen, snare_scene
+from ..report.snare_scene import SceneData, snare_scene
 from .ground_capture_figures import sections
 from .outcome import Quantity, table, write_result
 from .page import write_page
@@ -41,7 +41,7 @@ SWEEPS = {
 
 
 @dataclass(frozen=True)
-class Case:
+class GroundCase:
     """One capture of the study.
 
     Parameters
@@ -81,7 +81,7 @@ def main() -> int:
     _say(table(quantities))
     found = sentence(cases)
     base = cases[0]
-    scene = snare_scene(Seen.of(base.history), SnareParameters())
+    scene = snare_scene(SceneData.of(base.history), SnareParameters())
     page = write_page(
         STUDY,
         "Suspended ground test of a snare (Li et al.)",
@@ -97,28 +97,28 @@ def main() -> int:
     return 0
 
 
-def run_cases(say: Callable[[str], None]) -> list[Case]:
+def run_cases(say: Callable[[str], None]) -> list[GroundCase]:
     """All captures: the base case first, then the second set of sizes, then what is varied."""
     base, target = SnareParameters(), Target("spring")
     say("Capture of 10 s, base case ...")
-    cases = [Case("base", np.nan, capture(base, target))]
+    cases = [GroundCase("base", np.nan, capture(base, target))]
     say("  with the second set of sizes that meets the contact time ...")
-    cases.append(Case("wide_ring", np.nan, capture(WIDE_RING, target)))
+    cases.append(GroundCase("wide_ring", np.nan, capture(WIDE_RING, target)))
     for name, values in SWEEPS.items():
         usual = target.mass if name == "mass" else getattr(base, name)
         for value in values:
             if value == usual:
-                cases.append(Case(name, value, cases[0].history))
+                cases.append(GroundCase(name, value, cases[0].history))
                 continue
             say(f"  with {name} {value:g} ...")
             if name == "mass":
-                cases.append(Case(name, value, capture(base, replace(target, mass=value))))
+                cases.append(GroundCase(name, value, capture(base, replace(target, mass=value))))
             else:
-                cases.append(Case(name, value, capture(base.with_values(**{name: value}), target)))
+                cases.append(GroundCase(name, value, capture(base.with_values(**{name: value}), target)))
     return cases
 
 
-def measure(cases: list[Case]) -> list[Quantity]:
+def measure(cases: list[GroundCase]) -> list[Quantity]:
     """The base case beside the paper's numbers; intervals are ranges over all captures, not confidence."""
     base = cases[0]
     contacts = [_contact(c) for c in cases]
@@ -144,7 +144,7 @@ def measure(cases: list[Case]) -> list[Quantity]:
     return quantities
 
 
-def sentence(cases: list[Case]) -> str:
+def sentence(cases: list[GroundCase]) -> str:
     """What the study found."""
     base, others = cases[0], _others(cases)
     y, z = 1e3 * base.final_offset
@@ -158,12 +158,12 @@ def sentence(cases: list[Case]) -> str:
     )
 
 
-def _others(cases: list[Case]) -> list[Case]:
+def _others(cases: list[GroundCase]) -> list[GroundCase]:
     """All captures but the base case, which each sweep repeats."""
     return [c for c in cases if c.history is not cases[0].history]
 
 
-def _contact(case: Case) -> float:
+def _contact(case: GroundCase) -> float:
     contact = case.history.first_contact
     return np.inf if contact is None else contact
 

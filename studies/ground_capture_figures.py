@@ -15,7 +15,7 @@ from ..report.drawing import AFTER, BEFORE, GREY, MEASURED, SHADE, drawing, line
 from .page import Picture, Section
 
 if TYPE_CHECKING:
-    from .ground_capture import Case
+    from .ground_capture import GroundCase
 
 _VARIED = {
     "friction": ("friction coefficient", "1"),
@@ -26,7 +26,7 @@ _VARIED = {
 _CABLES = (AFTER, "#009E73", SHADE)
 
 
-def sections(cases: Sequence[Case], dimensions: Sequence[Dimension]) -> list[Section]:
+def sections(cases: Sequence[GroundCase], dimensions: Sequence[Dimension]) -> list[Section]:
     """The page's parts after the table."""
     calibrated = [d for d in dimensions if d.kind == "calibrated"]
     chosen = [d for d in dimensions if d.kind in ("chosen", "derived", "given")]
@@ -108,7 +108,7 @@ def _pin_in_middle(history: SnareHistory, k: int, x: float) -> np.ndarray:
     return (foot + (x - foot[0]) / axis[0] * axis)[1:]
 
 
-def _motion(cases: Sequence[Case]) -> bytes:
+def _motion(cases: Sequence[GroundCase]) -> bytes:
     with drawing():
         figure = Figure(figsize=(9.0, 3.4))
         axes = figure.subplots()
@@ -125,7 +125,7 @@ def _motion(cases: Sequence[Case]) -> bytes:
         return svg(figure)
 
 
-def _forces(cases: Sequence[Case]) -> bytes:
+def _forces(cases: Sequence[GroundCase]) -> bytes:
     with drawing():
         figure = Figure(figsize=(9.0, 5.0))
         all_axes: list[Axes] = list(figure.subplots(3, 1, sharex=True))
@@ -153,7 +153,7 @@ def _paper_contact(axes: Axes) -> None:
     )  # fmt: skip
 
 
-def _sweeps(cases: Sequence[Case]) -> bytes:
+def _sweeps(cases: Sequence[GroundCase]) -> bytes:
     with drawing():
         figure = Figure(figsize=(9.0, 4.6))
         grid = figure.subplots(2, len(_VARIED), sharex="col", sharey="row")

@@ -17,7 +17,7 @@ import numpy as np
 from ..errors import InputError
 from ..exit_status import status_of
 from ..identification.diagnose import Answer, diagnose
-from ..identification.fitting.assembly import Assembly
+from ..identification.fitting.assembly import TorqueModel
 from ..identification.fitting.experiment import Experiment, load_experiments, scales
 from ..identification.links.diagnose import diagnose_links
 from ..identification.links.run import load_links
@@ -25,9 +25,9 @@ from ..identification.links.source import Links, links_of
 from ..identification.nuisance.covariance import Covariance
 from ..identification.report.page import write_report
 from ..identification.sources.fit import fit, residuals
-from ..identification.sources.source import At
+from ..identification.sources.source import ModelPoint
 from ..models.effects import effects
-from ..models.model import Placed
+from ..models.model import PlacedEffect
 from ..models.model_file import load_model
 from ..models.model_write import save_model
 from ..models.rigid_body import RigidBody
@@ -84,7 +84,7 @@ def compare(answer: Answer, recordings: list[Path], holdout: Path) -> tuple[list
     body = RigidBody(model.tree)
     train = load_experiments(model, recordings, body)
     band, sizes = train[0].motion.band, scales(train)
-    assembly = Assembly(model.tree, (), None, sizes, model.values)
+    assembly = TorqueModel(model.tree, (), None, sizes, model.values)
     one, other = (load_links(model, paths, body, band)[1] for paths in (recordings, [holdout]))
     every = [links_of([axis], model, one, other, assembly, assembly.start, sizes) for axis in AXES]
     again = diagnose_links(model, recordings, holdout, body, assembly, assembly.start, sizes, band)
@@ -158,13 +158,13 @@ def compare(answer: Answer, recordings: list[Path], holdout: Path) -> tuple[list
 def spring_alone(links: Links) -> float:
     """RMS of one axis on the held-out recording with a spring without damping as the only difference, by least squares
     [mdeg]: a damper may act as a delay."""
-    placed = Placed(effects()["joint_elasticity"], links.joints[0], hold=("damping",))
+    placed = PlacedEffect(effects()["joint_elasticity"], links.joints[0], hold=("damping",))
     stiffness, damping = (f"{placed.key}.{name}" for name in ("stiffness", "damping"))
     size = 1e-3 * float(links.scale()[0])
     white = [[Covariance(np.full(len(links.measured(i)), size**2), [], None, 1.0, ())] for i in links.train]
     fits = []
     for value in sorted({v.values[stiffness] for v in links.variants(placed)}):
-        at = links.settled(At.of([placed], {stiffness: value, damping: 0.0}, links.n_shifts), links.train)
+        at = links.settled(ModelPoint.of([placed], {stiffness: value, damping: 0.0}, links.n_shifts), links.train)
         fits.append(fit(links, at.without(placed.key), at, white))
     best = min(fits, key=lambda f: sum(float(np.sum(r**2)) for r in f.residuals))
     left = residuals(links, links.held, links.settled(best.at, links.held))

@@ -37,7 +37,7 @@ def left_over(links: Links, numbers: Sequence[int], model: Model | None) -> list
 
 
 def rms(parts: Sequence[Left]) -> float:
-    """RMS of what is left over, all recordings together [mdeg]."""
+    """RMS of the remaining residual, all recordings together [mdeg]."""
     return float(MDEG * np.sqrt(np.mean(np.concatenate([x for _, _, x in parts]) ** 2)))
 
 

@@ -9,10 +9,10 @@ from html import escape
 from pathlib import Path
 
 from ..files import written_whole
-from ..identification.report.words import unit_words
 from ..report.html import figure, headline, page, paragraph, table
 from ..report.provenance import PACKAGES, provenance
-from ..report.strips import Drawn
+from ..report.strips import StripDrawing
+from ..report.words import unit_words
 from ..report.zoom import zoomable
 from .outcome import FOLDER, Quantity
 
@@ -178,7 +178,7 @@ def _numbers(quantities: Sequence[Quantity]) -> str:
 
 
 def _zoom(picture: Picture) -> str:
-    strips = picture.svg.strips if isinstance(picture.svg, Drawn) else ()
+    strips = picture.svg.strips if isinstance(picture.svg, StripDrawing) else ()
     return zoomable(strips, picture.alternative) if strips else ""
 
 

@@ -68,10 +68,10 @@ def run(values: Mapping[str, float]) -> Outcome:
 
 def film(values: Mapping[str, float]) -> str:
     """A page that plays the capture."""
-    from ..report.snare_scene import Seen, snare_scene
+    from ..report.snare_scene import SceneData, snare_scene
 
     history = simulate(values)
-    return snare_scene(Seen.of(history), SnareParameters()).html(start=history.first_contact or 0.0)
+    return snare_scene(SceneData.of(history), SnareParameters()).html(start=history.first_contact or 0.0)
 
 
 CAPTURE = Capture("ground", AXES, run, source_version("tolerance/ground.py", *SOURCES), film)

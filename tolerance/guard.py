@@ -37,7 +37,7 @@ DIRECTIONS = 4
 
 
 @dataclass(frozen=True)
-class Guarded:
+class GuardedNumber:
     """One number of the file: its value, how far it may move either way, and the unit of both."""
 
     value: float
@@ -46,11 +46,11 @@ class Guarded:
 
 
 @dataclass(frozen=True)
-class Moved:
+class GuardShift:
     """A number that has moved by more than it may."""
 
     name: str
-    before: Guarded
+    before: GuardedNumber
     after: float
 
     def __str__(self) -> str:
@@ -59,24 +59,26 @@ class Moved:
         return f"{self.name}: was {b.value:.6g} {b.unit}, is {self.after:.6g}, allowed is a change of {b.allowed:.6g}"
 
 
-def load(path: str | Path) -> dict[str, dict[str, Guarded]]:
+def load(path: str | Path) -> dict[str, dict[str, GuardedNumber]]:
     """The file's numbers by section and name; raises InputError where it cannot be used."""
     try:
         raw = tomllib.loads(Path(path).read_text(encoding="utf-8"))
         return {
-            section: {name: Guarded(float(n["value"]), float(n["allowed"]), str(n["unit"])) for name, n in rows.items()}
+            section: {
+                name: GuardedNumber(float(n["value"]), float(n["allowed"]), str(n["unit"])) for name, n in rows.items()
+            }
             for section, rows in raw.items()
         }
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); name the file of guarded numbers") from None
     except (ValueError, TypeError, KeyError, AttributeError) as error:
-        raise InputError(f"{path}: each number needs value, allowed and unit ({error}); mend that line") from None
+        raise InputError(f"{path}: each number needs value, allowed and unit ({error}); correct that line") from None
 
 
-def moved(section: str, before: Mapping[str, Guarded], after: Mapping[str, float]) -> list[Moved]:
+def moved(section: str, before: Mapping[str, GuardedNumber], after: Mapping[str, float]) -> list[GuardShift]:
     """Which numbers of a section have moved too far; one that is not a number any more has."""
     return [
-        Moved(f"{section}.{name}", guarded, after[name])
+        GuardShift(f"{section}.{name}", guarded, after[name])
         for name, guarded in before.items()
         if not abs(after[name] - guarded.value) <= guarded.allowed
     ]
@@ -127,7 +129,7 @@ def halved(good: Callable[[float], bool], farthest: float, exact: float) -> floa
     return 0.5 * (low + high)
 
 
-def end_holds(axis: str, end: Guarded) -> bool:
+def end_holds(axis: str, end: GuardedNumber) -> bool:
     """Whether the end of an axis is still where it was, from two captures."""
     return succeeds(axis, end.value - end.allowed) and not succeeds(axis, end.value + end.allowed)
 

@@ -23,7 +23,7 @@ from ..cosim.orbit_capture import (
     step_control,
 )
 from ..cosim.orbit_capture import (
-    Capture as Motion,
+    OrbitCapture as Motion,
 )
 from ..models.snare.parameters import SnareParameters
 from .capture import Axis, Capture, Outcome, source_version
@@ -54,7 +54,7 @@ AXES = (
 
 
 @dataclass(frozen=True)
-class Simulated:
+class SimulatedCapture:
     """One capture, simulated.
 
     Parameters
@@ -83,7 +83,7 @@ class Simulated:
         return rows, np.einsum("tcni,tij->tcnj", nodes, tip[:, 3:])
 
 
-def simulate(values: Mapping[str, float], case: CaseName = "inspection") -> Simulated:
+def simulate(values: Mapping[str, float], case: CaseName = "inspection") -> SimulatedCapture:
     """The capture itself; raises InputError for a pin that starts inside a cable, StepError if a step breaks down."""
     turn = Rotation.from_euler("xyz", [values["roll"], values["pitch"], values["yaw"]])
     foot = [AHEAD + values["axial"], values["radial_y"], values["radial_z"]]
@@ -104,7 +104,7 @@ def simulate(values: Mapping[str, float], case: CaseName = "inspection") -> Simu
     motion = capture_of(done, case)
     # What a floating target gets is, but for the cables' own momentum, what the end effector does not.
     on_pin = columns(done.recording, "snare.impulse.pin") if case == "inspection" else -motion.impulse
-    return Simulated(motion, snare, frames, tensions, on_pin)
+    return SimulatedCapture(motion, snare, frames, tensions, on_pin)
 
 
 def run(values: Mapping[str, float], case: CaseName = "inspection") -> Outcome:
@@ -127,7 +127,7 @@ def run(values: Mapping[str, float], case: CaseName = "inspection") -> Outcome:
     )
 
 
-def _encloses(done: Simulated) -> bool:
+def _encloses(done: SimulatedCapture) -> bool:
     """At the last picture of the cables, which is at most 1/15 s before the end."""
     rows, cables = done.seen()
     last = rows[-1]
@@ -137,13 +137,13 @@ def _encloses(done: Simulated) -> bool:
 
 def film(values: Mapping[str, float], case: CaseName = "inspection") -> str:
     """A page that plays the capture, as seen from the end effector."""
-    from ..report.snare_scene import Seen, snare_scene
+    from ..report.snare_scene import SceneData, snare_scene
 
     done = simulate(values, case)
     rows, cables = done.seen()
     tip, pin = done.motion.tip[rows, 3:], done.motion.pin[rows, 3:]
     turned = Rotation.from_matrix(tip.transpose(0, 2, 1) @ pin).as_quat(canonical=True)
-    seen = Seen(done.motion.times[rows], done.motion.relative[rows], np.roll(turned, 1, axis=1), cables)
+    seen = SceneData(done.motion.times[rows], done.motion.relative[rows], np.roll(turned, 1, axis=1), cables)
     return snare_scene(seen, done.snare).html(start=done.motion.first_contact or 0.0)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..cosim.docked import docked_of, margin
-from ..cosim.orbit_capture import SNARE, CaseName, Passive, Setting, arrival, column, resistance
+from ..cosim.orbit_capture import SNARE, CaseName, JointResistance, Setting, arrival, column, resistance
 from ..cosim.state_table import StateTable
 from ..cosim.whole_capture import WholeRun, co_simulate_whole
 from ..models.docking.parameters import DockingParameters
@@ -52,7 +52,7 @@ def outcome(
     snare: SnareParameters,
     values: Mapping[str, float],
     *,
-    passive: Passive | None = None,
+    passive: JointResistance | None = None,
     table: StateTable | None = None,
     scale: float = SCALE,
     sizes: Mapping[str, float] | None = None,

@@ -27,4 +27,4 @@ def run(values: Mapping[str, float]) -> Outcome:
 
 
 _OWN = ("tolerance/latched_ground.py", "tolerance/ground.py", "cosim/ground_capture.py", "cosim/programs/ground.toml")
-CAPTURE = Capture("latched-ground", AXES, run, source_version(*_OWN, "models/hung.py", *SOURCES))
+CAPTURE = Capture("latched-ground", AXES, run, source_version(*_OWN, "models/hanging.py", *SOURCES))

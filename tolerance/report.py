@@ -8,6 +8,7 @@ import numpy as np
 
 from .. import __version__
 from ..report.html import figure, headline, page, paragraph, table
+from ..report.words import percent
 from .box import where_the_box_stands_out, why_the_box_fails
 from .gallery import Miss, play_misses
 from .pictures import envelope_bars, probability_maps, sensitivity_bars, width_curve
@@ -67,9 +68,9 @@ def _sentence(study: Study, content: dict[str, Any]) -> str:
     words = [f"{study.name}: {content['cases']} captures"]
     if "probability_box" in content:
         p = content["probability_box"]
-        low, high = 100 * p["low"], 100 * p["high"]
+        low, high = percent(p["low"], 3), percent(p["high"], 3)
         where = "at the ends of" if study.box_ends else "inside"
-        words.append(f"{where} the box {100 * p['value']:.0f} % succeed (95 % interval {low:.1f} to {high:.1f} %)")
+        words.append(f"{where} the box {percent(p['value'])} succeed (95 % interval {low} to {high})")
     for key, factor, unit, what in (
         ("envelope_radial", 1e3, "mm", "offset alone"),
         ("envelope_angle", 180 / np.pi, "deg", "tilt alone"),
@@ -90,7 +91,7 @@ def _sentence(study: Study, content: dict[str, Any]) -> str:
     first, *others = sorted(content["sensitivity"], key=lambda s: -s["total"])
     most = [first["axis"], *(s["axis"] for s in others if s["total_high"] > first["total_low"])]
     sure = content["width"] <= study.width
-    doubt = "" if sure else f", by a boundary that leaves {100 * content['width']:.0f} % of the ranges undecided"
+    doubt = "" if sure else f", by a boundary that leaves {percent(content['width'])} of the ranges undecided"
     words.append(f"{', '.join(most)} matter{'s' if len(most) == 1 else ''} most{doubt}")
     return "; ".join(words) + "."
 

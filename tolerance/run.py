@@ -12,6 +12,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from ..errors import InputError
+from ..report.words import percent
 from .boundary import Boundary, fit_boundary
 from .capture import Outcome, run_case
 from .rays import STAGE, most_cases, next_cases
@@ -61,7 +62,7 @@ def run_study(
         while adaptive:  # replayed from the start when a killed run goes on: batches depend on complete batches only
             boundary = space_boundary(study, results, count)
             width = boundary.width()
-            say(f"{count} cases: {100 * width:.1f} % of the range undecided, wanted {100 * study.width:.1f} %")
+            say(f"{count} cases: {percent(width, 3)} of the range undecided, wanted {percent(study.width, 3)}")
             if max(width, was) <= study.width or count >= study.cases:
                 return  # narrow twice running: one batch can flatter the process
             was = width

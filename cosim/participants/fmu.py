@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ...fmu.archive import open_fmu
+from ...fmi.archive import open_fmu
 from ...scratch import scratch_folder
 from ..fmi_calls import CompiledCalls, Instance, Vector, address
-from ..fmi_variables import Slot, read_interface
+from ..fmi_variables import FmiVariable, read_interface
 from ..participant import Causality, Participant, StepError
 
 _START, _TOOL_START = 3.0, 60.0  # s to initialise however short a step may be, without and with a tool to start
@@ -182,7 +182,7 @@ class Fmu(Participant):
 
     def _prepare_derivatives(self) -> None:
         assert self._instance is not None
-        slots: Sequence[Slot] = self._slots["input"]
+        slots: Sequence[FmiVariable] = self._slots["input"]
         buffer = (ctypes.c_double * len(slots))()
         self._slopes = np.ctypeslib.as_array(buffer)
         self._set_slopes = self._instance.function("SetRealInputDerivatives")
@@ -195,7 +195,7 @@ class Fmu(Participant):
         )
 
 
-def _continuous(slots: Sequence[Slot], type_: str) -> bool:
+def _continuous(slots: Sequence[FmiVariable], type_: str) -> bool:
     return all(slot.continuous and slot.type == type_ for slot in slots)
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from ...models.effects import get_effect
 from ...models.snare.parameters import SnareParameters
-from ...models.snare.setup import APPLIED, Applied
+from ...models.snare.setup import APPLIED, SetupField
 from ...models.snare.target import Target
 from ..participant import Variable
 from .snare import SnareParticipant
@@ -39,7 +39,7 @@ class SnareModelParticipant(SnareParticipant):
             *(v for v in self.variables if not (v.causality == "parameter" and v.name in taken)),
         )
 
-    def _parameter(self, key: str, effect: str, a: Applied) -> Variable:
+    def _parameter(self, key: str, effect: str, a: SetupField) -> Variable:
         (p,) = get_effect(effect).parameters
         value = getattr(self._own_target if a.of_target else self._default, a.field)
         words = f"{p.meaning}: {get_effect(effect).sentence}"

@@ -7,13 +7,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..diagnosis import Diagnosis, Estimate, Location, Moved, Step, Trace
+from ..diagnosis import Diagnosis, Estimate, Location, ParameterShift, Step, Trace
 from ..sources.answer import candidates, channel_fits, estimates, finding, limits, not_confirmed, rms
-from ..sources.decide import Decided
-from ..sources.source import At, Linear
+from ..sources.decide import Decision
+from ..sources.source import Linearisation, ModelPoint
 from ..sources.weigh import covariances
 from ..wording import foremost, named
-from .recording import EVERY, Record, unit_of
+from .recording import EVERY, DockingRecording, unit_of
 from .runs import SHIFTS
 from .source import Dockings
 
@@ -26,7 +26,7 @@ LEAST = 0.01
 """Share of what changed below which a channel is not listed."""
 
 
-def report_on(source: Dockings, name: str, decided: Decided, seconds: float) -> Diagnosis:
+def report_on(source: Dockings, name: str, decided: Decision, seconds: float) -> Diagnosis:
     """Put everything into words and numbers; ``name`` is the model's."""
     found, best, records = decided.found, decided.best, source.records
     own, locked = ([records[i] for i in some] for some in (source.train, source.held))
@@ -38,9 +38,8 @@ def report_on(source: Dockings, name: str, decided: Decided, seconds: float) -> 
         a, b, unit, channel = _worst(locked, best.missed[p.key].held, best.held, sizes[1])
         what = p.effect.sentence
         evidence = (
-            f"{what[:1].upper()}{what[1:]}: the recordings are e^{n.gain:.0f} times likelier with it, and taking it "
-            f"out again raises the error of {channel} on the held-out docking from {_size(b, unit)} to "
-            f"{_size(a, unit)}."
+            f"{what[:1].upper()}{what[1:]}: the recordings are e^{n.gain:.0f} times likelier with it. Without it, "
+            f"the error of {channel} on the held-out docking rises from {_size(b, unit)} to {_size(a, unit)}."
         )
         findings.append(finding(decided, n, values[p.key], evidence, max(0.0, 1 - (b / max(a, 1e-300)) ** 2)))
     units = [unit_of(c) for c in source.channels]
@@ -59,14 +58,16 @@ def report_on(source: Dockings, name: str, decided: Decided, seconds: float) -> 
     notes.append(f"numbers of the set-up moved within their tolerances, in deviations: {shifts or 'none by one'}")
     notes.append(f"{source.count} dockings were simulated in {seconds:.0f} s")
     return Diagnosis(
-        "missing_physics" if findings else "adequate", sentence, "", name, tuple(findings),
+        decided.verdict, sentence, "", name, tuple(findings),
         _locations(own[0], decided), fits, _steps(decided, sizes), candidates(decided),
         _moved(decided.given, values), _traces(own, locked, decided), limits(source, decided), tuple(notes), BAND,
         foremost=worst.channel,
     )  # fmt: skip
 
 
-def _worst(records: Sequence[Record], without: Linear, within: Linear, size: Array) -> tuple[float, float, str, str]:
+def _worst(
+    records: Sequence[DockingRecording], without: Linearisation, within: Linearisation, size: Array
+) -> tuple[float, float, str, str]:
     """RMS without and with an effect, unit and name of the channel that misses it most."""
     a, b = rms(without), rms(within)
     c = int(np.argmax((a - b) / size))
@@ -79,8 +80,8 @@ def _size(value: float, unit: str) -> str:
     return f"{factor * value:.3g} {word}"
 
 
-def _steps(decided: Decided, sizes: tuple[Array, Array]) -> tuple[Step, ...]:
-    def line(label: str, *fits: Linear) -> Step:
+def _steps(decided: Decision, sizes: tuple[Array, Array]) -> tuple[Step, ...]:
+    def line(label: str, *fits: Linearisation) -> Step:
         return Step(label, *(float(np.sqrt(np.mean((rms(x) / s) ** 2))) for x, s in zip(fits, sizes, strict=True)))
 
     lines = [line("model as given", decided.found.first, decided.before)]
@@ -90,17 +91,17 @@ def _steps(decided: Decided, sizes: tuple[Array, Array]) -> tuple[Step, ...]:
     return tuple(lines)
 
 
-def _moved(given: At, values: dict[str, dict[str, Estimate]]) -> tuple[Moved, ...]:
+def _moved(given: ModelPoint, values: dict[str, dict[str, Estimate]]) -> tuple[ParameterShift, ...]:
     before = given.all_values
     return tuple(
-        Moved(f"{key}.{name}", e.unit, before[f"{key}.{name}"], e.value, e.std)
+        ParameterShift(f"{key}.{name}", e.unit, before[f"{key}.{name}"], e.value, e.std)
         for key, own in values.items()
         for name, e in own.items()
         if f"{key}.{name}" in before
     )
 
 
-def _locations(record: Record, decided: Decided) -> tuple[Location, ...]:
+def _locations(record: DockingRecording, decided: Decision) -> tuple[Location, ...]:
     """Channels by the share of what the names changed, or of what is left, each in units of its noise."""
     first, last, found = decided.found.first, decided.best.train, decided.found
     named_any = len(last.at.placed) > len(first.at.placed)
@@ -124,7 +125,7 @@ def _locations(record: Record, decided: Decided) -> tuple[Location, ...]:
     return tuple(made)
 
 
-def _windows(record: Record, change: Array) -> tuple[tuple[float, float], ...]:
+def _windows(record: DockingRecording, change: Array) -> tuple[tuple[float, float], ...]:
     """Half seconds that hold the strongest half of a change, neighbours merged."""
     size = round(0.5 / EVERY)
     energy = np.bincount(np.arange(len(change)) // size, change**2)
@@ -140,9 +141,11 @@ def _windows(record: Record, change: Array) -> tuple[tuple[float, float], ...]:
     return tuple((round(float(a + record.zero), 3), round(float(b + record.zero), 3)) for a, b in spans[:MOST_WINDOWS])
 
 
-def _traces(train: Sequence[Record], held: Sequence[Record], decided: Decided) -> tuple[Trace, ...]:
+def _traces(
+    train: Sequence[DockingRecording], held: Sequence[DockingRecording], decided: Decision
+) -> tuple[Trace, ...]:
     made = []
-    sets: tuple[tuple[Literal["train", "holdout"], Sequence[Record], Linear, Linear], ...] = (
+    sets: tuple[tuple[Literal["train", "holdout"], Sequence[DockingRecording], Linearisation, Linearisation], ...] = (
         ("train", train, decided.found.first, decided.best.train),
         ("holdout", held, decided.before, decided.best.held),
     )

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from ...models.model import Model
-from ..evidence.arm import Weighed
+from ..evidence.arm import WeighedRecordings
 from ..parameter_list import parameter_list
 from ..sources.answer import estimates, rms, with_found
 from ..sources.fit import deviations, fit, linearised, shift_columns
-from ..sources.source import At, Linear
+from ..sources.source import Linearisation, ModelPoint
 from ..sources.weigh import covariances, weigh
 from .recording import unit_of
 from .source import Dockings, start
@@ -22,15 +22,15 @@ STEPS = 8
 
 
 @dataclass(frozen=True)
-class IdentifiedDockings:
+class DockingIdentification:
     """A fit of docking tests, the model with its values, and the recordings."""
 
     model: Model
-    given: At
+    given: ModelPoint
     source: Dockings
-    weighed: Weighed
-    fit: Linear
-    held: Linear | None
+    weighed: WeighedRecordings
+    fit: Linearisation
+    held: Linearisation | None
 
     def to_json(self) -> dict[str, Any]:
         """The published form."""
@@ -57,7 +57,7 @@ def identify_dockings(
     holdout: Sequence[str | Path] = (),
     *,
     progress: Callable[[str], None] = lambda _: None,
-) -> IdentifiedDockings:
+) -> DockingIdentification:
     """Fit every parameter of a docking's effects; arguments and errors as `diagnose_dockings`."""
     progress("reading the recordings")
     source, given = Dockings(model, recordings, holdout), start(model)
@@ -66,4 +66,4 @@ def identify_dockings(
     weighed = weigh(source, source.train, given, here, search=False)
     found = fit(source, given, here.at, covariances(weighed), shift_columns(here), STEPS)
     held = linearised(source, source.held, found.at) if holdout else None
-    return IdentifiedDockings(with_found(model, found.at), given, source, weighed, found, held)
+    return DockingIdentification(with_found(model, found.at), given, source, weighed, found, held)

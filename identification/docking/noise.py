@@ -1,4 +1,4 @@
-"""What the noise of a docking's channels hangs on: balls that touch and slide, a carriage that stands."""
+"""What the noise of a docking's channels depends on: balls that touch and slide, a carriage that stands."""
 
 from collections.abc import Sequence
 
@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..deciding import LEAST_LEVEL, STICKS
-from ..nuisance.noise import Run
-from ..sources.source import Linear
-from .recording import EVERY, KNOTS, Record
+from ..nuisance.noise import NoiseChannel
+from ..sources.source import Linearisation
+from .recording import EVERY, KNOTS, DockingRecording
 
 Array = NDArray[np.float64]
 
@@ -16,7 +16,7 @@ ABOUT = 3
 """Windows either way over which what nothing explains is averaged: 0.3 s, a touch and its rebound."""
 
 
-def touching(record: Record, seen: Array) -> NDArray[np.bool_]:
+def touching(record: DockingRecording, seen: Array) -> NDArray[np.bool_]:
     """Windows (n,) in which balls touch and slide, and those about them: the load on the target changes fast."""
     change = _change(seen)
     loads = [c for c, name in enumerate(record.channels) if name.startswith(("force.", "torque."))]
@@ -24,15 +24,17 @@ def touching(record: Record, seen: Array) -> NDArray[np.bool_]:
     return np.logical_or.reduce([np.roll(fast, k) for k in (-1, 0, 1)])
 
 
-def standing(record: Record) -> NDArray[np.bool_]:
+def standing(record: DockingRecording) -> NDArray[np.bool_]:
     """Windows (n,) in which the carriage stands, and takes any force up to its friction."""
     rate = record.motion.rate[::KNOTS]
     slowest = np.minimum(np.abs(rate[1:]), np.abs(rate[:-1]))
     return (slowest < STICKS[0][0] * np.abs(rate).max()) | (rate[1:] * rate[:-1] < 0)
 
 
-def hangs(records: Sequence[Record], linear: Linear, could: Sequence[Sequence[Array]], scale: Array) -> list[list[Run]]:
-    """What the noise of every channel hangs on.
+def noise_channels(
+    records: Sequence[DockingRecording], linear: Linearisation, could: Sequence[Sequence[Array]], scale: Array
+) -> list[list[NoiseChannel]]:
+    """What the noise of every channel depends on.
 
     While balls touch and slide no law of contact tells the load to the window: a channel may then be off, as a joint
     near rest may hold any torque, by what nothing explains there, in the RMS over `ABOUT` windows either way, and by
@@ -41,8 +43,8 @@ def hangs(records: Sequence[Record], linear: Linear, could: Sequence[Sequence[Ar
 
     Parameters
     ----------
-    records : sequence of Record
-    linear : Linear
+    records : sequence of DockingRecording
+    linear : Linearisation
         Their residuals.
     could : sequence of sequence of array (n, k)
         What could explain each channel's of each.
@@ -52,7 +54,7 @@ def hangs(records: Sequence[Record], linear: Linear, could: Sequence[Sequence[Ar
     kinds = [name.rpartition(".")[0] for name in records[0].channels]
     least = [LEAST_LEVEL * max(x for x, other in zip(scale, kinds, strict=True) if other == kind) for kind in kinds]
     loose = [touching(r, x) for r, x in zip(records, seen, strict=True)]
-    found: list[list[Run]] = [[] for _ in records]
+    found: list[list[NoiseChannel]] = [[] for _ in records]
     for c, name in enumerate(records[0].channels):
         driven = name.startswith(("tau.", "tension."))
         rows = [(standing(r) & (name == "tau.carriage")) if driven else k for r, k in zip(records, loose, strict=True)]
@@ -68,7 +70,7 @@ def hangs(records: Sequence[Record], linear: Linear, could: Sequence[Sequence[Ar
             energy = np.convolve(energy, np.ones(2 * ABOUT + 1), "same") / np.maximum(count, 1)
             sticks = np.where(k, np.maximum(np.sqrt(energy), least[c]), 0.0)
             n = len(k)
-            own.append(Run(EVERY, (slice(0, n),), np.zeros(n), (sticks,), _change(x)[:, c], 1.0))
+            own.append(NoiseChannel(EVERY, (slice(0, n),), np.zeros(n), (sticks,), _change(x)[:, c], 1.0))
     return found
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ...errors import InputError
-from ...models.docking.bench import NEVER, SEEN, Motion
+from ...models.docking.bench import NEVER, SEEN, DockingCommand
 from ...models.model import Model
 from ...recordings import read_recording
 from ...recordings.attitude import attitude
@@ -33,7 +33,7 @@ UNITS = {"pos": "m", "turn": "rad", "force": "N", "torque": "N*m", "tau": "N", "
 
 
 @dataclass(frozen=True)
-class Record:
+class DockingRecording:
     """One docking test: its file, the ends of the windows (n + 1,) [s], what was measured in them (n, c) by channel,
     and what the test was told to do. ``zero`` is the time of the recording's first row."""
 
@@ -41,7 +41,7 @@ class Record:
     times: Array
     channels: tuple[str, ...]
     measured: Array
-    motion: Motion
+    motion: DockingCommand
     zero: float
     notes: tuple[str, ...]
 
@@ -56,7 +56,7 @@ def unit_of(channel: str) -> str:
     return UNITS[channel.partition(".")[0]]
 
 
-def load_records(model: Model, paths: Sequence[str | Path]) -> list[Record]:
+def load_records(model: Model, paths: Sequence[str | Path]) -> list[DockingRecording]:
     """Read recordings of docking tests; raises InputError for what is missing, cannot be, or is not alike."""
     records = [_record(model, path, read_recording(path, model.signals, {"carriage": "prismatic"})) for path in paths]
     for record in records[1:]:
@@ -66,7 +66,7 @@ def load_records(model: Model, paths: Sequence[str | Path]) -> list[Record]:
     return records
 
 
-def _record(model: Model, path: str | Path, data: xr.Dataset) -> Record:
+def _record(model: Model, path: str | Path, data: xr.Dataset) -> DockingRecording:
     time = data["time"].values
     zero, since = float(time[0]), time - time[0]
     if since[-1] < SHORTEST:
@@ -93,11 +93,11 @@ def _record(model: Model, path: str | Path, data: xr.Dataset) -> Record:
     measured = np.stack([_means(since, columns[name], times) for name in channels], axis=1)
     knots = np.linspace(0.0, times[-1], KNOTS * (len(times) - 1) + 1)
     travel, rate = _followed(path, since, data["q.carriage"].values, knots)
-    motion = Motion(
+    motion = DockingCommand(
         knots, travel, rate, np.nanmean(place[still], axis=0), start.as_quat(canonical=True, scalar_first=True),
         _latch(path, since, data),
     )  # fmt: skip
-    return Record(str(path), times, channels, measured, motion, zero, tuple(data.attrs["notes"]))
+    return DockingRecording(str(path), times, channels, measured, motion, zero, tuple(data.attrs["notes"]))
 
 
 def _means(since: Array, values: Array, times: Array) -> Array:

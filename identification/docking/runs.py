@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ...errors import InputError
-from ...models.docking.bench import DockingBench, Motion, numbers_of
+from ...models.docking.bench import DockingBench, DockingCommand, numbers_of
 from ...models.docking.bench_setup import FACTORS, MACHINED, REGISTRATION, TOLERANCES, BenchSetup
 from ...models.dormand_prince import StepFault
-from .recording import Record
+from .recording import DockingRecording
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
@@ -27,10 +27,10 @@ def _bench() -> DockingBench:
     return DockingBench()
 
 
-class Runs:
+class DockingRuns:
     """Simulations of some docking tests."""
 
-    def __init__(self, setup: BenchSetup, records: Sequence[Record]) -> None:
+    def __init__(self, setup: BenchSetup, records: Sequence[DockingRecording]) -> None:
         """Start nothing yet."""
         self.setup, self.records = setup, tuple(records)
         self._said = numbers_of(setup)
@@ -48,7 +48,7 @@ class Runs:
         return None if seen is None else self.records[number].of(seen)
 
     def seen(self, number: int, values: Values, shifts: Array) -> Array | None:
-        """The same of all that a simulation shows, over each stretch of the travel."""
+        """All that a simulation shows over each stretch of the travel; None where it fails."""
         moved = dict(zip(SHIFTS, map(float, shifts), strict=True))
         own = dict(values) | {k: self._said[k] + moved[k] * x for k, x in TOLERANCES.items() if moved[k]}
         own |= {k: self._said[k] * float(np.exp(moved[k] * x)) for k, x in FACTORS.items() if moved[k]}
@@ -66,8 +66,8 @@ class Runs:
         return self._known[key]
 
 
-def _registered(motion: Motion, off: Array) -> Motion:
-    """The same from where the end effector truly was, the pose measured being off by so much [m, rad]."""
+def _registered(motion: DockingCommand, off: Array) -> DockingCommand:
+    """The command, started at the end effector's true pose: the measured one is off by this much [m, rad]."""
     if not off.any():
         return motion
     start = Rotation.from_rotvec(-off[3:]) * Rotation.from_quat(motion.quaternion, scalar_first=True)

@@ -11,7 +11,7 @@ from ...models.docking.bench import SEEN
 from ...models.docking.bench_setup import DockingTree
 from ...models.model import Model
 from .recording import EVERY, KNOTS, load_records
-from .runs import SHIFTS, Runs
+from .runs import SHIFTS, DockingRuns
 from .source import start
 
 
@@ -42,7 +42,7 @@ def simulate_docking(model: Model, motion: str | Path | None = None) -> xr.Datas
         raise InputError(f"{model.path}: system = 'docking' follows a test; give --motion RECORDING")
     (record,) = load_records(model, [motion])
     m = record.motion
-    seen = Runs(model.tree.setup, [record]).seen(0, start(model).all_values, np.zeros(len(SHIFTS)))
+    seen = DockingRuns(model.tree.setup, [record]).seen(0, start(model).all_values, np.zeros(len(SHIFTS)))
     if seen is None:
         raise InputError(f"{model.path}: the docking cannot be simulated from where {motion} starts; check [docking]")
     columns = {name: seen[:, c] for c, name in enumerate(SEEN) if not name.startswith("turn.")}

@@ -14,19 +14,19 @@ from ...errors import InputError
 from ...models.docking.bench_setup import DockingTree, docking_effects
 from ...models.effect import Parameter
 from ...models.effects import get_effect
-from ...models.model import Model, Placed
+from ...models.model import Model, PlacedEffect
 from ..deciding import BLOCK
-from ..nuisance.noise import Run
+from ..nuisance.noise import NoiseChannel
 from ..sources.fit import differences, shift_differences
-from ..sources.source import At, Linear, Variant
-from .noise import hangs
+from ..sources.source import GridPoint, Linearisation, ModelPoint
+from .noise import noise_channels
 from .recording import EVERY, load_records
-from .runs import SHIFTS, Runs
+from .runs import SHIFTS, DockingRuns
 
 Array = NDArray[np.float64]
 
 
-class Dockings(Runs):
+class Dockings(DockingRuns):
     """Docking tests of a model, the training recordings first."""
 
     n_shifts, anew, steps = len(SHIFTS), False, 4
@@ -43,7 +43,7 @@ class Dockings(Runs):
     def measured(self, i: int) -> Array:
         return self.records[i].measured
 
-    def predicted(self, i: int, at: At) -> Array | None:
+    def predicted(self, i: int, at: ModelPoint) -> Array | None:
         return self(i, at.all_values, at.shifts)
 
     def refused(self, i: int) -> InputError:
@@ -52,13 +52,13 @@ class Dockings(Runs):
             "[docking] against the test's set-up"
         )
 
-    def slopes(self, i: int, at: At, here: Array) -> Array:
+    def slopes(self, i: int, at: ModelPoint, here: Array) -> Array:
         return differences(self, i, at, here)
 
-    def shift_slopes(self, i: int, at: At, here: Array) -> Array:
+    def shift_slopes(self, i: int, at: ModelPoint, here: Array) -> Array:
         return shift_differences(self, i, at, here)
 
-    def settled(self, at: At, numbers: Sequence[int]) -> At:
+    def settled(self, at: ModelPoint, numbers: Sequence[int]) -> ModelPoint:
         return at
 
     def scale(self) -> Array:
@@ -69,21 +69,21 @@ class Dockings(Runs):
         every = np.concatenate([self.records[i].measured - self.records[i].measured[0] for i in numbers])
         return np.maximum(np.sqrt(np.nanmean(every**2, axis=0)), 1e-12)
 
-    def bounds(self, p: Placed, x: Parameter) -> tuple[float, float]:
+    def bounds(self, p: PlacedEffect, x: Parameter) -> tuple[float, float]:
         return x.low, x.high
 
-    def size(self, p: Placed, x: Parameter) -> float:
+    def size(self, p: PlacedEffect, x: Parameter) -> float:
         return min(abs(g) for g in x.grid)
 
-    def unit(self, p: Placed, x: Parameter) -> str:
+    def unit(self, p: PlacedEffect, x: Parameter) -> str:
         return x.unit
 
-    def library(self, placed: Sequence[Placed]) -> list[Placed]:
+    def library(self, placed: Sequence[PlacedEffect]) -> list[PlacedEffect]:
         have = {p.key for p in placed}
-        every = [Placed(get_effect(name), at) for name, places in docking_effects().items() for at in places]
+        every = [PlacedEffect(get_effect(name), at) for name, places in docking_effects().items() for at in places]
         return [p for p in every if p.key not in have]
 
-    def variants(self, p: Placed) -> list[Variant]:
+    def variants(self, p: PlacedEffect) -> list[GridPoint]:
         """A parameter that is zero where there is no effect is an amplitude."""
         amplitudes = [x for x in p.effect.parameters if x.zero == 0]
         shapes = [x for x in p.effect.parameters if x.zero != 0]
@@ -92,10 +92,10 @@ class Dockings(Runs):
             for k in range(max(len(x.grid) for x in amplitudes)):
                 values = {f"{p.key}.{x.name}": v for x, v in zip(shapes, shape, strict=True)}
                 values |= {f"{p.key}.{x.name}": x.grid[k % len(x.grid)] for x in amplitudes}
-                found.append(Variant(p, values, tuple(f"{p.key}.{x.name}" for x in amplitudes)))
+                found.append(GridPoint(p, values, tuple(f"{p.key}.{x.name}" for x in amplitudes)))
         return found
 
-    def columns(self, i: int, at: At, v: Variant) -> Array:
+    def columns(self, i: int, at: ModelPoint, v: GridPoint) -> Array:
         """What the simulation changes by for each amplitude, from there being none of it."""
         shape = {k: x for k, x in v.values.items() if k not in v.amplitudes}
         none, own = self.predicted(i, at), []
@@ -108,15 +108,17 @@ class Dockings(Runs):
     def curves(self, numbers: Sequence[int]) -> Mapping[tuple[int, str], list[Array]]:
         return {}
 
-    def hangs(self, numbers: Sequence[int], linear: Linear, could: Sequence[Sequence[Array]]) -> list[list[Run]]:
-        return hangs([self.records[i] for i in numbers], linear, could, self.scale())
+    def noise_channels(
+        self, numbers: Sequence[int], linear: Linearisation, could: Sequence[Sequence[Array]]
+    ) -> list[list[NoiseChannel]]:
+        return noise_channels([self.records[i] for i in numbers], linear, could, self.scale())
 
     def blocks(self, i: int, x: Array) -> Array:
         count = max(round(BLOCK / EVERY), 1)
         return np.array([b.sum() for b in np.array_split(x, max(len(x) // count, 4))])
 
 
-def start(model: Model) -> At:
+def start(model: Model) -> ModelPoint:
     """The model as given; a parameter without a value starts at what hardware usually has."""
     usual = {f"{p.key}.{x.name}": x.grid[0] for p in model.effects for x in p.effect.parameters}
-    return At.of(model.effects, usual | {k: v for k, v in model.values.items() if k in usual}, len(SHIFTS))
+    return ModelPoint.of(model.effects, usual | {k: v for k, v in model.values.items() if k in usual}, len(SHIFTS))

@@ -1,4 +1,4 @@
-"""The evidence of recordings of an arm: residuals along the motion as measured, columns along the motion asked for."""
+"""The evidence of recordings of an arm: residuals along the motion as measured, columns along the instrument motion."""
 
 import functools
 from collections.abc import Callable, Mapping, Sequence
@@ -7,19 +7,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.model import Model, Placed
+from ...models.model import Model, PlacedEffect
 from ..deciding import LEAST_LEVEL
-from ..fitting.assembly import Assembly
+from ..fitting.assembly import TorqueModel
 from ..fitting.experiment import Experiment, Scales
 from ..fitting.fit import Fit
 from ..nuisance.curve import SMALL
 from ..nuisance.encoder import encoder_noise
-from ..nuisance.noise import Noise, Run, learn
+from ..nuisance.noise import Noise, NoiseChannel, learn
 from ..nuisance.rest import SETTLES, STICKS, share
-from .beside import Beside, beside, regressor_columns
-from .evidence import Channel, Evidence
-from .hypotheses import Along, Curves, curves, names, pool
-from .pool import Columns, Hypothesis, Item
+from .evidence import Evidence, ResidualChannel
+from .hypotheses import ColumnSource, Curves, curves, names, pool
+from .nuisance_columns import NuisanceColumns, beside, regressor_columns
+from .pool import CandidateColumns, Hypothesis, Item
 
 Array = NDArray[np.float64]
 
@@ -27,28 +27,28 @@ QUIET = 0.01
 """RMS torque of the loudest channel that stands for that of a channel which is as good as silent."""
 
 STILL = 0.03
-"""Share of the peak speed below which what is left over tells how much a joint holds."""
+"""Share of the peak speed below which the residual tells how much a joint holds."""
 
 STRONGEST = 40
 """Directions of all that could explain a channel beside which its noise is learnt."""
 
 
 @dataclass(frozen=True)
-class Weighed:
+class WeighedRecordings:
     """Recordings under a fit, ready to be searched: the training recordings come first."""
 
     evidence: Evidence
     pool: tuple[Hypothesis, ...]
     noises: tuple[Noise, ...]
-    beside: Beside
+    beside: NuisanceColumns
     scale: Array
     n_train: int
-    runs: list[list[Run]]
+    runs: list[list[NoiseChannel]]
     bare: Callable[[int], Noise]
     """A channel's noise where nothing is missing."""
 
-    def with_noise(self, c: int, noise: Noise, alone: Evidence) -> "Weighed":
-        """The same with another noise of one channel, whose evidence by itself has it already."""
+    def with_noise(self, c: int, noise: Noise, alone: Evidence) -> "WeighedRecordings":
+        """These recordings with another noise of one channel; ``alone`` is that channel's evidence under it."""
         noises = tuple(noise if k == c else x for k, x in enumerate(self.noises))
         return replace(self, evidence=self.evidence.with_channel(c, alone), noises=noises)
 
@@ -68,11 +68,11 @@ def weigh(
     scales: Mapping[str, Scales],
     noises: Sequence[Noise] | None = None,
     *,
-    runs: list[list[Run]] | None = None,
+    runs: list[list[NoiseChannel]] | None = None,
     search: bool = True,
     nameless: Mapping[tuple[int, str], float] | None = None,
     tuned: Mapping[str, Array] | None = None,
-) -> Weighed:
+) -> WeighedRecordings:
     """Recordings under a fit.
 
     Parameters
@@ -81,13 +81,13 @@ def weigh(
         With the effects of the fit.
     found : Fit
     experiments, instruments : sequence of Experiment
-        Recordings, and the same with the motion that was asked for; the first ``n_train`` are for training.
+        Recordings, and these recordings along the instrument motion; the first ``n_train`` are for training.
     n_train : int
     scales : mapping of str to Scales
     noises : sequence of Noise or None
         Of each channel; None learns them from the training recordings.
-    runs : lists of Run, optional
-        What the noise of every channel hangs on, as another fit has it: two models are compared under one noise.
+    runs : lists of NoiseChannel, optional
+        What the noise of every channel depends on, as another fit has it: two models are compared under one noise.
     search : bool
         False leaves out all hypotheses: only the evidence of the fit itself is wanted.
     nameless : mapping of (channel, words) to float, optional
@@ -97,8 +97,10 @@ def weigh(
     """
     assembly = found.assembly
     states = [assembly.evaluate(e, found.theta) for e in instruments]
-    along = Along(model, assembly, instruments, states, n_train, torque_scale(experiments[:n_train]), tuned or {})
-    columns = Columns([len(e.measured) for e in experiments])
+    along = ColumnSource(
+        model, assembly, instruments, states, n_train, torque_scale(experiments[:n_train]), tuned or {}
+    )
+    columns = CandidateColumns([len(e.measured) for e in experiments])
     nameless = nameless or {}
     by_words = curves(along, scales, columns, small=not search, more={words for _, words in nameless})
     named = names(along, by_words, columns) if search else {}
@@ -110,11 +112,11 @@ def weigh(
     if noises is None:
         noises = [_noise(c, along, residuals, runs, others, by_words, named, columns) for c in range(J)]
     channels = [
-        [Channel(r[:, c], noises[c].covariance(own[c]), *part[c]) for c in range(J)]
+        [ResidualChannel(r[:, c], noises[c].covariance(own[c]), *part[c]) for c in range(J)]
         for r, own, part in zip(residuals, runs, others.parts, strict=True)
     ]
     if not search:
-        columns = Columns([len(e.measured) for e in experiments])
+        columns = CandidateColumns([len(e.measured) for e in experiments])
     found_pool = tuple(pool(named, by_words, model.effects)) if search else ()
     items = [item for h in found_pool for item in h.items]
 
@@ -123,7 +125,7 @@ def weigh(
         return _noise(c, along, residuals, runs, others, by_words, {}, columns)
 
     evidence = Evidence(channels, columns, items, others.count)
-    return Weighed(evidence, found_pool, tuple(noises), others, along.scale, n_train, runs, bare)
+    return WeighedRecordings(evidence, found_pool, tuple(noises), others, along.scale, n_train, runs, bare)
 
 
 def _runs(
@@ -133,8 +135,8 @@ def _runs(
     residuals: Sequence[Array],
     n_train: int,
     scale: Array,
-) -> list[list[Run]]:
-    """What the noise of every channel of every recording hangs on."""
+) -> list[list[NoiseChannel]]:
+    """What the noise of every channel of every recording depends on."""
     train, made = experiments[:n_train], []
     peaks = np.max([np.abs(e.motion.qd).max(axis=0) for e in train], axis=0)
     travels = np.max([np.ptp(e.motion.q, axis=0) for e in train], axis=0)
@@ -148,14 +150,16 @@ def _runs(
                 *sticks, settles = (share(m, c, z, max(peak, 1e-12), travel) for z in (*STICKS, SETTLES))
                 level = _level(found.assembly, found.theta, train, residuals, c, peak, scale[c])
             row.append(
-                Run(m.period * m.thinning, m.band_segments(), encoder_noise(e, c), tuple(sticks), settles, level)
+                NoiseChannel(
+                    m.period * m.thinning, m.band_segments(), encoder_noise(e, c), tuple(sticks), settles, level
+                )
             )
         made.append(row)
     return made
 
 
 def _level(
-    assembly: Assembly,
+    assembly: TorqueModel,
     theta: Array,
     train: Sequence[Experiment],
     residuals: Sequence[Array],
@@ -163,7 +167,7 @@ def _level(
     peak: float,
     scale: float,
 ) -> float:
-    """How much a joint may hold at rest [T]: its level of dry friction, or what is left over there."""
+    """How much a joint may hold at rest [T]: its level of dry friction, or the residual there."""
     joint = assembly.tree.joints[channel].name
     torque = {
         assembly.unit(p, x) for p in assembly.placed if p.at == joint for x in p.effect.parameters if x.unit == "T"
@@ -179,13 +183,13 @@ def _level(
 
 def _noise(
     channel: int,
-    along: Along,
+    along: ColumnSource,
     residuals: Sequence[Array],
-    runs: Sequence[Sequence[Run]],
-    others: Beside,
+    runs: Sequence[Sequence[NoiseChannel]],
+    others: NuisanceColumns,
     by_words: Curves,
-    named: Mapping[str, tuple[Placed, list[Item]]],
-    columns: Columns,
+    named: Mapping[str, tuple[PlacedEffect, list[Item]]],
+    columns: CandidateColumns,
 ) -> Noise:
     """Scales of a channel's noise, beside the baseline, the masses, small curves and the middle of every law."""
     laws: list[int] = []

@@ -1,6 +1,6 @@
 """Confirm on the held-out recordings what a search named, by the same evidence.
 
-With an effect and without it the rest is fitted again, and both models foretell the held-out recordings: the log
+With an effect and without it the rest is fitted again, and both models predict the held-out recordings: the log
 density of these given the training recordings (Dawid 1984), every nuisance integrated out anew. The nameless curves
 that the search ended with stand beside both, so that what only stands in for one of them is not missed.
 A name stays if that density falls without it by more than it scatters over blocks of time, and if what is missed is
@@ -19,8 +19,8 @@ from ..fitting.experiment import Experiment, Scales
 from ..fitting.fit import Fit, channel_rms
 from ..search.refit import without
 from .arm import weigh
-from .found import Found, Name
-from .projected import Projected
+from .projected import ProjectedEvidence
+from .selection import ArmNaming, ArmSelection
 
 Array = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ FEWEST_BLOCKS = 4
 
 
 @dataclass(frozen=True)
-class Foretold:
+class PredictiveDensity:
     """Log density of the held-out recordings given the training ones, and what each block of time takes off it."""
 
     density: float
@@ -36,7 +36,7 @@ class Foretold:
 
 
 @dataclass(frozen=True)
-class Missed:
+class ArmLoss:
     """What the held-out recordings lose without an effect: log density and its scatter; how far the two models' torques
     are apart [RMS, share of the channel's]; relative errors with and without; the share of the residual's energy that
     goes with it, 0 to 1; and the fit without."""
@@ -60,29 +60,29 @@ class Missed:
 
 
 @dataclass(frozen=True)
-class Confirmed:
+class ArmConfirmation:
     """Names that the held-out recordings confirmed and did not, what they miss of each, and the fit of what is left.
 
     What is missed, but is less than any model has wrong, is neither."""
 
-    found: Found
-    names: tuple[Name, ...]
-    rejected: tuple[Name, ...]
-    weak: Mapping[str, Missed]
+    found: ArmSelection
+    names: tuple[ArmNaming, ...]
+    rejected: tuple[ArmNaming, ...]
+    weak: Mapping[str, ArmLoss]
     """What the held-out recordings miss of the rejected."""
-    missed: Mapping[str, Missed]
+    missed: Mapping[str, ArmLoss]
     model: Model
     fit: Fit
-    foretold: Foretold
+    forecast: PredictiveDensity
 
 
 def confirm(
-    found: Found,
+    found: ArmSelection,
     train: Sequence[Experiment],
     held: Sequence[Experiment],
     scales: Mapping[str, Scales],
     progress: Callable[[str], None],
-) -> Confirmed:
+) -> ArmConfirmation:
     """Take out the name that the held-out recordings miss least, all else fitted again, until they miss every one.
 
     One at a time: of two that stand in for each other, one stays, and is missed more from then on. So the others are
@@ -90,11 +90,11 @@ def confirm(
     """
     progress("confirming on the held-out recordings")
     model, final = found.model, found.fit
-    whole = foretold(model, final, found, train, held, scales)
+    whole = forecast(model, final, found, train, held, scales)
     left = {n.placed.key: n for n in found.names}
-    missed: dict[str, Missed] = {}
-    rejected: list[Name] = []
-    weak: dict[str, Missed] = {}
+    missed: dict[str, ArmLoss] = {}
+    rejected: list[ArmNaming] = []
+    weak: dict[str, ArmLoss] = {}
     stale = set(left)
     while stale:
         # What was never tried, then what was missed least.
@@ -111,22 +111,22 @@ def confirm(
                 rejected.append(out)
                 weak[weakest] = gone
             model = _without(model, weakest)
-            whole = foretold(model, final, found, train, held, scales)
+            whole = forecast(model, final, found, train, held, scales)
             stale = set(left)
             progress(f"confirming on the held-out recordings: {out.placed.key} is not missed, {len(left)} left")
     names = tuple(sorted(left.values(), key=lambda n: -missed[n.placed.key].size))
-    return Confirmed(found, names, tuple(rejected), weak, missed, model, final, whole)
+    return ArmConfirmation(found, names, tuple(rejected), weak, missed, model, final, whole)
 
 
-def foretold(
+def forecast(
     model: Model,
     own: Fit,
-    found: Found,
+    found: ArmSelection,
     train: Sequence[Experiment],
     held: Sequence[Experiment],
     scales: Mapping[str, Scales],
-) -> Foretold:
-    """How well a fitted model foretells the held-out recordings."""
+) -> PredictiveDensity:
+    """How well a fitted model predicts the held-out recordings."""
     n = len(train)
     noise = found.weighed
     weighed = weigh(
@@ -142,12 +142,12 @@ def foretold(
         nameless=found.nameless,
     )
     weight = weighed.beside.weight(found.tolerance)
-    fitted_by = Projected(weighed.evidence, range(n), weight)
+    fitted_by = ProjectedEvidence(weighed.evidence, range(n), weight)
     known = fitted_by.posterior(len(own.theta))
-    on = Projected(weighed.evidence, range(n, n + len(held)), weight, known)
+    on = ProjectedEvidence(weighed.evidence, range(n, n + len(held)), weight, known)
     always = on.beside([])
     parts = [weighed.evidence.left(n + i, always, []) for i in range(len(held))]
-    return Foretold(on.null, np.concatenate([blocks(x, e) for x, e in zip(parts, held, strict=True)]))
+    return PredictiveDensity(on.null, np.concatenate([blocks(x, e) for x, e in zip(parts, held, strict=True)]))
 
 
 def blocks(x: Array, e: Experiment) -> Array:
@@ -167,19 +167,19 @@ def _without(model: Model, key: str) -> Model:
 
 
 def _missed(
-    name: Name,
+    name: ArmNaming,
     model: Model,
     final: Fit,
-    whole: Foretold,
-    found: Found,
+    whole: PredictiveDensity,
+    found: ArmSelection,
     train: Sequence[Experiment],
     held: Sequence[Experiment],
     scales: Mapping[str, Scales],
-) -> Missed:
+) -> ArmLoss:
     """Take one effect out of a fit, and fit the rest again."""
     key = name.placed.key
     rest = without(final, [key], train)
-    other = foretold(_without(model, key), rest, found, train, held, scales)
+    other = forecast(_without(model, key), rest, found, train, held, scales)
     c = list(name.channels)
     with_it, measured = channel_rms(final.assembly, held, final.theta)
     rms, _ = channel_rms(rest.assembly, held, rest.theta)
@@ -189,12 +189,12 @@ def _missed(
     size = float(apart[worst] / measured[worst])
     gain = whole.density - other.density
     explained = _explained(found, final, rest, held, worst)
-    return Missed(gain, scatter(0.5 * (other.blocks - whole.blocks)), size, trial, explained, rest)
+    return ArmLoss(gain, scatter(0.5 * (other.blocks - whole.blocks)), size, trial, explained, rest)
 
 
-def _explained(found: Found, final: Fit, rest: Fit, held: Sequence[Experiment], c: int) -> float:
+def _explained(found: ArmSelection, final: Fit, rest: Fit, held: Sequence[Experiment], c: int) -> float:
     """Share of a channel's residual energy that goes with an effect, every sample by its own variance: near rest, where
-    a joint holds any torque, little counts. What wanders counts as left over, for a law without a name may be it."""
+    a joint holds any torque, little counts. A wander counts as residual: a law without a name may look like it."""
     n, sums = found.weighed.n_train, np.zeros(2)
     for e, row in zip(held, found.weighed.evidence.channels[n:], strict=True):
         both = [f.assembly.residual(e, f.theta)[0][:, c] for f in (final, rest)]

@@ -2,34 +2,31 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 from ...models.model import Model
 from ..deciding import SECOND_CHOICES
 from ..fitting.base_parameters import BaseParameters
 from ..fitting.experiment import Experiment, Scales
-from .confirm import Confirmed, confirm
-from .found import Name
-from .left import LeftOver, left_over
+from ..verdict import Verdict, verdict
+from .confirm import ArmConfirmation, confirm
+from .nameless import NamelessParts, left_over
 from .rounds import search
+from .selection import ArmNaming
 
 
 @dataclass(frozen=True)
-class Decided:
+class ArmDecision:
     """What the recordings say: names confirmed on the held-out ones, what is left without a name, and names that the
     held-out recordings did not confirm."""
 
-    best: Confirmed
-    left: LeftOver
-    rejected: tuple[Name, ...]
+    best: ArmConfirmation
+    left: NamelessParts
+    rejected: tuple[ArmNaming, ...]
 
     @property
-    def verdict(self) -> Literal["missing_physics", "unknown_effect", "adequate"]:
-        """By what is named and what is left."""
-        if self.best.names:
-            return "missing_physics"
-        nameless = self.left.curves or any(b.again for b in self.left.bursts.values())
-        return "unknown_effect" if nameless else "adequate"
+    def verdict(self) -> Verdict:
+        """By what is named, and by curves and bursts without a name; a burst that came once is no law."""
+        return verdict(self.best.names, [*self.left.curves, *(b for b in self.left.bursts.values() if b.again)])
 
 
 def decide(
@@ -41,7 +38,7 @@ def decide(
     *,
     progress: Callable[[str], None] = lambda _: None,
     seed: int = 0,
-) -> Decided:
+) -> ArmDecision:
     """Name what a model leaves out.
 
     Parameters
@@ -69,6 +66,6 @@ def decide(
         )
         last = confirm(again, train, held, scales, progress)
         rejected |= {n.placed.key: n for n in last.rejected}
-        if last.foretold.density > best.foretold.density:
+        if last.forecast.density > best.forecast.density:
             best = last
-    return Decided(best, left_over(best, scales, train, held, rejected), tuple(rejected.values()))
+    return ArmDecision(best, left_over(best, scales, train, held, rejected), tuple(rejected.values()))

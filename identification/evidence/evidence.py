@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..nuisance.covariance import Covariance
-from .pool import Columns, Hypothesis, Item
+from .pool import CandidateColumns, Hypothesis, Item
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int_]
@@ -25,7 +25,7 @@ AT_ONCE = 512
 
 
 @dataclass(frozen=True)
-class Channel:
+class ResidualChannel:
     """One channel of one recording: residual (n,), its covariance, and what always stands beside it: positions (p,)
     among all such parameters, and columns (n, p) in units of their prior deviation."""
 
@@ -51,7 +51,7 @@ class Products:
 
 
 @dataclass(frozen=True)
-class Alike:
+class ItemStack:
     """Items of the same number of columns k, side by side: their numbers (N,), columns and spreads (N, k), signs."""
 
     numbers: Index
@@ -62,13 +62,13 @@ class Alike:
 
 
 class Evidence:
-    """Products of all columns over every recording; `Projected` sums some of them.
+    """Products of all columns over every recording; `ProjectedEvidence` sums some of them.
 
     Parameters
     ----------
-    channels : sequence of sequences of Channel
+    channels : sequence of sequences of ResidualChannel
         Of recording i and channel c.
-    columns : Columns
+    columns : CandidateColumns
     items : sequence of Item
         Every hypothesis at every shape.
     n_always : int
@@ -76,7 +76,11 @@ class Evidence:
     """
 
     def __init__(
-        self, channels: Sequence[Sequence[Channel]], columns: Columns, items: Sequence[Item], n_always: int
+        self,
+        channels: Sequence[Sequence[ResidualChannel]],
+        columns: CandidateColumns,
+        items: Sequence[Item],
+        n_always: int,
     ) -> None:
         """Work the products out, one channel after the other."""
         self.channels = [list(row) for row in channels]
@@ -92,13 +96,13 @@ class Evidence:
         by: dict[tuple[int, bool], list[int]] = {}
         for number, item in enumerate(self.items):
             by.setdefault((len(item.index), item.whole), []).append(number)
-        self.alike: list[Alike] = []
+        self.alike: list[ItemStack] = []
         for (_, whole), numbers in by.items():
             rows = [self.items[x] for x in numbers]
             index, spread, positive = (
                 np.stack(x) for x in zip(*((r.index, r.spread, r.positive) for r in rows), strict=True)
             )
-            self.alike.append(Alike(np.array(numbers), index, spread, positive, whole))
+            self.alike.append(ItemStack(np.array(numbers), index, spread, positive, whole))
         self._own: dict[tuple[int, int], list[tuple[Index, Array]]] = {}
         self._rows: dict[tuple[int, int, int], Array] = {}
 
@@ -161,7 +165,7 @@ class Evidence:
         return self._rows[key]
 
     def with_covariances(self, c: int, covariances: Sequence[Covariance]) -> "Evidence":
-        """The same with other covariances of one channel, one a recording."""
+        """This evidence with other covariances of one channel, one a recording."""
         other = copy(self)
         other.channels = [list(row) for row in self.channels]
         other._forget(c)
@@ -170,7 +174,7 @@ class Evidence:
         return other
 
     def _forget(self, c: int) -> None:
-        """Forget, on a copy, what hangs on the covariance of a channel."""
+        """Forget, on a copy, what depends on the covariance of a channel."""
         self._made = {key: x for key, x in self._made.items() if key[1] != c}
         self._own = {key: x for key, x in self._own.items() if key[1] != c}
         self._rows = {key: x for key, x in self._rows.items() if key[1] != c}
@@ -193,7 +197,7 @@ class Evidence:
         return other, own, always
 
     def with_channel(self, c: int, alone: "Evidence") -> "Evidence":
-        """The same with one channel as it became by itself: another covariance, and its products."""
+        """This evidence with one channel's covariance and products taken from ``alone``."""
         other = copy(self)
         other.channels = [list(row) for row in self.channels]
         other._forget(c)

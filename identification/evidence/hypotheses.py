@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...models.effect import Effect
-from ...models.model import Model, Placed
+from ...models.model import Model, PlacedEffect
 from ..deciding import BENDS, ELSEWHERE, ODDS_OF_CURVES, ODDS_OF_NAMES, SLOPE
-from ..fitting.assembly import Assembly, Evaluation
+from ..fitting.assembly import TorqueEvaluation, TorqueModel
 from ..fitting.experiment import Experiment, Scales
 from ..nuisance.curve import SMALL, Coordinates, family
-from ..search.candidates import MOST_OF_WHOLE, Variant, candidate_columns, library, reduced, variants
-from .pool import Columns, Hypothesis, Item
+from ..search.candidates import MOST_OF_WHOLE, EffectVariant, candidate_columns, library, reduced, variants
+from .pool import CandidateColumns, Hypothesis, Item
 
 Array = NDArray[np.float64]
 Curves = Mapping[tuple[int, str], Item]
@@ -34,13 +34,13 @@ SMALL_STEP = 0.02
 
 
 @dataclass(frozen=True)
-class Along:
+class ColumnSource:
     """What columns are taken from: instruments with the model's state along each, the training recordings first."""
 
     model: Model
-    assembly: Assembly
+    assembly: TorqueModel
     instruments: Sequence[Experiment]
-    states: Sequence[Evaluation]
+    states: Sequence[TorqueEvaluation]
     n_train: int
     scale: Array
     """RMS torque of each channel in the training recordings (J,)."""
@@ -49,9 +49,9 @@ class Along:
 
 
 def curves(
-    along: Along,
+    along: ColumnSource,
     scales: Mapping[str, Scales],
-    columns: Columns,
+    columns: CandidateColumns,
     *,
     small: bool = False,
     more: Collection[str] = (),
@@ -76,7 +76,9 @@ def curves(
     return found
 
 
-def names(along: Along, by_words: Curves, columns: Columns) -> dict[str, tuple[Placed, list[Item]]]:
+def names(
+    along: ColumnSource, by_words: Curves, columns: CandidateColumns
+) -> dict[str, tuple[PlacedEffect, list[Item]]]:
     """Every effect at every place that the model does not have yet, with all its shapes, by its key."""
     have = {p.key for p in along.model.effects}
     found = {}
@@ -94,7 +96,9 @@ def names(along: Along, by_words: Curves, columns: Columns) -> dict[str, tuple[P
     return found
 
 
-def pool(named: Mapping[str, tuple[Placed, list[Item]]], by_words: Curves, there: Sequence[Placed]) -> list[Hypothesis]:
+def pool(
+    named: Mapping[str, tuple[PlacedEffect, list[Item]]], by_words: Curves, there: Sequence[PlacedEffect]
+) -> list[Hypothesis]:
     """Hypotheses with their prior odds: shared by the effects, and by the places of each (Scott and Berger 2010).
 
     What is ``there`` in the model counts as one of an effect's places that has it.
@@ -128,7 +132,7 @@ def log_share_of_places(k: int, n: int) -> float:
     return float(np.log(ELSEWHERE * every + (1 - ELSEWHERE) * (k == 1) / n))
 
 
-def _items(along: Along, p: Placed, by_words: Curves, columns: Columns) -> list[Item]:
+def _items(along: ColumnSource, p: PlacedEffect, by_words: Curves, columns: CandidateColumns) -> list[Item]:
     grid, between = _grid(along.assembly, p)
     made = [_made(along, v) for v in grid]
     extra = None
@@ -180,12 +184,12 @@ def _items(along: Along, p: Placed, by_words: Curves, columns: Columns) -> list[
     return items if fitted is None else [*items, fitted]
 
 
-def remembers(p: Placed) -> bool:
+def remembers(p: PlacedEffect) -> bool:
     """Has a law a memory that is no joint's own: a sling's carriage, a tank, a late sensor?"""
     return bool(p.effect.states) and p.effect.at != "joint"
 
 
-def lagging(along: Along, parts: Mapping[int, Sequence[Array]], columns: Columns) -> Item:
+def lagging(along: ColumnSource, parts: Mapping[int, Sequence[Array]], columns: CandidateColumns) -> Item:
     """What a law adds if it comes sooner or later: the first two derivatives by time of each of its columns.
 
     The item's spreads make each as large as the law where that is as large as its channel's torque.
@@ -204,7 +208,7 @@ def lagging(along: Along, parts: Mapping[int, Sequence[Array]], columns: Columns
     return Item(columns.add(own), 1 / np.maximum(sizes, 1e-12), np.zeros(len(sizes), bool))
 
 
-def _grid(assembly: Assembly, p: Placed) -> tuple[list[Variant], bool]:
+def _grid(assembly: TorqueModel, p: PlacedEffect) -> tuple[list[EffectVariant], bool]:
     """Points of an effect's grid, and whether a slope to its neighbours may ride along with each.
 
     A law of one shape without hidden state is cheap: the grid gets a point between every two.
@@ -225,15 +229,15 @@ def _grid(assembly: Assembly, p: Placed) -> tuple[list[Variant], bool]:
     return finer, True
 
 
-def rings(p: Placed) -> bool:
+def rings(p: PlacedEffect) -> bool:
     """Has a law a frequency of its own that no joint's motion tells: a tank, a boom on the base?"""
     return bool(p.effect.states) and p.effect.at == "base"
 
 
-def _fitted(along: Along, p: Placed, columns: Columns) -> Item | None:
+def _fitted(along: ColumnSource, p: PlacedEffect, columns: CandidateColumns) -> Item | None:
     """A law at the parameters that it was fitted to by itself, and what each parameter's own size more would add."""
     none = np.zeros(0, int)
-    v = Variant(p, along.tuned[p.key], none, np.zeros(1), np.full(1, MOST_OF_WHOLE))
+    v = EffectVariant(p, along.tuned[p.key], none, np.zeros(1), np.full(1, MOST_OF_WHOLE))
     parts = _made(along, v)
     size = None if parts is None else _size(along, parts)
     if parts is None or size is None or size[0] <= 1e-12:
@@ -251,7 +255,7 @@ def _fitted(along: Along, p: Placed, columns: Columns) -> Item | None:
     return Item(index, np.full(len(index), 1 / size[0]), np.arange(len(index)) == 0, label=v)
 
 
-def _made(along: Along, v: Variant) -> dict[int, list[Array]] | None:
+def _made(along: ColumnSource, v: EffectVariant) -> dict[int, list[Array]] | None:
     """Columns of a point by channel, one array a recording; None where the law cannot be simulated there."""
     parts: dict[int, list[Array]] = {}
     for e, s in zip(along.instruments, along.states, strict=True):
@@ -266,7 +270,7 @@ def _made(along: Along, v: Variant) -> dict[int, list[Array]] | None:
     return parts if parts and complete and finite else None
 
 
-def _size(along: Along, parts: Mapping[int, Sequence[Array]]) -> Array:
+def _size(along: ColumnSource, parts: Mapping[int, Sequence[Array]]) -> Array:
     """RMS of each column over the training recordings, in the RMS torque of the channel that it shows most on."""
     sizes = [
         np.sqrt(np.mean(np.concatenate(list(own[: along.n_train])) ** 2, axis=0)) / along.scale[c]

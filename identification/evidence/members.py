@@ -9,7 +9,7 @@ from scipy.special import log_ndtr
 
 from .. import deciding
 from ..deciding import WHOLE
-from .projected import Projected
+from .projected import ProjectedEvidence
 
 Array = NDArray[np.float64]
 
@@ -22,7 +22,7 @@ class Members:
     A law without amplitudes has its prior about one, and a small spread.
     """
 
-    def __init__(self, on: Projected, taken: Sequence[tuple[int, float]] = ()) -> None:
+    def __init__(self, on: ProjectedEvidence, taken: Sequence[tuple[int, float]] = ()) -> None:
         """``taken``: (number of the item, size)."""
         self.on, self.taken = on, tuple(taken)
         self.value = 0.0
@@ -95,7 +95,7 @@ def log_bayes(curvature: Array, score: Array, positive: NDArray[np.bool_]) -> Ar
 
 
 def log_bayes_whole(curvature: Array, score: Array) -> Array:
-    """The same of a column that is a whole law, its amplitude about one: (N,)."""
+    """Log Bayes factors (N,) of columns that are a whole law each, with an amplitude about one."""
     h = np.maximum(curvature, 0.0)
     left = score - h
     k2 = WHOLE**2

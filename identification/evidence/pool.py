@@ -48,7 +48,7 @@ class Hypothesis:
 
 
 @dataclass
-class Columns:
+class CandidateColumns:
     """Columns of all hypotheses, by recording and channel, numbered through.
 
     They are kept in single precision, 6e-8 of each value, as they are most of the memory that a diagnosis takes; what

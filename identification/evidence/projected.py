@@ -10,20 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 
-from .evidence import Alike, Evidence
+from .evidence import Evidence, ItemStack
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Group(Alike):
-    """The same with their curvature (N, k, k) and score (N, k), all that stands beside projected out."""
+class ProjectedStack(ItemStack):
+    """Items with their curvature (N, k, k) and score (N, k), the nuisance columns projected out."""
 
     curvature: Array
     score: Array
 
 
-class Projected:
+class ProjectedEvidence:
     """The evidence of some recordings together, what always stands beside projected out."""
 
     def __init__(
@@ -74,7 +74,7 @@ class Projected:
         self.groups = self._grouped()
         self._at = {int(x): (g, row) for g in self.groups for row, x in enumerate(g.numbers)}
 
-    def _grouped(self) -> list[Group]:
+    def _grouped(self) -> list[ProjectedStack]:
         made = [np.zeros((*x.index.shape, x.index.shape[1])) for x in self.evidence.alike]
         for c in range(len(self.evidence.where)):
             for i in self.recordings:
@@ -86,7 +86,7 @@ class Projected:
             curvature -= np.einsum("pak,pal->akl", beside, beside, optimize=True)
             curvature *= x.spread[:, :, None] * x.spread[:, None, :]
             score = self.score_all[x.index] * x.spread
-            groups.append(Group(x.numbers, x.index, x.spread, x.positive, x.whole, curvature, score))
+            groups.append(ProjectedStack(x.numbers, x.index, x.spread, x.positive, x.whole, curvature, score))
         return groups
 
     def left(self, c: int) -> float:

@@ -2,13 +2,13 @@
 
 from dataclasses import dataclass
 
-from ...models.model import Placed
+from ...models.model import PlacedEffect
 
 
 @dataclass(frozen=True)
 class RivalOdds:
     """A rival of an effect: its posterior share in the same place, and whether recordings can tell the two apart."""
 
-    placed: Placed
+    placed: PlacedEffect
     probability: float
     separable: bool

@@ -15,12 +15,12 @@ from ..search.candidates import free_parameters, library
 from ..search.closed_loop import planned
 from ..search.refit import assemble, refitted
 from ..search.rest import fitted
-from .arm import Weighed, weigh
-from .found import Found, Name, Trial
+from .arm import WeighedRecordings, weigh
 from .hypotheses import remembers, rings
 from .members import Members, log_bayes
 from .rival import RivalOdds
-from .search import Search, Slot, Taken
+from .search import Member, MemberOdds, Search
+from .selection import ArmNaming, ArmSelection, ArmTrial
 from .tolerant import searched
 
 Array = NDArray[np.float64]
@@ -33,11 +33,11 @@ def search(
     train: Sequence[Experiment],
     held: Sequence[Experiment],
     *,
-    before: Found | None = None,
+    before: ArmSelection | None = None,
     barred: Collection[str] = (),
     progress: Callable[[str], None] = lambda _: None,
     seed: int = 0,
-) -> Found:
+) -> ArmSelection:
     """Add effects to a model until nothing more that has a name raises the posterior.
 
     Parameters
@@ -49,7 +49,7 @@ def search(
     scales : mapping of str to Scales
     train, held : sequence of Experiment
         What is searched; and what is weighed beside it, but not looked at before the confirmation.
-    before : Found, optional
+    before : ArmSelection, optional
         An earlier search of the same: its baseline, noise and first columns are not worked out again.
     barred : collection of str
         Keys of effects that must not be named.
@@ -67,8 +67,8 @@ def search(
     found, named = first, []
     instruments = planned(found, train, others=held, driven=DRIVEN)
     noises = before.weighed.noises if before is not None else None
-    opening: Weighed | None = None
-    trials: tuple[Trial, ...] = before.trials if before is not None else ()
+    opening: WeighedRecordings | None = None
+    trials: tuple[ArmTrial, ...] = before.trials if before is not None else ()
     tuned = _tuned(model, base, scales, train, first, seed) if before is None else before.tuned
     channels = None if before is None else _reached_by(before.opening, barred)
     for number in range(1, ROUNDS + 1):
@@ -114,7 +114,7 @@ def search(
         found = refitted(found, assembly, fitted(assembly, train), any(rings(p) for p in placed), seed)
         instruments = planned(found, train, instruments, others=held, driven=DRIVEN)
     assert opening is not None
-    return Found(
+    return ArmSelection(
         first,
         model,
         found,
@@ -150,7 +150,7 @@ def _tuned(
     return found
 
 
-def _error_of_laws(opening: Weighed, weighed: Weighed) -> Array:
+def _error_of_laws(opening: WeighedRecordings, weighed: WeighedRecordings) -> Array:
     """Log-likelihood that the names so far took out of each channel of the training recordings (J,).
 
     A law that is wrong by a share of itself leaves the square of that share of it.
@@ -164,17 +164,17 @@ def _error_of_laws(opening: Weighed, weighed: Weighed) -> Array:
     return np.maximum(taken, 0.0)
 
 
-def _reached_by(weighed: Weighed, keys: Collection[str]) -> set[int]:
+def _reached_by(weighed: WeighedRecordings, keys: Collection[str]) -> set[int]:
     """Channels that some hypotheses reach."""
     evidence = weighed.evidence
     return {c for h in weighed.pool if h.key in keys for x in h.items for c in evidence.reached(x)}
 
 
-def _reached(weighed: Weighed, slot: Slot) -> list[int]:
+def _reached(weighed: WeighedRecordings, slot: MemberOdds) -> list[int]:
     return weighed.evidence.reached(weighed.evidence.items[slot.taken.item])
 
 
-def as_names(search: Search, slots: Sequence[Slot]) -> list[Slot]:
+def as_names(search: Search, slots: Sequence[MemberOdds]) -> list[MemberOdds]:
     """Slots in which a curve that a name's law nearly is has become that name, and a law that is nearly a special case
     of it that special case (the principle of marginality: Nelder 1977). What it is not is found afterwards."""
     taken = [s.taken for s in slots]
@@ -201,7 +201,7 @@ def as_names(search: Search, slots: Sequence[Slot]) -> list[Slot]:
     return found
 
 
-def _simpler(search: Search, t: Taken) -> list[int]:
+def _simpler(search: Search, t: Member) -> list[int]:
     """Names that could stand for a curve on their channel; special cases of a name at its place."""
     own, evidence = search.pool[t.hypothesis], search.on.evidence
     if own.named:
@@ -214,11 +214,11 @@ def _simpler(search: Search, t: Taken) -> list[int]:
 def _name(
     search: Search,
     members: Members,
-    slot: Slot,
-    weighed: Weighed,
+    slot: MemberOdds,
+    weighed: WeighedRecordings,
     found: Fit,
     experiment: Experiment,
-) -> tuple[Name, dict[str, float]]:
+) -> tuple[ArmNaming, dict[str, float]]:
     """A slot as a name with its rivals, and the values its parameters start from."""
     hypothesis, item = weighed.pool[slot.taken.hypothesis], weighed.evidence.items[slot.taken.item]
     variant = item.label
@@ -231,10 +231,10 @@ def _name(
     start = {f"{placed.key}.{p.name}": float(v) for p, v in zip(placed.effect.parameters, values, strict=True)}
     channels = tuple(weighed.evidence.reached(item))
     rivals = _rivals(search, slot, amplitudes)
-    return Name(placed, channels, slot.gain, float(slot.shares[slot.taken.hypothesis]), rivals), start
+    return ArmNaming(placed, channels, slot.gain, float(slot.shares[slot.taken.hypothesis]), rivals), start
 
 
-def _rivals(search: Search, slot: Slot, amplitudes: Array) -> tuple[RivalOdds, ...]:
+def _rivals(search: Search, slot: MemberOdds, amplitudes: Array) -> tuple[RivalOdds, ...]:
     """Names that could stand in a slot: likely ones, and those whose law can do what the slot's does."""
     found, on = [], search.on
     own = slot.taken.item
@@ -284,7 +284,7 @@ def share_of_residual(search: Search, item: int, amplitudes: Array) -> float:
     return float(np.clip(gained / max(energy, 1e-300), 0.0, 1.0))
 
 
-def _trials(search: Search, weighed: Weighed) -> tuple[Trial, ...]:
+def _trials(search: Search, weighed: WeighedRecordings) -> tuple[ArmTrial, ...]:
     """Every effect at every place by itself, on top of the baseline."""
     rows = search.scan([])
     made = []
@@ -293,7 +293,7 @@ def _trials(search: Search, weighed: Weighed) -> tuple[Trial, ...]:
             own = search.take([], h)
             alone = Members(search.on, [(own.item, own.size)])
             explained = share_of_residual(search, own.item, alone.amplitudes)
-            made.append(Trial(x.label, explained, float(rows.odds[h]), _smallest(search, h)))
+            made.append(ArmTrial(x.label, explained, float(rows.odds[h]), _smallest(search, h)))
     return tuple(sorted(made, key=lambda t: -t.odds))
 
 

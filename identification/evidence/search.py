@@ -14,7 +14,7 @@ from scipy.special import logsumexp
 
 from .members import SIZES, Members
 from .pool import Hypothesis
-from .projected import Projected
+from .projected import ProjectedEvidence
 
 Array = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ MOVED = 0.05
 
 
 @dataclass(frozen=True)
-class Taken:
+class Member:
     """A hypothesis in a set: with the number of its item, its size, and what averaging took, as a negative number."""
 
     hypothesis: int
@@ -39,7 +39,7 @@ class Taken:
 
 
 @dataclass(frozen=True)
-class Scanned:
+class Scan:
     """Every hypothesis on top of a set: log posterior odds, the best item and size, the log Bayes factor there."""
 
     odds: Array
@@ -49,11 +49,11 @@ class Scanned:
 
 
 @dataclass(frozen=True)
-class Slot:
+class MemberOdds:
     """A member of the best set, and who could stand in its place: log odds (n_hypotheses,) and shares of them, the last
     share being nobody's."""
 
-    taken: Taken
+    taken: Member
     gain: float
     odds: Array
     shares: Array
@@ -62,23 +62,23 @@ class Slot:
 class Search:
     """Of the best set of hypotheses on some recordings."""
 
-    def __init__(self, on: Projected, pool: Sequence[Hypothesis], barred: Collection[int] = ()) -> None:
+    def __init__(self, on: ProjectedEvidence, pool: Sequence[Hypothesis], barred: Collection[int] = ()) -> None:
         """``barred``: hypotheses that no set may have. Items stand in the evidence in the order of the pool."""
         self.on, self.pool, self.barred = on, pool, set(barred)
         counts = np.array([len(h.items) for h in pool], int)
         self._starts = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(int)
         self._counts = counts
-        self._scans: dict[frozenset[tuple[int, float]], Scanned] = {}
+        self._scans: dict[frozenset[tuple[int, float]], Scan] = {}
         self._sets: dict[frozenset[tuple[int, float]], Members] = {}
 
-    def members(self, taken: Sequence[Taken]) -> Members:
+    def members(self, taken: Sequence[Member]) -> Members:
         """The set, worked out once."""
         key = _key(taken)
         if key not in self._sets:
             self._sets[key] = Members(self.on, [(t.item, t.size) for t in taken])
         return self._sets[key]
 
-    def scan(self, taken: Sequence[Taken]) -> Scanned:
+    def scan(self, taken: Sequence[Member]) -> Scan:
         """Every hypothesis on top of a set."""
         key = _key(taken)
         if key not in self._scans:
@@ -90,24 +90,24 @@ class Search:
             weight = np.exp(gains - np.repeat(top, self._counts)[:, None])
             cases = np.add.reduceat(np.isfinite(gains).sum(axis=1), self._starts)
             mean = np.log(np.add.reduceat(weight.sum(axis=1), self._starts) / cases) + top
-            self._scans[key] = Scanned(mean + self._prior(taken), item, SIZES[np.argmax(gains[item], axis=1)], top)
+            self._scans[key] = Scan(mean + self._prior(taken), item, SIZES[np.argmax(gains[item], axis=1)], top)
         return self._scans[key]
 
-    def total(self, taken: Sequence[Taken]) -> float:
+    def total(self, taken: Sequence[Member]) -> float:
         """Log posterior of a set against nothing."""
         return self.members(taken).value + self._log_prior(taken) + sum(t.offset for t in taken)
 
-    def _prior(self, taken: Sequence[Taken]) -> Array:
+    def _prior(self, taken: Sequence[Member]) -> Array:
         """Log odds (n_hypotheses,) of every hypothesis beside a set, before the recordings are looked at."""
         own = [self.pool[t.hypothesis].kind for t in taken]
         return np.array([h.prior_beside(own.count(h.kind)) for h in self.pool])
 
-    def _log_prior(self, taken: Sequence[Taken]) -> float:
+    def _log_prior(self, taken: Sequence[Member]) -> float:
         """Log odds of a set, before the recordings are looked at."""
         own = [self.pool[t.hypothesis] for t in taken]
         return sum(h.prior_beside(sum(x.kind == h.kind for x in own[:k])) for k, h in enumerate(own))
 
-    def run(self, start: Sequence[Taken] = (), *, exchange: bool = True) -> tuple[float, list[Taken]]:
+    def run(self, start: Sequence[Member] = (), *, exchange: bool = True) -> tuple[float, list[Member]]:
         """The best set that moves from a start reach, and its log posterior.
 
         Members are added, and dropped, until neither helps; only then is each tried against what could replace it.
@@ -128,25 +128,25 @@ class Search:
                 return best, taken
             best, taken = value, move
 
-    def _highest(self, moves: Sequence[list[Taken]]) -> tuple[float, list[Taken]]:
+    def _highest(self, moves: Sequence[list[Member]]) -> tuple[float, list[Member]]:
         """The move to the best set."""
         return max(((self.total(m), m) for m in moves), key=lambda pair: pair[0], default=(-np.inf, []))
 
-    def _best(self, taken: Sequence[Taken], count: int) -> list[Taken]:
+    def _best(self, taken: Sequence[Member], count: int) -> list[Member]:
         """The hypotheses with the highest odds on top of a set, which does not have them."""
         odds = self.scan(taken).odds.copy()
         odds[[t.hypothesis for t in taken] + sorted(self.barred)] = -np.inf
         return [self.take(taken, int(h)) for h in np.argsort(-odds)[:count] if np.isfinite(odds[h])]
 
-    def take(self, taken: Sequence[Taken], h: int) -> Taken:
+    def take(self, taken: Sequence[Member], h: int) -> Member:
         """A hypothesis at its best on top of a set."""
         rows = self.scan(taken)
-        plain = Taken(h, int(rows.item[h]), float(rows.size[h]), 0.0)
+        plain = Member(h, int(rows.item[h]), float(rows.size[h]), 0.0)
         gained = self.members([*taken, plain]).value - self.members(taken).value
         prior = self.pool[h].prior_beside(sum(self.pool[t.hypothesis].kind == self.pool[h].kind for t in taken))
         return replace(plain, offset=float(rows.odds[h]) - prior - gained)
 
-    def answer(self) -> list[Slot]:
+    def answer(self) -> list[MemberOdds]:
         """The best set from two starts, nothing and the best nameless curve, and the rivals of each member."""
         if not self.pool:
             return []
@@ -159,7 +159,7 @@ class Search:
         _, taken = max(found, key=lambda pair: pair[0])
         return [self.slot(taken, k) for k in range(len(taken))]
 
-    def slot(self, taken: Sequence[Taken], k: int) -> Slot:
+    def slot(self, taken: Sequence[Member], k: int) -> MemberOdds:
         """A member of a set, and who could stand in its place."""
         taken = list(taken)
         rest = taken[:k] + taken[k + 1 :]
@@ -167,8 +167,8 @@ class Search:
         odds = rows.odds.copy()
         odds[[t.hypothesis for t in rest] + sorted(self.barred)] = -np.inf
         both = np.append(odds, 0.0)
-        return Slot(taken[k], float(rows.gain[taken[k].hypothesis]), odds, np.exp(both - logsumexp(both)))
+        return MemberOdds(taken[k], float(rows.gain[taken[k].hypothesis]), odds, np.exp(both - logsumexp(both)))
 
 
-def _key(taken: Sequence[Taken]) -> frozenset[tuple[int, float]]:
+def _key(taken: Sequence[Member]) -> frozenset[tuple[int, float]]:
     return frozenset((t.item, t.size) for t in taken)

@@ -7,10 +7,10 @@ import numpy as np
 
 from ..deciding import TOLERANCES
 from ..nuisance.noise import Noise
-from .arm import Weighed
+from .arm import WeighedRecordings
 from .evidence import Evidence
-from .projected import Projected
-from .search import Search, Slot, Taken
+from .projected import ProjectedEvidence
+from .search import Member, MemberOdds, Search
 
 
 @dataclass(frozen=True)
@@ -19,13 +19,13 @@ class _Best:
 
     value: float
     search: Search
-    taken: tuple[Taken, ...]
+    taken: tuple[Member, ...]
     tolerance: float
 
 
 def searched(
-    weighed: Weighed, recordings: Sequence[int], barred: Collection[str], channels: Collection[int]
-) -> tuple[Weighed, Search, list[Slot], float]:
+    weighed: WeighedRecordings, recordings: Sequence[int], barred: Collection[str], channels: Collection[int]
+) -> tuple[WeighedRecordings, Search, list[MemberOdds], float]:
     """The best set of explanations of some recordings, with the noise and the tolerance of the masses that go with it.
 
     Chosen before the search, a wide tolerance would take a payload in; without any, it would be named a payload. So
@@ -44,7 +44,9 @@ def searched(
     return weighed, best.search, best.search.answer(), best.tolerance
 
 
-def _chosen(weighed: Weighed, c: int, best: _Best, recordings: Sequence[int], barred: Collection[str]) -> Weighed:
+def _chosen(
+    weighed: WeighedRecordings, c: int, best: _Best, recordings: Sequence[int], barred: Collection[str]
+) -> WeighedRecordings:
     """The noise of one channel that is likeliest beside the best set of explanations of that channel by itself."""
     changes = _others(weighed, c, best)
     if not changes:
@@ -54,7 +56,7 @@ def _chosen(weighed: Weighed, c: int, best: _Best, recordings: Sequence[int], ba
     weight = weighed.beside.weight(best.tolerance)[always]
 
     def value(evidence: Evidence, noise: Noise) -> float:
-        search = Search(Projected(evidence, recordings, weight), pool, out)
+        search = Search(ProjectedEvidence(evidence, recordings, weight), pool, out)
         return noise.log_prior + search.on.null + (search.run((), exchange=False)[0] if pool else 0.0)
 
     own = weighed.noises[c]
@@ -68,7 +70,7 @@ def _chosen(weighed: Weighed, c: int, best: _Best, recordings: Sequence[int], ba
     return weighed.with_noise(c, own, alone) if most > first else weighed
 
 
-def _others(weighed: Weighed, c: int, best: _Best) -> list[Callable[[Noise], Noise]]:
+def _others(weighed: WeighedRecordings, c: int, best: _Best) -> list[Callable[[Noise], Noise]]:
     """Changes of a channel's noise that are worth a try, one after the other."""
     own, evidence = weighed.noises[c], weighed.evidence
     changes: list[Callable[[Noise], Noise]] = [lambda x: replace(x, wander=0.0)] if own.wander else []
@@ -81,10 +83,12 @@ def _others(weighed: Weighed, c: int, best: _Best) -> list[Callable[[Noise], Noi
     return changes
 
 
-def _best(weighed: Weighed, recordings: Sequence[int], barred: Collection[str], tolerance: float) -> _Best:
+def _best(weighed: WeighedRecordings, recordings: Sequence[int], barred: Collection[str], tolerance: float) -> _Best:
     """The best set that simple moves reach from nothing."""
     out = {h for h, x in enumerate(weighed.pool) if x.key in barred}
-    search = Search(Projected(weighed.evidence, recordings, weighed.beside.weight(tolerance)), weighed.pool, out)
+    search = Search(
+        ProjectedEvidence(weighed.evidence, recordings, weighed.beside.weight(tolerance)), weighed.pool, out
+    )
     gained, taken = search.run((), exchange=False) if weighed.pool else (0.0, [])
     prior = sum(x.log_prior for x in weighed.noises)
     return _Best(prior + search.on.null + gained, search, tuple(taken), tolerance)

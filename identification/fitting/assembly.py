@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ...models.axes import Place, place
 from ...models.effect import Parameter, written_unit
-from ...models.model import Placed
+from ...models.model import PlacedEffect
 from ...models.tree import Tree
 from .base_parameters import INERTIAL, BaseParameters
 from .effect_terms import contributions
@@ -33,7 +33,7 @@ KEPT = 3
 
 
 @dataclass(frozen=True)
-class Slot:
+class FreeParameter:
     """One free parameter: what it belongs to, its unit, bounds and start."""
 
     effect: str
@@ -64,7 +64,7 @@ class Block:
 
 
 @dataclass(frozen=True)
-class Evaluation:
+class TorqueEvaluation:
     """A model evaluated along one recording.
 
     ``load`` (n, J) is the rigid-body torque, ``tau`` (n, J) the modelled readings; ``passed`` holds, for each channel
@@ -77,13 +77,13 @@ class Evaluation:
     passed: dict[int, list[Callable[[Array], Array]]]
 
 
-class Assembly:
+class TorqueModel:
     """Parameters of a model, in one order, and the torque they give.
 
     Parameters
     ----------
     tree : Tree
-    placed : sequence of Placed
+    placed : sequence of PlacedEffect
         Effects and where they act.
     base : BaseParameters or None
         Identified base inertial parameters; None trusts the tree's.
@@ -96,7 +96,7 @@ class Assembly:
     def __init__(
         self,
         tree: Tree,
-        placed: Sequence[Placed],
+        placed: Sequence[PlacedEffect],
         base: BaseParameters | None,
         scales: Mapping[str, Scales],
         values: Mapping[str, float],
@@ -114,10 +114,10 @@ class Assembly:
                 for name, value in zip(INERTIAL, link.phi, strict=True)
             ]
         )
-        slots: list[Slot] = []
+        slots: list[FreeParameter] = []
         if base is not None:
             for (link, name, _), unit, value in zip(base.names, base.units, base.matrix @ self.phi, strict=True):
-                slots.append(Slot("inertia", link, name, unit, -np.inf, np.inf, float(value)))
+                slots.append(FreeParameter("inertia", link, name, unit, -np.inf, np.inf, float(value)))
         self._full: list[Array] = []
         self._free: list[NDArray[np.bool_]] = []
         self._index: list[NDArray[np.int_]] = []
@@ -134,7 +134,9 @@ class Assembly:
                 if is_free:
                     low, high = self.bounds(p, x)
                     unit = self.unit(p, x)
-                    slots.append(Slot(p.effect.name, p.at, x.name, unit, low, high, float(np.clip(start, low, high))))
+                    slots.append(
+                        FreeParameter(p.effect.name, p.at, x.name, unit, low, high, float(np.clip(start, low, high)))
+                    )
             self._full.append(full)
             self._free.append(free)
         self.slots = tuple(slots)
@@ -150,37 +152,37 @@ class Assembly:
         """
         return len(self._joints) == 1 and self.base is not None
 
-    def joint_of(self, p: Placed) -> int:
+    def joint_of(self, p: PlacedEffect) -> int:
         """Index of the joint that an effect's place belongs to; of an axis, the first of its joints."""
         link = self.tree.link_at(p.effect.at, p.at)
         return int(self.place_of(p).channels[0]) if link is None else link
 
-    def place_of(self, p: Placed) -> Place:
+    def place_of(self, p: PlacedEffect) -> Place:
         """The joint, or the axis, that an effect acts at, or whose channel it reads."""
         return place(self.tree, p.at.removeprefix("tau.").removeprefix("q."))
 
-    def _own(self, p: Placed) -> str:
+    def _own(self, p: PlacedEffect) -> str:
         """Name of the joint or axis whose scales an effect refers to."""
         return p.at if p.at in self.scales else self._joints[self.joint_of(p)]
 
-    def speed_scale(self, p: Placed) -> float:
+    def speed_scale(self, p: PlacedEffect) -> float:
         """Peak speed that an effect's law refers to [rad/s or m/s]."""
         return self._speeds[self._own(p)]
 
-    def scale(self, p: Placed, parameter: Parameter) -> float:
+    def scale(self, p: PlacedEffect, parameter: Parameter) -> float:
         """What a parameter's bounds and grid are multiples of at this place."""
         return self.scales[self._own(p)].of(parameter.relative_to)
 
-    def bounds(self, p: Placed, parameter: Parameter) -> tuple[float, float]:
+    def bounds(self, p: PlacedEffect, parameter: Parameter) -> tuple[float, float]:
         """Physical bounds of a parameter at a place."""
         scale = self.scale(p, parameter)
         return parameter.low * scale, parameter.high * scale
 
-    def unit(self, p: Placed, parameter: Parameter) -> str:
+    def unit(self, p: PlacedEffect, parameter: Parameter) -> str:
         """A parameter's unit with the joint's torque and position units written out."""
         return written_unit(parameter.unit, self.tree.joints[self.joint_of(p)].kind, p.at)
 
-    def usual(self, p: Placed, parameter: Parameter) -> float:
+    def usual(self, p: PlacedEffect, parameter: Parameter) -> float:
         """Start of a parameter: middle of its grid, or the value at which the effect vanishes."""
         if parameter.grid:
             return parameter.grid[len(parameter.grid) // 2] * self.scale(p, parameter)
@@ -195,9 +197,9 @@ class Assembly:
             for x, value in zip(p.effect.parameters, self.parameters(k, theta), strict=True)
         }
 
-    def keep(self, placed: Sequence[Placed], theta: Array) -> "Assembly":
-        """The same model with only some of its effects, to start from where it is."""
-        kept = Assembly(self.tree, placed, self.base, self.scales, self.values(theta))
+    def keep(self, placed: Sequence[PlacedEffect], theta: Array) -> "TorqueModel":
+        """This model with only some of its effects, started from its values."""
+        kept = TorqueModel(self.tree, placed, self.base, self.scales, self.values(theta))
         kept.phi = self.phi
         return kept
 
@@ -207,7 +209,7 @@ class Assembly:
         full[self._free[k]] = theta[self._index[k]]
         return full
 
-    def index_of(self, p: Placed) -> NDArray[np.int_]:
+    def index_of(self, p: PlacedEffect) -> NDArray[np.int_]:
         """Positions in theta of a placed effect's free parameters."""
         return self._index[[x.key for x in self.placed].index(p.key)]
 
@@ -228,9 +230,9 @@ class Assembly:
             banded.append(Block(block.channel, block.index, columns))
         return experiment.measured - experiment.all_to_band(state.tau), banded
 
-    def evaluate(self, experiment: Experiment, theta: Array) -> Evaluation:
+    def evaluate(self, experiment: Experiment, theta: Array) -> TorqueEvaluation:
         """Rigid-body torque, readings and derivative blocks at full rate; the last few are kept with the recording."""
-        kept: list[tuple[Assembly, bytes, Evaluation]] = experiment.store.setdefault("evaluated", [])
+        kept: list[tuple[TorqueModel, bytes, TorqueEvaluation]] = experiment.store.setdefault("evaluated", [])
         key = theta.tobytes() + self.phi.tobytes()
         for other, at, found in kept:
             if other is self and at == key:
@@ -240,7 +242,7 @@ class Assembly:
         del kept[:-KEPT]
         return found
 
-    def _evaluate(self, experiment: Experiment, theta: Array) -> Evaluation:
+    def _evaluate(self, experiment: Experiment, theta: Array) -> TorqueEvaluation:
         load, rigid = self._rigid(experiment, theta)
         tau, blocks = load.copy("F"), list(rigid)
         passed: dict[int, list[Callable[[Array], Array]]] = {}
@@ -264,9 +266,9 @@ class Assembly:
                 if not self._free[k].any():
                     continue  # all of it is held
                 blocks.append(Block(channel, self._index[k], columns[:, self._free[k]]))
-        return Evaluation(load, tau, blocks, passed)
+        return TorqueEvaluation(load, tau, blocks, passed)
 
-    def _through_load(self, p: Placed, by_load: Array, rigid: Sequence[Block]) -> list[Block]:
+    def _through_load(self, p: PlacedEffect, by_load: Array, rigid: Sequence[Block]) -> list[Block]:
         """Derivative blocks of a torque that follows the load of its place: by_load (n,), of what gives the load."""
         here = self.place_of(p)
         return [

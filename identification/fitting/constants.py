@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...models.effect import Effect, Parameter, Symbols
-from ...models.model import Model, Placed
+from ...models.model import Model, PlacedEffect
 from ...models.rigid_body import RigidBody
 from ...models.servo import Servo
 from ...recordings.columns import split_header
@@ -65,13 +65,13 @@ def with_constants(
         if joint in servos:
             servo = servos[joint]
             stiffness = nominal[joint] if servo.stiffness is None else servo.stiffness
-            place = Placed(_servo(), joint, _held(model, joint, servo))
+            place = PlacedEffect(_servo(), joint, _held(model, joint, servo))
             values |= {f"{place.key}.damping": servo.damping or 0.0}
             notes += _shared(model, joint, servo)
             servos[joint] = replace(servo, stiffness=stiffness)
         elif joint in nominal:
             stiffness = nominal[joint]
-            place = Placed(_gain(_per(model, datasets[0], name)), name, ("nominal",))
+            place = PlacedEffect(_gain(_per(model, datasets[0], name)), name, ("nominal",))
             signals[name] = replace(signals[name], gain=stiffness)
         else:
             continue

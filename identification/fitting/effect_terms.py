@@ -10,7 +10,7 @@ from scipy.signal import fftconvolve
 from ...models.axes import Place, place
 from ...models.effect import Effect
 from ...models.hidden_state import evaluate_law, rows
-from ...models.model import Placed
+from ...models.model import PlacedEffect
 from ...models.rig.points import far_end
 from ...models.rig.rig import Rig
 from ...models.tree import Tree
@@ -27,7 +27,7 @@ _RESPONSE = 512
 def contributions(
     experiment: Experiment,
     tree: Tree,
-    placed: Placed,
+    placed: PlacedEffect,
     joint: int,
     load: Array,
     reading: Array,
@@ -43,7 +43,7 @@ def contributions(
     experiment : Experiment
         n samples, J joints.
     tree : Tree
-    placed : Placed
+    placed : PlacedEffect
     joint : int
         The joint of the effect's place; of an axis, the first.
     load, reading : array (n, J)

@@ -82,7 +82,7 @@ class Experiment:
         return np.full(self.measured.shape[1], len(self.measured)) if self.kept is None else self.kept.sum(axis=0)
 
     def with_bridges(self, bridges: tuple[Bridge, ...], kept: NDArray[np.bool_] | None) -> "Experiment":
-        """The same recording with runs of samples that are no data; what the rigid body gave is not worked out anew."""
+        """This recording with runs of samples that are no data. The rigid body's results are kept."""
         made = replace(self, store={}, bridged=bridges, kept=kept)
         shared = ("regressor", "mass_matrix", "tangent", "carried", "elapsed")
         made.__dict__.update({name: getattr(self, name) for name in shared})

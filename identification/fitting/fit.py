@@ -1,8 +1,8 @@
 """Joint fit of all parameters to all recordings: weighted least squares in the analysis band, with covariance.
 
 Output error in torque: measured torque minus the model's along the measured motion, each channel weighted by its own
-residual (iteratively reweighted). The covariance is the sandwich over half-second clusters, because what is left over
-is never white (White 1980; Liang & Zeger 1986).
+residual (iteratively reweighted). The covariance is the sandwich over half-second clusters, because the residual is
+never white (White 1980; Liang & Zeger 1986).
 """
 
 from collections.abc import Callable, Sequence
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .assembly import Assembly
+from .assembly import TorqueModel
 from .experiment import Experiment
 from .problem import Problem, split
 from .starts import best_start
@@ -34,7 +34,7 @@ class Fit:
 
     Parameters
     ----------
-    assembly : Assembly
+    assembly : TorqueModel
     theta, std : array (P,)
         Parameters in the assembly's order and their standard deviations; inf where the data say nothing.
     covariance : array (P, P)
@@ -48,7 +48,7 @@ class Fit:
         Starts tried where most were needed, and how many of them reached the best cost there (within 0.1 %).
     """
 
-    assembly: Assembly
+    assembly: TorqueModel
     theta: Array
     std: Array
     covariance: Array
@@ -60,7 +60,7 @@ class Fit:
 
 
 def fit(
-    assembly: Assembly,
+    assembly: TorqueModel,
     experiments: Sequence[Experiment],
     *,
     start: Array | None = None,
@@ -72,7 +72,7 @@ def fit(
 
     Parameters
     ----------
-    assembly : Assembly
+    assembly : TorqueModel
     experiments : sequence of Experiment
     start : array (P,), optional
         Where to start; the assembly's own start otherwise.
@@ -103,7 +103,7 @@ def fit(
     return Fit(assembly, theta, std, covariance, sigma, condition, at_bound, starts, agreed)
 
 
-def channel_rms(assembly: Assembly, experiments: Sequence[Experiment], theta: Array) -> tuple[Array, Array]:
+def channel_rms(assembly: TorqueModel, experiments: Sequence[Experiment], theta: Array) -> tuple[Array, Array]:
     """RMS residual and RMS measurement of every channel in the analysis band, each (J,), over samples that count.
 
     Of a channel that is silent in all, the largest measurement of the others stands for its own; of one that nothing
@@ -134,7 +134,7 @@ def _reweighted(problem: Problem, theta: Array, sigma: Array) -> Array:
 
 
 def _covariance(
-    assembly: Assembly, experiments: Sequence[Experiment], theta: Array, sigma: Array
+    assembly: TorqueModel, experiments: Sequence[Experiment], theta: Array, sigma: Array
 ) -> tuple[Array, Array, float]:
     """Cluster-robust covariance (P, P), standard deviations (P,), and the condition number of the scaled Jacobian.
 

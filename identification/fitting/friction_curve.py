@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ...models.axes import Place, place
 from ...models.hidden_state import evaluate_law, reads
-from ...models.model import Placed
+from ...models.model import PlacedEffect
 from ..diagnosis import FrictionCurve
 from .experiment import Experiment
 from .fit import Fit
@@ -23,7 +23,7 @@ POINTS = 61
 def friction_curves(found: Fit, experiments: list[Experiment] | tuple[Experiment, ...]) -> list[FrictionCurve]:
     """Curve of every place whose friction depends on speed alone, over the speeds of the recordings."""
     assembly = found.assembly
-    places: dict[tuple[str, str], list[tuple[int, Placed]]] = {}
+    places: dict[tuple[str, str], list[tuple[int, PlacedEffect]]] = {}
     for k, p in enumerate(assembly.placed):
         friction = p.effect.family == "joint friction" or p.effect.at == "slide"
         if friction and not p.effect.states and set(reads(p.effect)) <= {"qd", "speed_scale"}:

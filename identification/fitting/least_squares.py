@@ -3,7 +3,7 @@
 One pass over the samples gives cost, gradient and normal matrix; the (n_samples, n_parameters) Jacobian need never
 stand in memory at once, which is what makes it quicker than a general solver where samples are many and parameters few
 (Levenberg 1944; Marquardt 1963). Where residuals stay large, the curvature that the normal matrix lacks is learnt from
-the steps, and used while it foretells them better. Bounds are kept by solving each step's quadratic program (Stark &
+the steps, and used while it predicts them better. Bounds are kept by solving each step's quadratic program (Stark &
 Parker 1995, BVLS).
 """
 
@@ -21,7 +21,7 @@ _GROWTH = 10.0
 
 
 @dataclass(frozen=True)
-class Normal:
+class NormalEquations:
     """Cost ½‖r‖², its gradient Jᵀr (n_parameters,), and the normal matrix JᵀJ (n_parameters, n_parameters)."""
 
     cost: float
@@ -40,7 +40,7 @@ class Objective:
     low, high : array (n_parameters,)
     """
 
-    normal: Callable[[Array], Normal]
+    normal: Callable[[Array], NormalEquations]
     low: Array
     high: Array
 
@@ -50,7 +50,7 @@ class Solution:
     """Where the search ended: parameters, the normal equations there, steps taken, and whether it settled."""
 
     theta: Array
-    normal: Normal
+    normal: NormalEquations
     steps: int
     settled: bool
 
@@ -91,7 +91,7 @@ def minimise(
     for step in range(1, max_steps + 1):
         # The largest influence so far (Moré 1978): a parameter that loses its influence stays, it does not run away.
         scale = np.maximum(scale, np.sqrt(np.diag(here.matrix)))
-        model = Normal(here.cost, here.gradient, here.matrix + bend) if bent else here
+        model = NormalEquations(here.cost, here.gradient, here.matrix + bend) if bent else here
         try:
             move = bounded_step(
                 model, scale, damping, np.maximum(low - theta, -stride), np.minimum(high - theta, stride)
@@ -136,7 +136,7 @@ def _secant(bend: Array, change: Array, matrix: Array, move: Array) -> Array:
     return share * bend + pair + pair.T - (miss @ move) * np.outer(change, change) / along**2
 
 
-def bounded_step(here: Normal, scale: Array, damping: float, low: Array, high: Array) -> Array:
+def bounded_step(here: NormalEquations, scale: Array, damping: float, low: Array, high: Array) -> Array:
     """Minimise the quadratic model of the cost, damped by ``damping * scale**2``, between bounds on the step.
 
     Parameters with ``scale`` 0 (no influence) or with ``low == high`` stay where they are.

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...models.hidden_state import rows
-from ...models.model import Placed
+from ...models.model import PlacedEffect
 from ...models.rig.kinematics import reached_joints
 from ...models.rig.rig import Rig
-from .assembly import Assembly, Block
+from .assembly import Block, TorqueModel
 from .experiment import Experiment
-from .least_squares import Normal, Objective, Solution
+from .least_squares import NormalEquations, Objective, Solution
 from .projection import minimise_projected
 from .rig_terms import PLACES
 
@@ -32,7 +32,7 @@ class Problem:
 
     Parameters
     ----------
-    assembly : Assembly
+    assembly : TorqueModel
         With the effects that reach these channels only; P parameters.
     experiments : tuple of Experiment
     channels : array (C,) of int
@@ -40,7 +40,7 @@ class Problem:
         Where its parameters stand in the whole model's.
     """
 
-    assembly: Assembly
+    assembly: TorqueModel
     experiments: tuple[Experiment, ...]
     channels: Index
     index: Index
@@ -89,7 +89,7 @@ class Problem:
             residual = experiment.measured[:, channel] - experiment.to_band(state.tau[:, channel], channel)
             yield residual, index, columns.reshape(len(residual), len(index))
 
-    def normal(self, theta: Array, sigma: Array) -> Normal:
+    def normal(self, theta: Array, sigma: Array) -> NormalEquations:
         """Cost, gradient and normal matrix, channels weighted by 1 / sigma (C,); inf where torque is not finite."""
         size = len(theta)
         cost, gradient, matrix = 0.0, np.zeros(size), np.zeros((size, size))
@@ -102,7 +102,7 @@ class Problem:
                         gradient[index] -= columns.T @ residual / s**2
                         matrix[np.ix_(index, index)] += columns.T @ columns / s**2
         finite = np.isfinite(cost) and np.isfinite(gradient).all() and np.isfinite(matrix).all()
-        return Normal(cost if finite else np.inf, gradient, matrix)
+        return NormalEquations(cost if finite else np.inf, gradient, matrix)
 
     def rms(self, theta: Array) -> Array:
         """RMS residual of each of its channels in the analysis band (C,)."""
@@ -126,7 +126,7 @@ def gather(blocks: Sequence[Block], channel: int) -> tuple[Index, Array]:
     return unique, columns @ np.eye(len(unique))[inverse]
 
 
-def reached(assembly: Assembly, p: Placed) -> tuple[int, ...]:
+def reached(assembly: TorqueModel, p: PlacedEffect) -> tuple[int, ...]:
     """Channels that a placed effect can change."""
     tree = assembly.tree
     if p.effect.at in PLACES:
@@ -139,7 +139,7 @@ def reached(assembly: Assembly, p: Placed) -> tuple[int, ...]:
     return tuple(int(c) for c in assembly.place_of(p).channels)
 
 
-def split(assembly: Assembly, experiments: Sequence[Experiment], theta: Array) -> list[Problem]:
+def split(assembly: TorqueModel, experiments: Sequence[Experiment], theta: Array) -> list[Problem]:
     """Cut a model's fit into problems that share no parameter; channels without any parameter are left out."""
     blocks = assembly.evaluate(experiments[0], theta).blocks
     label = np.arange(len(assembly.tree.joints))
@@ -156,7 +156,7 @@ def split(assembly: Assembly, experiments: Sequence[Experiment], theta: Array) -
     return problems
 
 
-def _part(assembly: Assembly, channels: Index, theta: Array) -> Assembly:
+def _part(assembly: TorqueModel, channels: Index, theta: Array) -> TorqueModel:
     """The model with only what reaches some channels."""
     placed = [p for p in assembly.placed if not set(reached(assembly, p)).isdisjoint(channels)]
     return assembly.keep(placed, theta)

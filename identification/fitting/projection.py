@@ -3,13 +3,13 @@
 The search runs over the shape parameters s alone; for every s the amplitudes a are solved between their bounds. Where
 amplitude and shape trade off along a curved valley, as they do in friction curves, this gets to the end where a search
 over both crawls (Golub & Pereyra 1973). A step is Kaufman's (1975): the Schur complement of the normal equations.
-Amplitudes for a new s are foretold to first order, so that a point takes one pass over the samples or two.
+Amplitudes for a new s are predicted to first order, so that a point takes one pass over the samples or two.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .least_squares import Normal, Objective, Solution, bounded_step, minimise
+from .least_squares import NormalEquations, Objective, Solution, bounded_step, minimise
 
 Array = NDArray[np.float64]
 
@@ -45,10 +45,10 @@ def minimise_projected(
     def scaled(values: Array) -> Array:
         return np.where(positive, np.log(np.where(positive, values, 1.0)), values)
 
-    def normal(coordinates: Array) -> Normal:
+    def normal(coordinates: Array) -> NormalEquations:
         power = np.exp(np.where(positive, coordinates, 0.0))
         reduced = search(np.clip(np.where(positive, power, coordinates), low, high))
-        return Normal(reduced.cost, reduced.gradient * power, reduced.matrix * np.outer(power, power))
+        return NormalEquations(reduced.cost, reduced.gradient * power, reduced.matrix * np.outer(power, power))
 
     found = minimise(
         Objective(normal, scaled(low), scaled(high)),
@@ -63,7 +63,7 @@ def minimise_projected(
 
 def project(
     objective: Objective, theta: Array, shapes: NDArray[np.bool_], scale: Array | float = 0.0
-) -> tuple[Array, float, Normal]:
+) -> tuple[Array, float, NormalEquations]:
     """Solve the amplitudes, shapes held: parameters (n_parameters,), cost there, normal equations at ``theta``.
 
     ``scale`` is the most influence that each parameter is known to have: one that lost nearly all of it stays.
@@ -82,25 +82,25 @@ class _Search:
 
     def __init__(self, objective: Objective, start: Array, shapes: NDArray[np.bool_]) -> None:
         self._objective, self._shapes = objective, shapes
-        self.theta, self.here = start, Normal(np.inf, np.zeros(len(start)), np.zeros((len(start), len(start))))
+        self.theta, self.here = start, NormalEquations(np.inf, np.zeros(len(start)), np.zeros((len(start), len(start))))
         self._follow = np.zeros((len(start), np.count_nonzero(shapes)))
         self._scale = np.zeros(len(start))
 
-    def __call__(self, shape: Array) -> Normal:
-        foretold = self.theta + self._follow @ (shape - self.theta[self._shapes])
-        foretold[self._shapes] = shape
+    def __call__(self, shape: Array) -> NormalEquations:
+        forecast = self.theta + self._follow @ (shape - self.theta[self._shapes])
+        forecast[self._shapes] = shape
         low, high = self._objective.low, self._objective.high
-        foretold = np.clip(foretold, low, high)
-        theta, cost, here = project(self._objective, foretold, self._shapes, self._scale)
+        forecast = np.clip(forecast, low, high)
+        theta, cost, here = project(self._objective, forecast, self._shapes, self._scale)
         if not np.isfinite(cost):
-            return Normal(np.inf, np.zeros(len(shape)), np.zeros((len(shape), len(shape))))
+            return NormalEquations(np.inf, np.zeros(len(shape)), np.zeros((len(shape), len(shape))))
         self._scale = np.maximum(self._scale, np.sqrt(np.diag(here.matrix)))
         progress = self.here.cost - cost if np.isfinite(self.here.cost) else 0.0
         if here.cost - cost > WORTH_A_PASS * abs(progress):
             there = self._objective.normal(theta)
-            theta, here = (theta, there) if there.cost < here.cost else (foretold, here)
+            theta, here = (theta, there) if there.cost < here.cost else (forecast, here)
         else:
-            theta = foretold
+            theta = forecast
         free = ~self._shapes & (theta > low) & (theta < high)
         reduced, follow = _schur(here, free, self._shapes, self._scale)
         if here.cost < self.here.cost:
@@ -110,7 +110,9 @@ class _Search:
         return reduced
 
 
-def _schur(here: Normal, free: NDArray[np.bool_], shapes: NDArray[np.bool_], scale: Array) -> tuple[Normal, Array]:
+def _schur(
+    here: NormalEquations, free: NDArray[np.bool_], shapes: NDArray[np.bool_], scale: Array
+) -> tuple[NormalEquations, Array]:
     """Normal equations of the shapes with free amplitudes following, and how they follow (n_free, n_shapes)."""
     scale = np.where(scale > 0, scale, np.inf)[free]  # amplitudes without influence stay
     own = here.matrix[np.ix_(free, free)] / np.outer(scale, scale) + _RIDGE * np.eye(len(scale))
@@ -121,4 +123,4 @@ def _schur(here: Normal, free: NDArray[np.bool_], shapes: NDArray[np.bool_], sca
     matrix = here.matrix[np.ix_(shapes, shapes)] - cross.T @ follow
     # Rounding must not turn a direction that amplitudes mimic wholly into one of negative curvature.
     matrix = matrix + 1e-12 * np.diag(np.diag(here.matrix)[shapes])
-    return Normal(here.cost, gradient, 0.5 * (matrix + matrix.T)), -follow / scale[:, None]
+    return NormalEquations(here.cost, gradient, 0.5 * (matrix + matrix.T)), -follow / scale[:, None]

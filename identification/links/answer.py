@@ -10,12 +10,13 @@ from ..diagnosis import ChannelFit, Diagnosis, Finding, Location, Step
 from ..fitting.experiment import Experiment
 from ..search.locate import locate
 from ..sources.answer import candidates, channel_fits, limits, rms, with_found
-from .diagnose import Compared
+from ..verdict import gravest
+from .diagnose import EncoderComparison
 from .findings import findings_of, length, nameless, noise_floor, notes_of, traces_of, unit_of
 from .source import Links
 
 
-def with_links(diagnosis: Diagnosis, model: Model, one: Compared) -> tuple[Diagnosis, Model]:
+def with_links(diagnosis: Diagnosis, model: Model, one: EncoderComparison) -> tuple[Diagnosis, Model]:
     """One answer from the torques' diagnosis and the encoders'.
 
     Effects are ordered by the share of its own channel's misfit that each kind of channel was told by what is named:
@@ -27,7 +28,7 @@ def with_links(diagnosis: Diagnosis, model: Model, one: Compared) -> tuple[Diagn
         Of the torques.
     model : Model
         With what the torques asked for.
-    one : Compared
+    one : EncoderComparison
 
     Returns
     -------
@@ -42,23 +43,21 @@ def with_links(diagnosis: Diagnosis, model: Model, one: Compared) -> tuple[Diagn
     # A constant difference of zeros explains nothing that moves, and comes last.
     offsets = tuple(f for f in findings if (f.name, f.at) in still)
     moving = tuple(f for f in findings if (f.name, f.at) not in still)
-    verdict, description = diagnosis.verdict, diagnosis.description
+    both, description = gravest(diagnosis.verdict, decided.verdict), diagnosis.description
     sentences, spoken_of = [diagnosis.sentence], diagnosis.foremost
     if findings:
         spoken_of = _foremost(fits).channel if first else spoken_of
         said = _sentence(moving, offsets, fits)
-        if verdict == "adequate":
+        if diagnosis.verdict == "adequate":
             sentences = ["The torques ask for nothing that these recordings can show."]
         sentences = [said, *sentences] if first else [*sentences, said]
-        verdict = "missing_physics"
-    elif nameless(one) and verdict != "missing_physics":
+    elif decided.left and both == "unknown_effect":
         description = "; ".join(filter(None, [description, nameless(one)]))
         sentences = [f"Something is missing that no effect of the vocabulary explains: {description}."]
-        verdict = "unknown_effect"
     steps, torques = _steps(one), diagnosis
     answer = replace(
         diagnosis,
-        verdict=verdict,
+        verdict=both,
         sentence=" ".join(sentences),
         description=description,
         effects=(*moving, *others, *offsets) if first else (*others, *moving, *offsets),
@@ -79,7 +78,7 @@ def _told(fits: Sequence[ChannelFit]) -> list[float]:
     return [max(0.0, 1 - (f.holdout.rms_after / max(f.holdout.rms_before, 1e-300)) ** 2) for f in fits]
 
 
-def _fits(one: Compared) -> tuple[ChannelFit, ...]:
+def _fits(one: EncoderComparison) -> tuple[ChannelFit, ...]:
     links, every = one.links, range(len(one.links.joints))
     sizes = _readings(links, links.train), _readings(links, links.held)
     units, floors = [unit_of(links, c) for c in every], [noise_floor(links, c) for c in every]
@@ -120,7 +119,7 @@ def _sentence(moving: Sequence[Finding], offsets: Sequence[Finding], fits: Seque
     )
 
 
-def _location(diagnosis: Diagnosis, one: Compared, fits: Sequence[ChannelFit]) -> tuple[Location, ...]:
+def _location(diagnosis: Diagnosis, one: EncoderComparison, fits: Sequence[ChannelFit]) -> tuple[Location, ...]:
     """Channels by the share of their own misfit that is told; torques and encoders have no unit in common."""
     told = dict(zip((f.channel for f in diagnosis.fit), _told(diagnosis.fit), strict=True))
     places = [(told[p.channel], p) for p in diagnosis.location if told.get(p.channel, 0.0) > 0]
@@ -142,7 +141,7 @@ def _location(diagnosis: Diagnosis, one: Compared, fits: Sequence[ChannelFit]) -
     return tuple(replace(p, share=float(share / total) * (1 - 1e-12)) for share, p in places)
 
 
-def _steps(one: Compared) -> list[Step]:
+def _steps(one: EncoderComparison) -> list[Step]:
     """Relative misfit of the encoders, each effect's name added at all its joints at once."""
     sizes = [_readings(one.links, numbers) for numbers in (one.links.train, one.links.held)]
     return [

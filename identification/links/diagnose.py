@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from ...models.model import Model
 from ...models.rigid_body import RigidBody
 from ...recordings.part import several
-from ..fitting.assembly import Assembly
+from ..fitting.assembly import TorqueModel
 from ..fitting.experiment import Experiment, Scales
-from ..sources.decide import Decided, decide
+from ..sources.decide import Decision, decide
 from ..sources.fit import fit, residuals
-from ..sources.source import Linear
+from ..sources.source import Linearisation
 from ..sources.weigh import covariances
 from .run import load_links
 from .source import Links, links_of, start
@@ -23,13 +23,13 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Compared:
+class EncoderComparison:
     """Encoders, what was decided, the fits after each name's effect was added (training, held out), and the training
     recordings with link less motor position in place of torque."""
 
     links: Links
-    decided: Decided
-    stages: tuple[tuple[str, Linear, Linear], ...]
+    decided: Decision
+    stages: tuple[tuple[str, Linearisation, Linearisation], ...]
     train: tuple[Experiment, ...]
 
 
@@ -38,13 +38,13 @@ def diagnose_links(
     recordings: Sequence[str | Path],
     holdout: str | Path | Sequence[str | Path],
     body: RigidBody,
-    assembly: Assembly,
+    assembly: TorqueModel,
     theta: Array,
     scales: Mapping[str, Scales],
     band: float,
     *,
     progress: Callable[[str], None] = lambda _: None,
-) -> Compared | None:
+) -> EncoderComparison | None:
     """Diagnose the joints that have a second encoder in all recordings; None where none has.
 
     Parameters
@@ -52,7 +52,7 @@ def diagnose_links(
     model : Model
     recordings, holdout : paths
     body : RigidBody
-    assembly, theta : Assembly, array (P,)
+    assembly, theta : TorqueModel, array (P,)
         Of the torques: their rigid-body part loads the drives.
     scales : mapping of str to Scales
     band : float
@@ -68,10 +68,10 @@ def diagnose_links(
         return None
     links = links_of(joints, model, train, held, assembly, theta, scales)
     decided = decide(links, start(links, model), lambda text: progress(f"link encoders: {text}"))
-    return Compared(links, decided, tuple(stages(links, decided)), tuple(train))
+    return EncoderComparison(links, decided, tuple(stages(links, decided)), tuple(train))
 
 
-def stages(links: Links, decided: Decided) -> list[tuple[str, Linear, Linear]]:
+def stages(links: Links, decided: Decision) -> list[tuple[str, Linearisation, Linearisation]]:
     """Fits after each effect is added at all its joints, every parameter fitted again; the first as given."""
     best, noise = decided.best, covariances(decided.found.weighed)
     found = [("link encoders as given", decided.found.first, decided.before)]
@@ -82,7 +82,7 @@ def stages(links: Links, decided: Decided) -> list[tuple[str, Linear, Linear]]:
         if later:
             own = fit(links, decided.given, own.at.without(*later), noise)
             at = links.settled(own.at, links.held)
-            there = Linear(at, residuals(links, links.held, at), ())
+            there = Linearisation(at, residuals(links, links.held, at), ())
         at = [n.placed.at for n in best.names if n.placed.effect.name == name]
         found.append((f"+ {name} at {', '.join(at)}", own, there))
     return found

@@ -8,13 +8,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ...report.words import percent
 from ..diagnosis import Estimate, Finding, Rival, Trace
 from ..sources.answer import estimates, finding, not_confirmed, rms
-from ..sources.search import Name
-from ..sources.source import Linear
+from ..sources.search import Naming
+from ..sources.source import Linearisation
 from ..sources.weigh import covariances
-from ..wording import percent
-from .diagnose import Compared
+from .diagnose import EncoderComparison
 from .source import Links
 
 Array = NDArray[np.float64]
@@ -30,7 +30,7 @@ def unit_of(links: Links, c: int) -> str:
     return "m" if links.kinds[c] == "prismatic" else "rad"
 
 
-def findings_of(one: Compared) -> tuple[Finding, ...]:
+def findings_of(one: EncoderComparison) -> tuple[Finding, ...]:
     """What the held-out recordings miss most goes first; what adds the same at all times goes last."""
     links, best = one.links, one.decided.best
     values = estimates(links, one.decided.given, best.train, covariances(one.decided.found.weighed))
@@ -38,7 +38,7 @@ def findings_of(one: Compared) -> tuple[Finding, ...]:
     return tuple(_finding(one, n, values[n.placed.key]) for n in order)
 
 
-def _finding(one: Compared, n: Name, values: dict[str, Estimate]) -> Finding:
+def _finding(one: EncoderComparison, n: Naming, values: dict[str, Estimate]) -> Finding:
     links, p = one.links, n.placed
     c = links.channel(p)
     unit, joint = unit_of(links, c), links.joints[c]
@@ -60,8 +60,8 @@ def _finding(one: Compared, n: Name, values: dict[str, Estimate]) -> Finding:
     else:
         share = max(0.0, 1 - (within / max(without, 1e-300)) ** 2)
         text += (
-            f"it explains {percent(share)} of what motor and link encoder of {joint} differ by without it; taking it "
-            f"out again raises the difference left on the held-out recording from {length(within, unit)} to "
+            f"it explains {percent(share)} of the difference of motor and link encoder of {joint}. Without it, the "
+            f"remaining difference on the held-out recording rises from {length(within, unit)} to "
             f"{length(without, unit)}.{_twist(one, n)}"
         )
     # Of a fault that time does not tell apart, the two cannot say which of the two encoders is off.
@@ -71,7 +71,7 @@ def _finding(one: Compared, n: Name, values: dict[str, Estimate]) -> Finding:
     return finding(one.decided, n, values, text, 1 - (within / max(without, 1e-300)) ** 2, rivals)
 
 
-def _twist(one: Compared, n: Name) -> str:
+def _twist(one: EncoderComparison, n: Naming) -> str:
     """How far a drive twists, beside what it does not explain."""
     if n.placed.effect.acts_on != "position":
         return ""
@@ -97,7 +97,7 @@ def noise_floor(links: Links, c: int) -> float:
     return min(floors)
 
 
-def nameless(one: Compared) -> str:
+def nameless(one: EncoderComparison) -> str:
     """What has no name, in words; empty where there is nothing."""
     after = rms(one.decided.best.train)
     return "; ".join(
@@ -108,10 +108,10 @@ def nameless(one: Compared) -> str:
     )
 
 
-def traces_of(one: Compared) -> list[Trace]:
+def traces_of(one: EncoderComparison) -> list[Trace]:
     """How the encoders differ over time, measured, as given and after: for pictures."""
     links, decided = one.links, one.decided
-    sets: tuple[tuple[Literal["train", "holdout"], Sequence[int], Linear, Linear], ...] = (
+    sets: tuple[tuple[Literal["train", "holdout"], Sequence[int], Linearisation, Linearisation], ...] = (
         ("train", links.train, decided.found.first, decided.best.train),
         ("holdout", links.held, decided.before, decided.best.held),
     )
@@ -130,7 +130,7 @@ def traces_of(one: Compared) -> list[Trace]:
     return made
 
 
-def notes_of(one: Compared) -> list[str]:
+def notes_of(one: EncoderComparison) -> list[str]:
     """Zeros of every recording, and what was not named, in words."""
     links, best, notes = one.links, one.decided.best, []
     every = links.zeros(best.train.at)[list(links.train)], links.zeros(best.held.at)[list(links.held)]

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...models.hidden_state import evaluate_law
-from ...models.model import Model, Placed
+from ...models.model import Model, PlacedEffect
 from ...models.rigid_body import RigidBody
 from ...recordings.condition import Motion, condition
 from ..fitting.experiment import Experiment
@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class EncoderPair:
     """One joint in one recording: ``motion.tau`` holds link less motor position, ``load`` (n,) [N·m or N] the modelled
     rigid-body torque, ``inertia`` (n,) the joint's own entry of the mass matrix."""
 
@@ -43,7 +43,7 @@ class Run:
         """Link less motor position in the analysis band (n_band,)."""
         return self.motion.to_band(self.motion.tau[:, self.joint])
 
-    def term(self, placed: Placed, parameters: Array) -> tuple[Array, Array]:
+    def term(self, placed: PlacedEffect, parameters: Array) -> tuple[Array, Array]:
         """What an effect adds to the difference (n,), and its derivative by the effect's parameters (n, p)."""
         motion, j, effect = self.motion, self.joint, placed.effect
         q = motion.q[:, j]

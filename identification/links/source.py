@@ -16,17 +16,17 @@ from ...errors import InputError
 from ...models.effect import Parameter, written_unit
 from ...models.effects import effects, get_effect
 from ...models.hidden_state import reads
-from ...models.model import Model, Placed
+from ...models.model import Model, PlacedEffect
 from ...recordings import JointKind
 from ..deciding import BLOCK, LEAST_LEVEL, SIZES
 from ..evidence.confirm import FEWEST_BLOCKS
-from ..fitting.assembly import Assembly
+from ..fitting.assembly import TorqueModel
 from ..fitting.experiment import Experiment, Scales
 from ..nuisance.curve import Coordinates, family
-from ..nuisance.noise import Run as Hangs
+from ..nuisance.noise import NoiseChannel
 from ..nuisance.rest import SETTLES, STICKS, share
-from ..sources.source import At, Linear, Variant
-from .run import Run
+from ..sources.source import GridPoint, Linearisation, ModelPoint
+from .run import EncoderPair
 
 Array = NDArray[np.float64]
 
@@ -41,7 +41,7 @@ class Links:
         Of each.
     scales : sequence of Scales
         Of each in the training recordings, which bounds and grids refer to.
-    rows : sequence of sequences of Run
+    rows : sequence of sequences of EncoderPair
         Of recording i and joint c.
     n_train : int
     """
@@ -53,7 +53,7 @@ class Links:
         joints: Sequence[str],
         kinds: Sequence[JointKind],
         scales: Sequence[Scales],
-        rows: Sequence[Sequence[Run]],
+        rows: Sequence[Sequence[EncoderPair]],
         n_train: int,
     ) -> None:
         """Nothing is worked out yet."""
@@ -70,37 +70,37 @@ class Links:
         self._term = lru_cache(64 * self.n_shifts)(self._worked)
         self._curves: dict[tuple[int, str], list[Array]] = {}
 
-    def channel(self, p: Placed) -> int:
+    def channel(self, p: PlacedEffect) -> int:
         """The joint that an effect acts at, as a number."""
         return self.joints.index(p.at.removeprefix("q_link.").removeprefix("q."))
 
-    def term(self, i: int, p: Placed, parameters: Array) -> tuple[Array, Array]:
+    def term(self, i: int, p: PlacedEffect, parameters: Array) -> tuple[Array, Array]:
         """What an effect adds to its channel in the analysis band (n,), and its slopes (n, p)."""
         return self._term(i, self.channel(p), p.effect.name, p.at, tuple(map(float, parameters)))
 
     def _worked(self, i: int, c: int, name: str, at: str, parameters: tuple[float, ...]) -> tuple[Array, Array]:
         run = self.rows[i][c]
-        value, slopes = run.term(Placed(get_effect(name), at), np.array(parameters))
+        value, slopes = run.term(PlacedEffect(get_effect(name), at), np.array(parameters))
         whole = run.motion.to_band(np.concatenate([value[:, None], slopes], axis=1))
         return whole[:, 0], whole[:, 1:]
 
-    def zeros(self, at: At) -> Array:
+    def zeros(self, at: ModelPoint) -> Array:
         """Zeros of every recording and channel (recordings, c) [rad or m]."""
         return at.shifts.reshape(len(self.rows), -1) * self._zero
 
     def measured(self, i: int) -> Array:
         return self._measured[i]
 
-    def predicted(self, i: int, at: At) -> Array:
+    def predicted(self, i: int, at: ModelPoint) -> Array:
         found = np.tile(self.zeros(at)[i], (len(self._measured[i]), 1))
         for p in at.placed:
             found[:, self.channel(p)] += self.term(i, p, at.of_effect(p))[0]
         return found
 
     def refused(self, i: int) -> InputError:
-        return InputError(f"{self.rows[i][0].motion.path}: the encoders cannot be foretold")
+        return InputError(f"{self.rows[i][0].motion.path}: the encoders cannot be predicted")
 
-    def slopes(self, i: int, at: At, here: Array) -> Array:
+    def slopes(self, i: int, at: ModelPoint, here: Array) -> Array:
         found, k = np.zeros((*here.shape, len(at.values))), 0
         for p in at.placed:
             free = [n for n, x in enumerate(p.effect.parameters) if x.name not in p.hold]
@@ -108,13 +108,13 @@ class Links:
             k += len(free)
         return found
 
-    def shift_slopes(self, i: int, at: At, here: Array) -> Array:
+    def shift_slopes(self, i: int, at: ModelPoint, here: Array) -> Array:
         found = np.zeros((*here.shape, len(self.rows), len(self.joints)))
         for c, size in enumerate(self._zero):
             found[:, c, i, c] = size
         return found.reshape(*here.shape, -1)
 
-    def settled(self, at: At, numbers: Sequence[int]) -> At:
+    def settled(self, at: ModelPoint, numbers: Sequence[int]) -> ModelPoint:
         """With the zeros of some recordings as they are there; what all training recordings share is a bias's."""
         zeros, values = at.shifts.reshape(len(self.rows), -1).copy(), at.values.copy()
         for i in numbers:
@@ -125,26 +125,26 @@ class Links:
                 shared = float(np.mean(zeros[list(self.train), c]))
                 values[k] += shared * self._zero[c]
                 zeros[list(numbers), c] -= shared
-        return At(at.placed, at.fixed, values, zeros.ravel())
+        return ModelPoint(at.placed, at.fixed, values, zeros.ravel())
 
     def scale(self) -> Array:
         return self._scale
 
-    def bounds(self, p: Placed, x: Parameter) -> tuple[float, float]:
+    def bounds(self, p: PlacedEffect, x: Parameter) -> tuple[float, float]:
         scale = self.scales[self.channel(p)].of(x.relative_to)
         return x.low * scale, x.high * scale
 
-    def size(self, p: Placed, x: Parameter) -> float:
+    def size(self, p: PlacedEffect, x: Parameter) -> float:
         if x.grid:
             return min(abs(g) for g in x.grid) * self.scales[self.channel(p)].of(x.relative_to)
         k = p.effect.parameters.index(x)
         own = [self.term(i, p, np.array([y.zero for y in p.effect.parameters]))[1][:, k] for i in self.train]
         return float(self._scale[self.channel(p)] / np.sqrt(np.mean(np.concatenate(own) ** 2) + 1e-300))
 
-    def unit(self, p: Placed, x: Parameter) -> str:
+    def unit(self, p: PlacedEffect, x: Parameter) -> str:
         return written_unit(x.unit, self.kinds[self.channel(p)], "q_link.")
 
-    def library(self, placed: Sequence[Placed]) -> list[Placed]:
+    def library(self, placed: Sequence[PlacedEffect]) -> list[PlacedEffect]:
         """Sensors' faults of the link's encoder, of the motor's where time tells the two apart; twists of the drive.
 
         Of one that either may have, a second, of the other encoder, is an alias of the first.
@@ -156,14 +156,14 @@ class Links:
                 at = [joint] if effect.at == "joint" and effect.acts_on == "position" else []
                 if effect.at == "sensor" and {"value", "time"}.issuperset(reads(effect)):
                     at = [f"q.{joint}", f"q_link.{joint}"] if effect.states else [f"q_link.{joint}"]
-                found += [Placed(effect, x) for x in at if (effect.name, c) not in have]
+                found += [PlacedEffect(effect, x) for x in at if (effect.name, c) not in have]
         return found
 
-    def still(self, p: Placed) -> bool:
+    def still(self, p: PlacedEffect) -> bool:
         """Does an effect add the same at all times?"""
         return not p.effect.states and all(np.ptp(self.term(i, p, np.ones(1))[0]) < 1e-9 for i in self.train)
 
-    def variants(self, p: Placed) -> list[Variant]:
+    def variants(self, p: PlacedEffect) -> list[GridPoint]:
         """A parameter without a grid is an amplitude."""
         scale = self.scales[self.channel(p)]
         shapes = [x for x in p.effect.parameters if x.grid]
@@ -172,11 +172,11 @@ class Links:
         size = self._zero[self.channel(p)] / SIZES[-1] if amplitudes and self.still(p) else 0.0
         axes = [[g * scale.of(x.relative_to) for g in x.grid] for x in shapes]
         return [
-            Variant(p, {f"{p.key}.{x.name}": v for x, v in zip(shapes, point, strict=True)}, amplitudes, float(size))
+            GridPoint(p, {f"{p.key}.{x.name}": v for x, v in zip(shapes, point, strict=True)}, amplitudes, float(size))
             for point in product(*axes)
         ]
 
-    def columns(self, i: int, at: At, v: Variant) -> Array:
+    def columns(self, i: int, at: ModelPoint, v: GridPoint) -> Array:
         names = [f"{v.placed.key}.{x.name}" for x in v.placed.effect.parameters]
         value, slopes = self.term(i, v.placed, np.array([v.values.get(k, 0.0) for k in names]))
         own = slopes[:, [names.index(k) for k in v.amplitudes]] if v.amplitudes else value[:, None]
@@ -203,10 +203,12 @@ class Links:
             lambda m: np.abs(m.qd[:, j]), lambda m: np.ptp(m.q[:, j])))  # fmt: skip
         return max(speed, 1e-12), max(travel, 1e-12)
 
-    def hangs(self, numbers: Sequence[int], linear: Linear, could: Sequence[Sequence[Array]]) -> list[list[Hangs]]:
+    def noise_channels(
+        self, numbers: Sequence[int], linear: Linearisation, could: Sequence[Sequence[Array]]
+    ) -> list[list[NoiseChannel]]:
         """Where a joint stands, friction holds its drive wound up by what no load tells, and encoders hold their steps:
         what nothing explains there, in the RMS, and `LEAST_LEVEL` of the channel at least."""
-        found: list[list[Hangs]] = [[] for _ in numbers]
+        found: list[list[NoiseChannel]] = [[] for _ in numbers]
         for c in range(len(self.joints)):
             peak, travel = self._moves(c)
             motions, j = [self.rows[i][c].motion for i in numbers], self.rows[0][c].joint
@@ -220,7 +222,7 @@ class Links:
                 level = max(level, float(np.sqrt(left @ left / (len(left) - beside.shape[1]))))
             for own, m, x in zip(found, motions, shares, strict=True):
                 step, n = m.period * m.thinning, len(x[0])
-                own.append(Hangs(step, m.band_segments(), np.zeros(n), tuple(x[:-1]), x[-1], level))
+                own.append(NoiseChannel(step, m.band_segments(), np.zeros(n), tuple(x[:-1]), x[-1], level))
         return found
 
     def blocks(self, i: int, x: Array) -> Array:
@@ -233,7 +235,7 @@ def links_of(
     model: Model,
     train: Sequence[Experiment],
     held: Sequence[Experiment],
-    assembly: Assembly,
+    assembly: TorqueModel,
     theta: Array,
     scales: Mapping[str, Scales],
 ) -> Links:
@@ -241,12 +243,12 @@ def links_of(
     at, rows = [model.joints.index(j) for j in joints], []
     for e in (*train, *held):
         load = assembly.evaluate(e, theta).load
-        rows.append([Run(e.motion, n, load[:, n], e.mass_matrix[:, n, n]) for n in at])
+        rows.append([EncoderPair(e.motion, n, load[:, n], e.mass_matrix[:, n, n]) for n in at])
     kinds: list[JointKind] = [model.tree.joints[n].kind for n in at]
     return Links(joints, kinds, [scales[j] for j in joints], rows, len(train))
 
 
-def start(links: Links, model: Model) -> At:
+def start(links: Links, model: Model) -> ModelPoint:
     """What a model has between the encoders; a parameter without a value starts at a usual one."""
     able = {p.key for p in links.library(())}
     placed = [p for p in model.effects if p.key in able]
@@ -255,4 +257,4 @@ def start(links: Links, model: Model) -> At:
         scale = links.scales[links.channel(p)]
         for x in p.effect.parameters:
             values[f"{p.key}.{x.name}"] = model.values.get(f"{p.key}.{x.name}", x.zero * scale.of(x.relative_to))
-    return At.of(placed, values, links.n_shifts)
+    return ModelPoint.of(placed, values, links.n_shifts)

@@ -25,7 +25,7 @@ LEAST = 0.25
 
 
 @dataclass(frozen=True)
-class Left:
+class ChannelResidual:
     """What is left of one channel of one recording: residual (n,) [T], its part of e' K⁻¹ e (n,), whether a sample is
     far from rest (n,), period [s]."""
 
@@ -45,7 +45,7 @@ class Bursts:
     again: bool
 
 
-def bursts(channel: Sequence[Left]) -> Bursts | None:
+def bursts(channel: Sequence[ChannelResidual]) -> Bursts | None:
     """Whether one channel's residual comes in bursts: `BURST_SHARE` of it above `BURST_LOUD` times the median window.
 
     A window counts by the time in motion in it. It comes again if as much is left without the loudest window: what was

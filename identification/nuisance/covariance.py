@@ -23,7 +23,7 @@ ROOT6 = np.sqrt(6.0)
 
 
 @dataclass(frozen=True)
-class Remembering:
+class FirstOrderNoise:
     """A process of first order: standard deviation ``level``, one number or one a sample (n,), and correlation
     ``time`` [s]."""
 
@@ -38,7 +38,7 @@ class Covariance:
     ----------
     variance : array (n,)
         Of what is independent from sample to sample; positive.
-    processes : sequence of Remembering
+    processes : sequence of FirstOrderNoise
     derivative : array (n,) or None
         Standard deviation b of noise that is a second difference; None or zeros: there is none.
     step : float
@@ -50,7 +50,7 @@ class Covariance:
     def __init__(
         self,
         variance: Array,
-        processes: Sequence[Remembering],
+        processes: Sequence[FirstOrderNoise],
         derivative: Array | None,
         step: float,
         segments: Sequence[slice],
@@ -144,7 +144,7 @@ class Covariance:
     def white(self, x: Array) -> Array:
         """Columns x (n, k) made white, so that white(x)' white(y) = x' K⁻¹ y: `solve` at half its cost for many.
 
-        What each sample has that those before it do not foretell, in units of its deviation (a Kalman filter's
+        What each sample has that those before it do not predict, in units of its deviation (a Kalman filter's
         innovations; Durbin and Koopman 2012, chapter 4). All columns go through one pass.
         """
         if not self._width:
@@ -162,7 +162,7 @@ class Covariance:
 
     @cached_property
     def _steps(self) -> Array:
-        """Maps (n, d + 1, d + 1) from what is foretold of the hidden values (d,), and a sample, to what is foretold
+        """Maps (n, d + 1, d + 1) from what is predicted of the hidden values (d,), and a sample, to what is predicted
         next, and the sample's innovation."""
         n, s = len(self._variance), len(self._levels)
         weights = np.stack([*self._levels, *(self._derivative or ())], axis=1)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...recordings.condition import Motion
-from ..fitting.assembly import Evaluation
+from ..fitting.assembly import TorqueEvaluation
 from ..fitting.experiment import Experiment
 
 Array = NDArray[np.float64]
@@ -45,13 +45,13 @@ class Coordinates:
     turned: Array
 
     @staticmethod
-    def of(experiment: Experiment, state: Evaluation, joint: int, peak: float, travel: float) -> "Coordinates":
+    def of(experiment: Experiment, state: TorqueEvaluation, joint: int, peak: float, travel: float) -> "Coordinates":
         """Of a joint with its peak speed and travel over the training recordings."""
         return Coordinates.along(experiment.motion, state.load[:, joint], joint, peak, travel)
 
     @staticmethod
     def along(m: Motion, load: Array, joint: int, peak: float, travel: float) -> "Coordinates":
-        """The same of a motion and the joint's load (n,)."""
+        """Coordinates of a joint along a motion, given its load (n,)."""
         speed = m.qd[:, joint]
         power = load * speed
         return Coordinates(
@@ -81,7 +81,7 @@ def _since_turning(speed: Array, segments: Sequence[slice], period: float) -> Ar
 
 
 @dataclass(frozen=True)
-class Curve:
+class NuisanceCurve:
     """One member of the family: what it runs over in words, and its columns (n, k) along a recording."""
 
     words: str
@@ -100,7 +100,7 @@ SMALL = ("position", "position by direction", "speed by direction", "load", "loa
 """Curves of the family that no law of a joint is free of: small ones stand beside every explanation."""
 
 
-def family(joint: int, names: Sequence[str], training: Sequence[Coordinates], alone: bool) -> list[Curve]:
+def family(joint: int, names: Sequence[str], training: Sequence[Coordinates], alone: bool) -> list[NuisanceCurve]:
     """Every curve that a joint's channel may have.
 
     Parameters
@@ -185,7 +185,7 @@ class _Ranges:
         length: float,
         order: int,
         times: Callable[[Coordinates], Array] | None = None,
-    ) -> Curve:
+    ) -> NuisanceCurve:
         """Over one coordinate, times a signal."""
         low, high = self._range(over)
 
@@ -193,7 +193,7 @@ class _Ranges:
             own = basis(over(x), low, high, length, order)
             return own if times is None else own * times(x)[:, None]
 
-        return Curve(words, columns)
+        return NuisanceCurve(words, columns)
 
     def map(
         self,
@@ -201,7 +201,7 @@ class _Ranges:
         over: Callable[[Coordinates], Array],
         other: Callable[[Coordinates], Array],
         times: Callable[[Coordinates], Array] | None = None,
-    ) -> Curve:
+    ) -> NuisanceCurve:
         """Over two coordinates, times a signal."""
         one, two = self._range(over), self._range(other)
 
@@ -210,4 +210,4 @@ class _Ranges:
             own = (a[:, :, None] * b[:, None, :]).reshape(len(a), -1)
             return own if times is None else own * times(x)[:, None]
 
-        return Curve(words, columns)
+        return NuisanceCurve(words, columns)

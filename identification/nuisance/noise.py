@@ -15,7 +15,7 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize
 
 from ..deciding import ODDS_OF_CURVES, WANDER_PRIOR, WANDER_TIMES
-from .covariance import Covariance, Remembering
+from .covariance import Covariance, FirstOrderNoise
 
 Array = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ AVERAGED = 0.25
 
 
 @dataclass(frozen=True)
-class Run:
+class NoiseChannel:
     """One channel of one recording, as its noise sees it: period [s], segments, noise of the encoders (n,) [T], shares
     of every sample near rest (n,), for each width that this may have, and about it, and the level [T] that a joint may
     hold at rest."""
@@ -45,11 +45,11 @@ class Run:
     settles: Array
     level: float
 
-    def some(self, rows: slice) -> "Run":
+    def some(self, rows: slice) -> "NoiseChannel":
         """The first samples of it."""
         inside = tuple(slice(s.start, min(s.stop, rows.stop)) for s in self.segments if s.start < rows.stop)
         sticks = tuple(x[rows] for x in self.sticks)
-        return Run(self.step, inside, self.encoder[rows], sticks, self.settles[rows], self.level)
+        return NoiseChannel(self.step, inside, self.encoder[rows], sticks, self.settles[rows], self.level)
 
 
 @dataclass(frozen=True)
@@ -72,17 +72,23 @@ class Noise:
         """Of its wander, which has prior odds as whatever else has no name."""
         return float(np.log(ODDS_OF_CURVES)) - WANDER_PRIOR * self.wander / self.unit if self.wander else 0.0
 
-    def covariance(self, run: Run) -> Covariance:
+    def covariance(self, run: NoiseChannel) -> Covariance:
         """K of a recording."""
         sticks = run.sticks[self.width]
         variance = self.white**2 + (run.level * sticks) ** 2 + (self.settling * run.settles) ** 2
-        held = Remembering(run.level * sticks, HELD)
-        processes = [Remembering(self.coloured, self.coloured_time), Remembering(self.wander, self.wander_time), held]
+        held = FirstOrderNoise(run.level * sticks, HELD)
+        processes = [
+            FirstOrderNoise(self.coloured, self.coloured_time),
+            FirstOrderNoise(self.wander, self.wander_time),
+            held,
+        ]
         heard = np.any(run.encoder**2 >= NEGLIGIBLE * variance)
         return Covariance(variance, processes, run.encoder if heard else None, run.step, run.segments)
 
 
-def learn(residuals: Sequence[Array], columns: Sequence[Array], runs: Sequence[Run], *, freely: bool = False) -> Noise:
+def learn(
+    residuals: Sequence[Array], columns: Sequence[Array], runs: Sequence[NoiseChannel], *, freely: bool = False
+) -> Noise:
     """The noise of one channel: its fast scales on a stretch of the recordings, its wander on averages over blocks.
 
     Parameters
@@ -91,7 +97,7 @@ def learn(residuals: Sequence[Array], columns: Sequence[Array], runs: Sequence[R
         Of each recording, under the baseline.
     columns : sequence of array (n, k)
         What could explain them, of about unit RMS.
-    runs : sequence of Run
+    runs : sequence of NoiseChannel
     freely : bool
         Whether the columns may explain as much as they can. Otherwise their amplitudes have a common prior deviation,
         estimated beside the noise: where nothing is missing it is small, and nothing of the noise is lost to them.
@@ -151,7 +157,7 @@ def _best(cost: Callable[[Array], float], start: Array, wide: Array, low: Array,
     return minimize(whole, start, method="L-BFGS-B", bounds=bounds, options={"maxiter": 12, "eps": 1e-3}).x
 
 
-def _averaged(residual: Array, columns: Array, run: Run) -> tuple[Array, Array, Run]:
+def _averaged(residual: Array, columns: Array, run: NoiseChannel) -> tuple[Array, Array, NoiseChannel]:
     """Means over blocks of `AVERAGED` seconds: what is faster becomes white."""
     length = max(int(AVERAGED / run.step), 1)
     starts, segments, count = [], [], 0
@@ -162,11 +168,11 @@ def _averaged(residual: Array, columns: Array, run: Run) -> tuple[Array, Array, 
         count += len(own)
     rows = np.concatenate(starts)[:, None] + np.arange(length)
     sticks, settles = tuple(x[rows].mean(axis=1) for x in run.sticks), run.settles[rows].mean(axis=1)
-    other = Run(run.step * length, tuple(segments), np.zeros(count), sticks, settles, run.level)
+    other = NoiseChannel(run.step * length, tuple(segments), np.zeros(count), sticks, settles, run.level)
     return residual[rows].mean(axis=1), columns[rows].mean(axis=1), other
 
 
-def _cost(own: tuple[Noise, float], parts: Sequence[tuple[Array, Array, Run]]) -> float:
+def _cost(own: tuple[Noise, float], parts: Sequence[tuple[Array, Array, NoiseChannel]]) -> float:
     """Minus the log-likelihood of all recordings, the amplitudes of the columns integrated out."""
     noise, spread = own
     k = parts[0][1].shape[1]

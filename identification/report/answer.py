@@ -4,10 +4,10 @@ from html import escape
 
 from ...report.html import paragraph, table
 from ...report.provenance import Provenance
+from ...report.words import chance, measured, percent, words
 from ..diagnosis import Diagnosis, Finding
 from ..summary import indistinguishable
 from .fit import comparison, most_changed
-from .words import chance, measured, percent, words
 
 _MOST = 8
 """Names for which the first printed sheet has room."""
@@ -42,14 +42,14 @@ def _names(diagnosis: Diagnosis) -> str:
                 f"{escape(name[:1].upper() + name[1:])} at {escape(finding.at)}",
                 _values(finding),
                 chance(finding.probability),
-                "–" if share is None else percent(min(share, 1.0)),
+                "–" if share is None else percent(min(share, 1.0), 3),
             ]
         )
     caption = "What the model leaves out. Share: of the residual's energy that it explains by itself; shares overlap"
     heads = ["Effect", "Value ± deviation", "Probability", "Share"]
     more = len(diagnosis.effects) - len(shown)
     rest = paragraph(f"And {more} more that are less likely: see what is missing, below.") if more else ""
-    return f'<div class="names">{table(caption, heads, rows, numeric=(2, 3))}</div>{rest}'
+    return table(caption, heads, rows, numeric=(2, 3)) + rest
 
 
 def _values(finding: Finding) -> str:

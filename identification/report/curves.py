@@ -7,8 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ...report.drawing import AFTER, BEFORE, GREY, drawing, margins, svg
+from ...report.words import unit_words, words
 from ..diagnosis import Array, FrictionCurve, Trace
-from .words import unit_words, words
 
 _BINS = 40
 _FEWEST = 8

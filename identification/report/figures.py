@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 
 from ...report.drawing import AFTER, BEFORE, GREY, MEASURED, SHADE, drawing, line, margins, svg
 from ...report.time_axes import over_time
+from ...report.words import percent, unit_words, words
 from ..diagnosis import Array, Candidate, Location, Step, Trace
-from .words import percent, unit_words, words
 
 _WIDTH = 10.0
 
@@ -143,5 +143,5 @@ def _numbers(axes: Axes, places: Array | np.ndarray, values: Sequence[float]) ->
     for place, value in zip(places, values, strict=True):
         if np.isfinite(value):
             axes.annotate(
-                percent(value / 100), (value, place), (3, 0), textcoords="offset points", va="center", fontsize=7.5
+                percent(value / 100, 3), (value, place), (3, 0), textcoords="offset points", va="center", fontsize=7.5
             )

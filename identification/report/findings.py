@@ -7,12 +7,12 @@ from html import escape
 from ...report.drawing import BEFORE
 from ...report.html import bar, figure, flag, folded, headline, paragraph, table
 from ...report.strips import Curve, Strip
+from ...report.words import chance, number, percent, spans, unit_words, with_std, words
 from ...report.zoom import zoomable
 from ..diagnosis import Diagnosis, Finding, FrictionCurve, Limit, Location, Rival, Trace
 from .curves import friction_over_speed, friction_words
 from .figures import residual_over_time
 from .tables import tables
-from .words import chance, number, percent, spans, unit_words, with_std, words
 
 STATUS = {
     "data_fault": "fault in the data",
@@ -85,7 +85,7 @@ def where(diagnosis: Diagnosis) -> tuple[str, str, str]:
     rows = [
         [
             escape(place.channel),
-            bar(place.share, percent(place.share)),
+            bar(place.share, percent(place.share, 3)),
             escape(spans(place.time_windows)),
             escape(place.where) or "–",
         ]

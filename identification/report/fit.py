@@ -8,12 +8,12 @@ import numpy as np
 from ...report.drawing import AFTER, BEFORE
 from ...report.html import figure, flag, folded, paragraph, table
 from ...report.strips import Curve, Strip
+from ...report.words import number, percent, unit_words, with_std, words
 from ...report.zoom import zoomable
 from ..diagnosis import Array, Diagnosis, Trace
 from .curves import residual_curves
 from .figures import before_and_after, candidates, steps
 from .findings import detection_limits
-from .words import number, percent, unit_words, with_std, words
 
 _OPEN = 4
 _TOP = 15
@@ -52,15 +52,15 @@ def unseen(diagnosis: Diagnosis, skip: int = 0) -> tuple[str, str, str]:
 
 def step_by_step(diagnosis: Diagnosis) -> tuple[str, str, str]:
     """The model step by step, with its misfit on both sets."""
-    rows = [[escape(step.label), percent(step.train), percent(step.holdout)] for step in diagnosis.steps]
+    rows = [[escape(step.label), percent(step.train, 3), percent(step.holdout, 3)] for step in diagnosis.steps]
     heads = ["Model", "Training", "Held-out"]
     content = table("Relative misfit over all channels", heads, rows, numeric=(1, 2), wide=False)
     if len(diagnosis.steps) > 1:
         first, last = diagnosis.steps[0], diagnosis.steps[-1]
         content += figure(
             steps(diagnosis.steps),
-            f"Relative misfit by step; on the held-out recording from {percent(first.holdout)} to "
-            f"{percent(last.holdout)}.",
+            f"Relative misfit by step; on the held-out recording from {percent(first.holdout, 3)} to "
+            f"{percent(last.holdout, 3)}.",
             "Each step keeps the effects above it and fits everything again.",
             small=True,
         )
@@ -107,7 +107,7 @@ def screened(diagnosis: Diagnosis) -> tuple[str, str, str]:
         [
             escape(words(row.name)),
             escape(row.at),
-            percent(row.explained),
+            percent(row.explained, 3),
             number(row.score),
             "named" if row.named else "",
         ]
@@ -227,8 +227,8 @@ def _misfits(diagnosis: Diagnosis, added: bool) -> str:
         columns += [(f"RMS, {said}, after", [number(m.rms_after) for m in misfits])] * added
     columns.append(("Noise floor", [number(fit.noise_floor) for fit in diagnosis.fit]))
     unseen = [fit.holdout for fit in diagnosis.fit]
-    columns.append(("Relative, held-out" + ", before" * added, [percent(m.relative_before) for m in unseen]))
-    columns += [("Relative, held-out, after", [percent(m.relative_after) for m in unseen])] * added
+    columns.append(("Relative, held-out" + ", before" * added, [percent(m.relative_before, 3) for m in unseen]))
+    columns += [("Relative, held-out, after", [percent(m.relative_after, 3) for m in unseen])] * added
     names = [f"{escape(fit.channel)}\u00a0[{escape(unit_words(fit.unit))}]" for fit in diagnosis.fit]
     heads = ["Channel", *(head for head, _ in columns)]
     rows = list(zip(names, *(cells for _, cells in columns), strict=True))

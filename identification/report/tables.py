@@ -6,8 +6,8 @@ from matplotlib.figure import Figure
 from ...models.table import TIMES, Table
 from ...report.drawing import AFTER, GREY, drawing, margins, svg
 from ...report.html import figure
+from ...report.words import unit_words
 from ..diagnosis import EmpiricalTable
-from .words import unit_words
 
 _POINTS = 201
 

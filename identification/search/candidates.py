@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from ...models.effect import Parameter
 from ...models.effects import effects
-from ...models.model import Model, Placed, all_places
-from ..fitting.assembly import Assembly, Evaluation
+from ...models.model import Model, PlacedEffect, all_places
+from ..fitting.assembly import TorqueEvaluation, TorqueModel
 from ..fitting.effect_terms import contributions
 from ..fitting.experiment import Experiment
 from ..fitting.problem import reached
@@ -29,7 +29,7 @@ MOST_COMBINED = 4
 
 
 @dataclass(frozen=True)
-class Variant:
+class EffectVariant:
     """One effect at one place with its shape parameters set.
 
     ``amplitudes`` are the parameters the law is linear in, whose columns are tried, between ``low`` and ``high``; where
@@ -37,7 +37,7 @@ class Variant:
     its slope tried beside the mass, which makes (mass, mass * x, mass * y, mass * z) amplitudes.
     """
 
-    placed: Placed
+    placed: PlacedEffect
     parameters: Array
     amplitudes: NDArray[np.int_]
     low: Array
@@ -64,7 +64,7 @@ class Variant:
         return full
 
 
-def library(model: Model) -> list[Placed]:
+def library(model: Model) -> list[PlacedEffect]:
     """Every effect at every place that the model does not have yet and its kind of inertia leaves room for."""
     have = {p.key for p in model.effects}
     if f"{SLIDE}.{model.joints[0]}" in have:
@@ -80,7 +80,7 @@ def library(model: Model) -> list[Placed]:
             arm = model.joints[model.tree.carriers :]
             other = {f"tau.{j}": f"q.{j}" for j in arm} | {f"q.{j}": f"tau.{j}" for j in arm}
             spots = tuple(at for at in other if f"{effect.name}.{other[at]}" not in have)
-        found += [Placed(effect, at) for at in spots if f"{effect.name}.{at}" not in have]
+        found += [PlacedEffect(effect, at) for at in spots if f"{effect.name}.{at}" not in have]
     return found
 
 
@@ -90,7 +90,7 @@ def _makkar() -> tuple[str, ...]:
     return law.name, *law.contains
 
 
-def variants(assembly: Assembly, placed: Placed) -> list[Variant]:
+def variants(assembly: TorqueModel, placed: PlacedEffect) -> list[EffectVariant]:
     """The grid over an effect's shape parameters at a place, amplitudes at zero."""
     axes, amplitudes = [], []
     for i, p in enumerate(placed.effect.parameters):
@@ -106,7 +106,7 @@ def variants(assembly: Assembly, placed: Placed) -> list[Variant]:
     low, high = (np.array(x, float) for x in zip(*bounds, strict=True))
     grid = list(product(*axes))
     step = -(-len(grid) // MOST_VARIANTS)
-    found = [Variant(placed, np.array(g, float), index, low, high) for g in grid[::step]]
+    found = [EffectVariant(placed, np.array(g, float), index, low, high) for g in grid[::step]]
     if 1 < len(masses) < len(amplitudes):
         # A mass for each axis: one that moves along a single axis has slopes of its own.
         others = [[], *([i for i in masses if i != alone] for alone in masses)]
@@ -114,7 +114,7 @@ def variants(assembly: Assembly, placed: Placed) -> list[Variant]:
     return found
 
 
-def reduced(variant: Variant, subset: NDArray[np.int_]) -> Variant:
+def reduced(variant: EffectVariant, subset: NDArray[np.int_]) -> EffectVariant:
     """A variant with only some of its amplitudes, by their positions."""
     if not len(variant.amplitudes):
         return variant
@@ -129,7 +129,7 @@ def _with_zeros(parameters: Array, where: list[int]) -> Array:
 
 
 def candidate_columns(
-    assembly: Assembly, experiment: Experiment, state: Evaluation, variant: Variant
+    assembly: TorqueModel, experiment: Experiment, state: TorqueEvaluation, variant: EffectVariant
 ) -> list[tuple[int, Array]]:
     """What a variant adds to each channel it reaches, in the analysis band: (channel, (n_band, k))."""
     placed = variant.placed
@@ -153,10 +153,10 @@ def candidate_columns(
 
 
 def _terms(
-    assembly: Assembly,
+    assembly: TorqueModel,
     experiment: Experiment,
-    state: Evaluation,
-    placed: Placed,
+    state: TorqueEvaluation,
+    placed: PlacedEffect,
     parameters: Array,
     bare: bool = False,
 ) -> tuple[list[tuple[int, Array, Array]], Array | None]:
@@ -169,7 +169,9 @@ def _terms(
     return terms, by_load
 
 
-def free_parameters(assembly: Assembly, experiment: Experiment, state: Evaluation, variant: Variant) -> tuple[str, ...]:
+def free_parameters(
+    assembly: TorqueModel, experiment: Experiment, state: TorqueEvaluation, variant: EffectVariant
+) -> tuple[str, ...]:
     """Names of the parameters that matter once the variant's amplitudes are switched on.
 
     A shape that only acts through an amplitude left at zero has no derivative, and is not counted.

@@ -1,4 +1,4 @@
-"""Motion that the servo was asked for, told from motion that a disturbance drove: the regressors' bandwidth per joint.
+"""The instrument motion: the measured motion, low-passed to the band that the servo and not a disturbance drove.
 
 In closed loop a torque that nobody modelled moves a light joint, and the measured acceleration then carries the very
 disturbance that stands in the torque; on a heavy one, encoder noise does the same. Least squares reads either as

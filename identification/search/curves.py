@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..fitting.assembly import Evaluation
+from ..fitting.assembly import TorqueEvaluation
 from ..fitting.experiment import Experiment
 
 Array = NDArray[np.float64]
@@ -19,7 +19,7 @@ SMOOTH = 8
 """Knots of a smooth curve."""
 
 
-def smooth_columns(experiments: Sequence[Experiment], states: Sequence[Evaluation], joint: int) -> Parts:
+def smooth_columns(experiments: Sequence[Experiment], states: Sequence[TorqueEvaluation], joint: int) -> Parts:
     """Smooth curves on one channel over position, speed, load and time together (n_band, k)."""
     motions = [e.motion for e in experiments]
     loads = [s.load[:, joint] for s in states]

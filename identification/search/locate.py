@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...models.floating.tree import channel
+from ...report.words import percent
 from ..diagnosis import Location
 from ..fitting.experiment import Experiment
 
@@ -103,5 +104,5 @@ def _state(experiments: Sequence[Experiment], changed: Sequence[Array], c: int) 
             share = float(energy[mask].sum() / max(energy.sum(), 1e-300))
             # What a condition gains in energy over chance, so that tiny and near-total sets both lose.
             if share > 1.33 * size and share - size > best:
-                best, text = share - size, f"{label} ({100 * share:.0f} % of it, in {100 * size:.0f} % of the time)"
+                best, text = share - size, f"{label} ({percent(share)} of it, in {percent(size)} of the time)"
     return text

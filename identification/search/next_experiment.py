@@ -21,12 +21,12 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...models.effects import get_effect
-from ...models.model import Model, Placed
+from ...models.model import Model, PlacedEffect
 from ...models.rigid_body import RigidBody
 from ...models.tree import Joint
 from ...recordings.condition import condition
 from ..diagnosis import Diagnosis
-from ..fitting.assembly import Assembly
+from ..fitting.assembly import TorqueModel
 from ..fitting.base_parameters import base_parameters
 from ..fitting.experiment import Experiment, load_experiments, scales
 from ..fitting.fit import channel_rms, fit
@@ -117,13 +117,13 @@ def next_experiment(
     train = load_experiments(model, recordings, body)
     base = base_parameters(body) if model.inertia == "free" else None
     known = scales(train)
-    own = Assembly(model.tree, model.effects, base, known, model.values)
+    own = TorqueModel(model.tree, model.effects, base, known, model.values)
     theta = np.array([model.values.get(s.key, s.start) for s in own.slots])
     sigma = channel_rms(own, train, theta)[0] + 1e-12
     others = []
     for named, rival in pairs:
         placed = [p for p in model.effects if p.key != named.key]
-        assembly = Assembly(model.tree, [*placed, rival], base, known, model.values)
+        assembly = TorqueModel(model.tree, [*placed, rival], base, known, model.values)
         others.append((assembly, fit(assembly, train, multi_start=True).theta))
 
     def separation(experiments: Sequence[Experiment]) -> float:
@@ -151,7 +151,7 @@ def next_experiment(
     return NextExperiment(best[0], words, separation(train), best[1])
 
 
-def rivals(model: Model, diagnosis: Diagnosis) -> list[tuple[Placed, Placed]]:
+def rivals(model: Model, diagnosis: Diagnosis) -> list[tuple[PlacedEffect, PlacedEffect]]:
     """Effects named and what rivals each: those that the data cannot part; where they part all, the likeliest."""
     open_, likely = [], []
     for finding in diagnosis.effects:
@@ -161,7 +161,7 @@ def rivals(model: Model, diagnosis: Diagnosis) -> list[tuple[Placed, Placed]]:
         for rival in sorted(finding.rivals, key=lambda r: -r.probability):
             # No motion parts an effect from what holds it and more.
             if placed and finding.name not in get_effect(rival.name).contains:
-                pair = placed[0], Placed(get_effect(rival.name), rival.at)
+                pair = placed[0], PlacedEffect(get_effect(rival.name), rival.at)
                 (likely if rival.separable else open_).append(pair)
     return open_[:PAIRS] or likely[:1]
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...models.model import Model
-from ..fitting.assembly import Assembly
+from ..fitting.assembly import TorqueModel
 from ..fitting.base_parameters import BaseParameters
 from ..fitting.experiment import Experiment, Scales
 from ..fitting.fit import Fit, channel_rms, fit
@@ -18,12 +18,12 @@ WORSE = 1.05
 """Ratio of a channel's residuals, with something more and without, that no good optimum has."""
 
 
-def assemble(model: Model, base: BaseParameters | None, scales: Mapping[str, Scales]) -> Assembly:
+def assemble(model: Model, base: BaseParameters | None, scales: Mapping[str, Scales]) -> TorqueModel:
     """Parameters and torque of a model, started from the values it has."""
-    return Assembly(model.tree, model.effects, base, scales, model.values)
+    return TorqueModel(model.tree, model.effects, base, scales, model.values)
 
 
-def refitted(before: Fit, assembly: Assembly, samples: Sequence[Experiment], everywhere: bool, seed: int) -> Fit:
+def refitted(before: Fit, assembly: TorqueModel, samples: Sequence[Experiment], everywhere: bool, seed: int) -> Fit:
     """The fit of a model that has something more; from many starts if it was to be, or if one ended badly.
 
     What it had before is a special case of it, so that it leaves no more, unless it ended in a bad optimum.
@@ -37,7 +37,7 @@ def refitted(before: Fit, assembly: Assembly, samples: Sequence[Experiment], eve
     return fit(assembly, samples, start=carry(before, assembly), multi_start=True, seed=seed)
 
 
-def carry(found: Fit, assembly: Assembly) -> Array:
+def carry(found: Fit, assembly: TorqueModel) -> Array:
     """A fit's parameters in another assembly's order; what is new there starts where that assembly says."""
     known = {s.key: v for s, v in zip(found.assembly.slots, found.theta, strict=True)}
     return np.array([known.get(s.key, s.start) for s in assembly.slots])

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..fitting.assembly import Assembly
+from ..fitting.assembly import TorqueModel
 from ..fitting.experiment import Bridge, Experiment
 
 Array = NDArray[np.float64]
@@ -46,8 +46,10 @@ def slow(experiment: Experiment, joint: int, share: float = REST) -> Mask:
 
 
 def moving(experiment: Experiment, shares: Sequence[float] | None = None) -> Experiment:
-    """The same without what happens near rest: bridged, for it would reach far through the low-pass into the samples
-    in motion; and what lies on the bridges counts for nothing, for a line between two samples has their noise.
+    """The experiment without its samples near rest.
+
+    They are bridged, because the low-pass would carry them far into the samples in motion. Samples on a bridge do not
+    count: a line between two samples has the noise of these two.
 
     ``shares`` of the peak speed are where motion begins, for each channel; `REST` by default.
     """
@@ -74,7 +76,7 @@ def _bridge(experiment: Experiment, rest: Mask) -> Bridge:
     return Bridge(*(np.concatenate(x) for x in zip(*parts, strict=True)))
 
 
-def fitted(assembly: Assembly, experiments: Sequence[Experiment]) -> list[Experiment]:
+def fitted(assembly: TorqueModel, experiments: Sequence[Experiment]) -> list[Experiment]:
     """What a model is fitted to: samples near rest count where it has a law for what happens there."""
     whole = {assembly.joint_of(p) for p in assembly.placed if p.effect.at_rest}
     creeping = {assembly.joint_of(p) for p in assembly.placed if p.effect.exceeds_at_rest}

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...models.model import Model
 from ...models.snare.setup import APPLIED, SnareTree
+from ...report.words import percent
 from ..diagnosis import (
     Candidate,
     ChannelFit,
@@ -17,21 +18,22 @@ from ..diagnosis import (
     Finding,
     Limit,
     Misfit,
-    Moved,
+    ParameterShift,
     Rival,
     Step,
     Trace,
 )
 from ..reliability import probability as reliability
-from ..wording import experiment_sentence, foremost, named, percent
+from ..verdict import verdict
+from ..wording import experiment_sentence, foremost, named
 from .channels import channel_errors, channels, modelled
 from .comparison import QUARTER, SLOW, variances
-from .fit import Fit, spread
+from .fit import CaptureFit, spread
 from .handles import bounds, handle_of, key_of
 from .library import absent
 from .locate import locate_capture
-from .recording import Capture
-from .search import Named, Searched
+from .recording import CaptureRecording
+from .search import CaptureNaming, CaptureSelection
 
 BAND = 1 / (2 * QUARTER)
 """[Hz] What means over a quarter of a second hold."""
@@ -44,7 +46,12 @@ LIKELY = 0.005
 
 
 def report_on(
-    model: Model, found: Searched, train: Sequence[Capture], locked: Sequence[Capture], seconds: float, runs: int
+    model: Model,
+    found: CaptureSelection,
+    train: Sequence[CaptureRecording],
+    locked: Sequence[CaptureRecording],
+    seconds: float,
+    runs: int,
 ) -> Diagnosis:
     """Put everything into words and numbers.
 
@@ -52,8 +59,8 @@ def report_on(
     ----------
     model : Model
         As it was.
-    found : Searched
-    train, locked : sequences of Capture
+    found : CaptureSelection
+    train, locked : sequences of CaptureRecording
     seconds, runs : float, int
         What the search took [s], and the simulations in it.
     """
@@ -64,8 +71,8 @@ def report_on(
         for p in found.last.placed
         if p.effect.name not in APPLIED
     ]
-    description = "" if findings else _unexplained(fits)
-    verdict = "missing_physics" if findings else "unknown_effect" if description else "adequate"
+    unexplained = () if findings else _unexplained(fits)
+    description = _unexplained_words(unexplained)
     notes = [f"{Path(c.path).name}: {note}" for c in (*train, *locked) for note in c.notes]
     notes += [
         f"{p.effect.name} at {p.at} passed on the captures fitted but made the held-out one hardly better: not named"
@@ -83,7 +90,7 @@ def report_on(
         if np.isfinite(t.score)
     )
     return Diagnosis(
-        verdict,
+        verdict(findings, unexplained),
         _sentence(findings, fits, description) + _corrected(corrected),
         description,
         model.name,
@@ -101,7 +108,7 @@ def report_on(
     )
 
 
-def estimates(captures: Sequence[Capture], found: Fit) -> dict[str, dict[str, Estimate]]:
+def estimates(captures: Sequence[CaptureRecording], found: CaptureFit) -> dict[str, dict[str, Estimate]]:
     """Parameters by the effect's key and their own name."""
     low, high = bounds(found.placed)
     std = spread(captures, found)
@@ -113,7 +120,9 @@ def estimates(captures: Sequence[Capture], found: Fit) -> dict[str, dict[str, Es
     return made
 
 
-def _finding(named: Named, found: Searched, train: Sequence[Capture], locked: Sequence[Capture]) -> Finding:
+def _finding(
+    named: CaptureNaming, found: CaptureSelection, train: Sequence[CaptureRecording], locked: Sequence[CaptureRecording]
+) -> Finding:
     placed = named.trial.placed
     right = reliability(named.margin)
     rivals = tuple(
@@ -131,8 +140,8 @@ def _finding(named: Named, found: Searched, train: Sequence[Capture], locked: Se
     before, after = max(pairs, key=lambda e: e[0].relative - e[1].relative)
     what = placed.effect.sentence
     evidence = (
-        f"{what[:1].upper()}{what[1:]}: it explains {percent(named.trial.explained)} of what the model so far left "
-        f"over; taking it out again raises the error of {before.channel} on the held-out capture from "
+        f"{what[:1].upper()}{what[1:]}: it explains {percent(named.trial.explained)} of the remaining residual. "
+        f"Without it, the error of {before.channel} on the held-out capture rises from "
         f"{_size(after.rms, after.unit)} to {_size(before.rms, before.unit)}."
     )
     values = estimates(train, found.last)[placed.key]
@@ -143,7 +152,9 @@ def _size(value: float, unit: str) -> str:
     return f"{1e3 * value:.3g} mm" if unit == "m" else f"{value:.3g} {unit}"
 
 
-def _fits(found: Searched, train: Sequence[Capture], locked: Sequence[Capture]) -> tuple[ChannelFit, ...]:
+def _fits(
+    found: CaptureSelection, train: Sequence[CaptureRecording], locked: Sequence[CaptureRecording]
+) -> tuple[ChannelFit, ...]:
     fitted = _misfits(train, found.first, found.last)
     held = _misfits(locked, found.held_first, found.held_last)
     made = []
@@ -156,24 +167,27 @@ def _fits(found: Searched, train: Sequence[Capture], locked: Sequence[Capture]) 
     return tuple(made)
 
 
-def _misfits(captures: Sequence[Capture], before: Fit, after: Fit) -> dict[str, tuple[str, Misfit]]:
+def _misfits(
+    captures: Sequence[CaptureRecording], before: CaptureFit, after: CaptureFit
+) -> dict[str, tuple[str, Misfit]]:
     """Unit and misfits by channel."""
     pairs = zip(channel_errors(captures, before), channel_errors(captures, after), strict=True)
     return {a.channel: (a.unit, Misfit(a.rms, b.rms, a.relative, b.relative)) for a, b in pairs}
 
 
-def _unexplained(fits: Sequence[ChannelFit]) -> str:
-    """Motion that is left without a name, in words; empty where it is too little."""
+def _unexplained(fits: Sequence[ChannelFit]) -> tuple[ChannelFit, ...]:
+    """Channels of a motion that remains without a name: more than `LEFT_OVER` of the largest, and `VISIBLE`."""
     positions = [f for f in fits if f.unit == "m"]
     largest = max(f.holdout.rms_before / max(f.holdout.relative_before, 1e-12) for f in positions)
-    found = [
-        f"{_size(f.train.rms_after, 'm')} of {f.channel}"
-        for f in positions
-        if f.train.rms_after > max(LEFT_OVER * largest, VISIBLE) and f.holdout.rms_after > VISIBLE
-    ]
-    if not found:
+    least = max(LEFT_OVER * largest, VISIBLE)
+    return tuple(f for f in positions if f.train.rms_after > least and f.holdout.rms_after > VISIBLE)
+
+
+def _unexplained_words(channels: Sequence[ChannelFit]) -> str:
+    if not channels:
         return ""
-    return f"{' and '.join(found)} are left that no effect of a capture explains: check the set-up's sizes and masses"
+    sizes = " and ".join(f"{_size(f.train.rms_after, 'm')} of {f.channel}" for f in channels)
+    return f"{sizes} are left that no effect of a capture explains: check the set-up's sizes and masses"
 
 
 def _foremost(findings: Sequence[Finding], fits: Sequence[ChannelFit]) -> ChannelFit:
@@ -205,7 +219,7 @@ def _corrected(numbers: Sequence[str]) -> str:
     return f" Numbers of the set-up that the model file does not give are better taken as {', '.join(numbers)}."
 
 
-def _relative(captures: Sequence[Capture], found: Fit) -> float:
+def _relative(captures: Sequence[CaptureRecording], found: CaptureFit) -> float:
     """RMS over motion and force of what is left, each relative to all of its kind."""
     shares = []
     errors = channel_errors(captures, found)
@@ -216,7 +230,9 @@ def _relative(captures: Sequence[Capture], found: Fit) -> float:
     return float(np.sqrt(np.mean(shares)))
 
 
-def _steps(found: Searched, train: Sequence[Capture], locked: Sequence[Capture]) -> tuple[Step, ...]:
+def _steps(
+    found: CaptureSelection, train: Sequence[CaptureRecording], locked: Sequence[CaptureRecording]
+) -> tuple[Step, ...]:
     lines = [Step("model as given", _relative(train, found.first), _relative(locked, found.held_first))]
     for n in found.named:
         label = f"+ {n.trial.placed.effect.name} at {n.trial.placed.at}"
@@ -224,7 +240,7 @@ def _steps(found: Searched, train: Sequence[Capture], locked: Sequence[Capture])
     return tuple(lines)
 
 
-def _moved(model: Model, found: Searched, train: Sequence[Capture]) -> tuple[Moved, ...]:
+def _moved(model: Model, found: CaptureSelection, train: Sequence[CaptureRecording]) -> tuple[ParameterShift, ...]:
     after = estimates(train, found.last)
     made = []
     for n in found.named:
@@ -232,16 +248,18 @@ def _moved(model: Model, found: Searched, train: Sequence[Capture]) -> tuple[Mov
         if p.effect.name not in APPLIED:
             (now,) = after[p.key].values()
             usual = handle_of(p).value(absent(model, p))
-            made.append(Moved(f"capture.{p.effect.name}", now.unit, usual, now.value, now.std))
+            made.append(ParameterShift(f"capture.{p.effect.name}", now.unit, usual, now.value, now.std))
     for p, x in zip(found.first.placed, found.first.x, strict=True):
         (now,) = after[p.key].values()
-        made.append(Moved(key_of(p), now.unit, handle_of(p).value(float(x)), now.value, now.std))
+        made.append(ParameterShift(key_of(p), now.unit, handle_of(p).value(float(x)), now.value, now.std))
     return tuple(made)
 
 
-def _traces(found: Searched, train: Sequence[Capture], locked: Sequence[Capture]) -> tuple[Trace, ...]:
+def _traces(
+    found: CaptureSelection, train: Sequence[CaptureRecording], locked: Sequence[CaptureRecording]
+) -> tuple[Trace, ...]:
     made = []
-    sets: tuple[tuple[Literal["train", "holdout"], Sequence[Capture], Fit, Fit], ...] = (
+    sets: tuple[tuple[Literal["train", "holdout"], Sequence[CaptureRecording], CaptureFit, CaptureFit], ...] = (
         ("train", train, found.first, found.last),
         ("holdout", locked, found.held_first, found.held_last),
     )
@@ -255,7 +273,7 @@ def _traces(found: Searched, train: Sequence[Capture], locked: Sequence[Capture]
     return tuple(made)
 
 
-def _limits(model: Model, found: Searched, train: Sequence[Capture]) -> tuple[Limit, ...]:
+def _limits(model: Model, found: CaptureSelection, train: Sequence[CaptureRecording]) -> tuple[Limit, ...]:
     """Smallest value of each effect that would have been seen: what it changes grows in proportion to its handle."""
     named = {n.trial.placed.key for n in found.named}
     by = variances(train, found.last.residuals)
@@ -279,7 +297,7 @@ def _limits(model: Model, found: Searched, train: Sequence[Capture]) -> tuple[Li
     return tuple(made)
 
 
-def with_found(model: Model, found: Fit) -> Model:
+def with_found(model: Model, found: CaptureFit) -> Model:
     """The model with what was found: effects, their values, and numbers of the set-up."""
     assert isinstance(model.tree, SnareTree)
     placed = tuple(p for p in found.placed if p.effect.name in APPLIED)

@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .comparison import slow_means
-from .fit import Fit
-from .recording import Capture, Track
+from .fit import CaptureFit
+from .recording import CaptureRecording, Track
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Channel:
+class MeasuredChannel:
     """One channel of one capture, as it was measured: name, unit, times [s] and values, all (n,).
 
     ``place`` (n,) [m] is the measured position along the channel's axis, which pictures draw forces against.
@@ -50,27 +50,31 @@ class ChannelError:
         return self.rms / max(self.reference, 1e-12)
 
 
-def channels(capture: Capture) -> list[Channel]:
+def channels(capture: CaptureRecording) -> list[MeasuredChannel]:
     """Every channel of a capture."""
     times = slow_means(capture.times[:, None])[:, 0] + capture.zero
     seen = capture.measured
     place = slow_means(seen.position)
-    found = [Channel(f"pos.{capture.body}.{a}", "m", times, place[:, i], place[:, i]) for i, a in enumerate("xyz")]
+    found = [
+        MeasuredChannel(f"pos.{capture.body}.{a}", "m", times, place[:, i], place[:, i]) for i, a in enumerate("xyz")
+    ]
     for body, sensor in capture.sensors.items():
         force = slow_means(seen.force[body])
-        found += [Channel(f"force.{sensor}.{a}", "N", times, force[:, i], place[:, i]) for i, a in enumerate("xyz")]
+        found += [
+            MeasuredChannel(f"force.{sensor}.{a}", "N", times, force[:, i], place[:, i]) for i, a in enumerate("xyz")
+        ]
     return found
 
 
-def modelled(capture: Capture, track: Track) -> list[Array]:
-    """The same channels of a simulation, (n,) each."""
+def modelled(capture: CaptureRecording, track: Track) -> list[Array]:
+    """A capture's `channels` as a simulation has them, (n,) each."""
     found = [*slow_means(track.position).T]
     for body in capture.sensors:
         found += [*slow_means(track.force[body]).T]
     return found
 
 
-def channel_errors(captures: Sequence[Capture], found: Fit) -> list[ChannelError]:
+def channel_errors(captures: Sequence[CaptureRecording], found: CaptureFit) -> list[ChannelError]:
     """The error of every channel that the captures have."""
     sums: dict[str, tuple[str, float, float, int]] = {}
     for c, track in zip(captures, found.tracks, strict=True):

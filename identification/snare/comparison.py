@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from .recording import EVERY, Capture, Track
+from .recording import EVERY, CaptureRecording, Track
 
 Array = NDArray[np.float64]
 Blocks = Mapping[str, Array]
@@ -33,7 +33,7 @@ LEAST = {"position": 1.5e-4, "turn": 4e-3, "slow": 0.05, "chatter": 0.15}
 MuJoCo under a smooth skin and this snare do by 0.15 mm on a soft pin; on a hard one, where cables bounce, by more, as
 the residual itself then says. Less than that is no physics left out."""
 LEAST_SHARE = 0.02
-"""The same of a force, as a share of its RMS; rods and this snare: 0.02 on a soft pin, 0.09 on a hard one."""
+"""Least difference of forces, as a share of their RMS; rods and this snare: 0.02 on a soft pin, 0.09 on a hard one."""
 QUIET = 0.05
 """[N] Chatter below this is none."""
 
@@ -43,7 +43,7 @@ def slow_means(x: Array) -> Array:
     return x[: len(x) // SLOW * SLOW].reshape(-1, SLOW, x.shape[1]).mean(1)
 
 
-def blocks(capture: Capture, track: Track) -> dict[str, Array]:
+def blocks(capture: CaptureRecording, track: Track) -> dict[str, Array]:
     """What a track is compared by."""
     found = {"position": slow_means(track.position)}
     if capture.setup.target.rotates:
@@ -62,13 +62,13 @@ def blocks(capture: Capture, track: Track) -> dict[str, Array]:
     return found
 
 
-def residual(capture: Capture, track: Track) -> dict[str, Array]:
+def residual(capture: CaptureRecording, track: Track) -> dict[str, Array]:
     """Measurement less simulation, by block; 0 where nothing was measured."""
     ours, theirs = blocks(capture, track), blocks(capture, capture.measured)
     return {name: np.nan_to_num(theirs[name] - ours[name]) for name in theirs}
 
 
-def floor(capture: Capture, name: str) -> float:
+def floor(capture: CaptureRecording, name: str) -> float:
     """f_b: the least that a block's numbers count for."""
     kind, _, body = name.partition(".")
     noise = capture.noise[body or kind] if kind in ("position", "slow") else 0.0
@@ -76,7 +76,7 @@ def floor(capture: Capture, name: str) -> float:
     return float(np.hypot(LEAST[kind] + carried, noise / SLOW**0.5))
 
 
-def scales(captures: Sequence[Capture], residuals: Sequence[Blocks]) -> dict[str, tuple[int, float]]:
+def scales(captures: Sequence[CaptureRecording], residuals: Sequence[Blocks]) -> dict[str, tuple[int, float]]:
     """Numbers in a block of all captures together, and their variance with the floor."""
     found = {}
     for name in residuals[0]:
@@ -86,12 +86,12 @@ def scales(captures: Sequence[Capture], residuals: Sequence[Blocks]) -> dict[str
     return found
 
 
-def variances(captures: Sequence[Capture], residuals: Sequence[Blocks]) -> dict[str, float]:
+def variances(captures: Sequence[CaptureRecording], residuals: Sequence[Blocks]) -> dict[str, float]:
     """What squares of a block's numbers are divided by, so that ½ of their sum is in units of the log-likelihood."""
     return {name: variance / NEWS for name, (_, variance) in scales(captures, residuals).items()}
 
 
-def likelihood(captures: Sequence[Capture], residuals: Sequence[Blocks]) -> float:
+def likelihood(captures: Sequence[CaptureRecording], residuals: Sequence[Blocks]) -> float:
     """L of residuals; a block's scale is one for all captures."""
     return float(sum(-0.5 * NEWS * n * np.log(v) for n, v in scales(captures, residuals).values()))
 

@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.model import Placed
-from ..fitting.least_squares import Normal, bounded_step
+from ...models.model import PlacedEffect
+from ..fitting.least_squares import NormalEquations, bounded_step
 from .comparison import Blocks, likelihood, residual, variances
 from .handles import bounds, free, handle_of, steps, values_of
-from .recording import Capture, Track
+from .recording import CaptureRecording, Track
 from .sets import CaptureSet
 
 Array = NDArray[np.float64]
@@ -33,7 +33,7 @@ SETTLED = 0.3
 
 
 @dataclass(frozen=True)
-class Fit:
+class CaptureFit:
     """Effects, their handles x (P,), and how a set of captures is told with them.
 
     ``likelihood`` is L, −inf where a capture cannot be simulated; ``tracks`` and ``residuals`` are then empty.
@@ -41,7 +41,7 @@ class Fit:
     one mapping a capture, None where they were not asked for.
     """
 
-    placed: tuple[Placed, ...]
+    placed: tuple[PlacedEffect, ...]
     x: Array
     likelihood: float
     tracks: tuple[Track, ...]
@@ -54,26 +54,27 @@ class Fit:
         return values_of(self.placed, self.x)
 
 
-def evaluate(captures: CaptureSet, placed: Sequence[Placed], many: Sequence[Array]) -> list[Fit]:
+def evaluate(captures: CaptureSet, placed: Sequence[PlacedEffect], many: Sequence[Array]) -> list[CaptureFit]:
     """Simulate at many places (P,) of the handles; L is −inf where a capture cannot be."""
     found = []
     for x, tracks in zip(many, captures.tracks_at([values_of(placed, x) for x in many]), strict=True):
         whole = tuple(t for t in tracks if t is not None and np.all(np.isfinite(t.position)))
         if len(whole) < len(tracks):
-            found.append(Fit(tuple(placed), x, -np.inf, (), ()))
+            found.append(CaptureFit(tuple(placed), x, -np.inf, (), ()))
             continue
         residuals = tuple(residual(c, t) for c, t in zip(captures.captures, whole, strict=True))
-        found.append(Fit(tuple(placed), x, likelihood(captures.captures, residuals), whole, residuals))
+        found.append(CaptureFit(tuple(placed), x, likelihood(captures.captures, residuals), whole, residuals))
     return found
 
 
-def started(captures: CaptureSet, placed: Sequence[Placed], x: Array) -> Fit:
+def started(captures: CaptureSet, placed: Sequence[PlacedEffect], x: Array) -> CaptureFit:
     """A start for `fit`, inside the bounds but for what is held."""
     return evaluate(captures, placed, [np.where(free(placed), np.clip(x, *bounds(placed)), x)])[0]
 
 
-def with_slopes(captures: CaptureSet, at: Fit) -> Fit:
-    """The same with derivatives by the handles, one difference each, away from the upper bound; 0 where none can be."""
+def with_slopes(captures: CaptureSet, at: CaptureFit) -> CaptureFit:
+    """This fit with derivatives by the handles: one forward difference each (backward at the upper bound), 0 where the
+    capture cannot be simulated."""
     _, high = bounds(at.placed)
     step = steps(at.placed)
     step = np.where(at.x + step > high, -step, step)
@@ -85,7 +86,7 @@ def with_slopes(captures: CaptureSet, at: Fit) -> Fit:
     return replace(at, slopes=tuple(slopes))
 
 
-def normal(captures: Sequence[Capture], at: Fit) -> tuple[Array, Array]:
+def normal(captures: Sequence[CaptureRecording], at: CaptureFit) -> tuple[Array, Array]:
     """Gradient (P,) and normal matrix (P, P) of −L by Gauss and Newton, scales as they are."""
     assert at.slopes is not None
     gradient, matrix = np.zeros(len(at.x)), np.zeros((len(at.x), len(at.x)))
@@ -99,7 +100,7 @@ def normal(captures: Sequence[Capture], at: Fit) -> tuple[Array, Array]:
     return gradient, matrix
 
 
-def step_from(captures: Sequence[Capture], at: Fit, stride: Array) -> tuple[Array, float]:
+def step_from(captures: Sequence[CaptureRecording], at: CaptureFit, stride: Array) -> tuple[Array, float]:
     """Step of the handles (P,), at most ``stride`` (P,) each and inside the bounds, and how much of L it should gain.
 
     What is held stays.
@@ -108,11 +109,11 @@ def step_from(captures: Sequence[Capture], at: Fit, stride: Array) -> tuple[Arra
     low, high = bounds(at.placed)
     size = np.where(free(at.placed), np.sqrt(np.diag(matrix)), 0.0)
     room = np.maximum(low - at.x, -stride), np.minimum(high - at.x, stride)
-    move = bounded_step(Normal(0.0, gradient, matrix), size, DAMPING, *room)
+    move = bounded_step(NormalEquations(0.0, gradient, matrix), size, DAMPING, *room)
     return move, -float(gradient @ move + 0.5 * move @ matrix @ move)
 
 
-def fit(captures: CaptureSet, start: Fit, most: int = 4) -> Fit:
+def fit(captures: CaptureSet, start: CaptureFit, most: int = 4) -> CaptureFit:
     """Climb L from a start.
 
     Derivatives are taken once, where the start has none, and then follow the steps by Broyden's update (1965).
@@ -120,7 +121,7 @@ def fit(captures: CaptureSet, start: Fit, most: int = 4) -> Fit:
     Parameters
     ----------
     captures : CaptureSet
-    start : Fit
+    start : CaptureFit
         Effects that hold their parameter are simulated with it and not moved.
     most : int
         Most steps.
@@ -146,21 +147,21 @@ def fit(captures: CaptureSet, start: Fit, most: int = 4) -> Fit:
     return here
 
 
-def _broyden(here: Fit, there: Fit, step: Array) -> Slopes:
+def _broyden(here: CaptureFit, there: CaptureFit, step: Array) -> Slopes:
     """Derivatives that agree with a step that was taken: the least change, lengths in units of the differences."""
     assert here.slopes is not None
     move = there.x - here.x
     share = move / step**2 / max(float(np.sum((move / step) ** 2)), 1e-300)
     made: list[list[dict[str, Array]]] = [[] for _ in move]
     for c, (a, b) in enumerate(zip(here.residuals, there.residuals, strict=True)):
-        foretold = {name: sum(own[c][name] * m for own, m in zip(here.slopes, move, strict=True)) for name in a}
-        miss = {name: b[name] - a[name] - foretold[name] for name in a}
+        forecast = {name: sum(own[c][name] * m for own, m in zip(here.slopes, move, strict=True)) for name in a}
+        miss = {name: b[name] - a[name] - forecast[name] for name in a}
         for k, own in enumerate(here.slopes):
             made[k].append({name: own[c][name] + miss[name] * share[k] for name in a})
     return tuple(tuple(m) for m in made)
 
 
-def spread(captures: Sequence[Capture], at: Fit) -> Array:
+def spread(captures: Sequence[CaptureRecording], at: CaptureFit) -> Array:
     """Standard deviation of each parameter's value (P,); inf where the recordings say nothing."""
     _, matrix = normal(captures, at)
     size = np.sqrt(np.diag(matrix))

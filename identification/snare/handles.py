@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.model import Placed
+from ...models.model import PlacedEffect
 from ...models.snare.setup import APPLIED, NUMBERS
 
 Array = NDArray[np.float64]
@@ -59,32 +59,32 @@ HANDLES = {
 """By the effect's name; each has one parameter."""
 
 
-def handle_of(placed: Placed) -> Handle:
+def handle_of(placed: PlacedEffect) -> Handle:
     """The handle of an effect's parameter."""
     return HANDLES[placed.effect.name]
 
 
-def key_of(placed: Placed) -> str:
+def key_of(placed: PlacedEffect) -> str:
     """``effect.place.parameter`` of an effect, which has one."""
     return f"{placed.key}.{(APPLIED | NUMBERS)[placed.effect.name].parameter}"
 
 
-def values_of(placed: Sequence[Placed], x: Array) -> dict[str, float]:
+def values_of(placed: Sequence[PlacedEffect], x: Array) -> dict[str, float]:
     """Parameters by ``effect.place.parameter``, their handles at x (P,)."""
     return {key_of(p): handle_of(p).value(float(v)) for p, v in zip(placed, x, strict=True)}
 
 
-def bounds(placed: Sequence[Placed]) -> tuple[Array, Array]:
+def bounds(placed: Sequence[PlacedEffect]) -> tuple[Array, Array]:
     """Lowest and highest x (P,), those of held parameters too."""
     handles = [handle_of(p) for p in placed]
     return np.array([h.low for h in handles], float), np.array([h.high for h in handles], float)
 
 
-def steps(placed: Sequence[Placed]) -> Array:
+def steps(placed: Sequence[PlacedEffect]) -> Array:
     """Steps of differences in x (P,)."""
     return np.array([handle_of(p).step for p in placed], float)
 
 
-def free(placed: Sequence[Placed]) -> NDArray[np.bool_]:
+def free(placed: Sequence[PlacedEffect]) -> NDArray[np.bool_]:
     """Which parameters are fitted (P,): those that the model file does not hold."""
     return np.array([not p.hold for p in placed], bool)

@@ -11,8 +11,8 @@ from ...models.model import Model
 from ..parameter_list import parameter_list
 from .answer import estimates, with_found
 from .channels import channel_errors
-from .fit import Fit, evaluate, fit, normal, with_slopes
-from .recording import Capture
+from .fit import CaptureFit, evaluate, fit, normal, with_slopes
+from .recording import CaptureRecording
 from .search import demand_simulated, start_at
 from .sets import sets_of
 
@@ -21,14 +21,14 @@ STEPS = 8
 
 
 @dataclass(frozen=True)
-class IdentifiedCaptures:
+class CaptureIdentification:
     """A fit of captures, the model with its values, and the recordings."""
 
     model: Model
-    fit: Fit
-    train: tuple[Capture, ...]
-    holdout: tuple[Capture, ...]
-    held: Fit | None
+    fit: CaptureFit
+    train: tuple[CaptureRecording, ...]
+    holdout: tuple[CaptureRecording, ...]
+    held: CaptureFit | None
 
     def to_json(self) -> dict[str, Any]:
         """The published form."""
@@ -58,11 +58,11 @@ def identify_captures(
     *,
     progress: Callable[[str], None] = lambda _: None,
     jobs: int | None = None,
-) -> IdentifiedCaptures:
+) -> CaptureIdentification:
     """Fit every parameter of a capture's effects; arguments and errors as `diagnose_captures`."""
     progress("reading the recordings")
     with sets_of(model, recordings, holdout, jobs) as (train, locked):
         progress("fitting the effects' parameters with the simulation in the loop")
         found = with_slopes(train, fit(train, start_at(model, train), STEPS))
         held = demand_simulated(model, evaluate(locked, found.placed, [found.x])[0]) if holdout else None
-    return IdentifiedCaptures(with_found(model, found), found, tuple(train.captures), tuple(locked.captures), held)
+    return CaptureIdentification(with_found(model, found), found, tuple(train.captures), tuple(locked.captures), held)

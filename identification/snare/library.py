@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ...models.effect import Effect, Parameter
 from ...models.effects import get_effect
-from ...models.model import Model, Placed, places
+from ...models.model import Model, PlacedEffect, places
 from ...models.snare.setup import APPLIED, NUMBERS, SnareTree
 from .handles import handle_of, key_of
 
@@ -26,27 +26,27 @@ def start_of(model: Model) -> Array:
     return np.array(found, float)
 
 
-def absent(model: Model, placed: Placed) -> float:
+def absent(model: Model, placed: PlacedEffect) -> float:
     """Handle of an effect that is not there."""
     assert isinstance(model.tree, SnareTree)
     return handle_of(placed).x(model.tree.setup.usual(placed.effect.name))
 
 
-def library(model: Model) -> list[Placed]:
+def library(model: Model) -> list[PlacedEffect]:
     """Every effect of the vocabulary that this capture can have, beside those that the model has.
 
     Numbers of the set-up that the model file does not give are candidates too: to correct one is no missing physics.
     """
     known = {p.key for p in model.effects}
-    every = [Placed(get_effect(name), at) for name in APPLIED for at in places(get_effect(name), model.tree)]
+    every = [PlacedEffect(get_effect(name), at) for name in APPLIED for at in places(get_effect(name), model.tree)]
     return [p for p in every if p.key not in known] + _numbers_open(model)
 
 
-def _numbers_open(model: Model) -> list[Placed]:
+def _numbers_open(model: Model) -> list[PlacedEffect]:
     assert isinstance(model.tree, SnareTree)
     setup = model.tree.setup
     target = ("mass",) if setup.target.rotates else ()  # its mass and its inertia go together
-    return [Placed(_number(name), a.at) for name, a in NUMBERS.items() if name not in (*setup.given, *target)]
+    return [PlacedEffect(_number(name), a.at) for name, a in NUMBERS.items() if name not in (*setup.given, *target)]
 
 
 def _number(name: str) -> Effect:

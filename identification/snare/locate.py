@@ -5,11 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ...report.words import percent
 from ..diagnosis import Location
 from .channels import channels, modelled
 from .comparison import QUARTER
-from .recording import Capture
-from .search import Searched
+from .recording import CaptureRecording
+from .search import CaptureSelection
 
 Array = NDArray[np.float64]
 
@@ -21,7 +22,7 @@ TOUCH, STANDS_OUT = 0.5, 8.0
 MOST_WINDOWS = 6
 
 
-def locate_capture(found: Searched, train: Sequence[Capture]) -> tuple[Location, ...]:
+def locate_capture(found: CaptureSelection, train: Sequence[CaptureRecording]) -> tuple[Location, ...]:
     """Channels of the first capture by the share of their own energy that is explained, or left without a name."""
     entries = []
     capture, before, after = train[0], found.first.tracks[0], found.last.tracks[0]
@@ -41,14 +42,14 @@ def locate_capture(found: Searched, train: Sequence[Capture]) -> tuple[Location,
         where = "throughout the capture"
         inside = float(np.sum(change[channel.times >= touched] ** 2)) / max(float(np.sum(change**2)), 1e-300)
         if np.isfinite(touched) and inside > 0.9:
-            where = f"in contact, from {touched:.2f} s on ({100 * inside:.0f} % of it)"
+            where = f"in contact, from {touched:.2f} s on ({percent(inside)} of it)"
         elif np.isfinite(touched) and inside < 0.5:
-            where = f"before contact, until {touched:.2f} s ({100 * (1 - inside):.0f} % of it)"
+            where = f"before contact, until {touched:.2f} s ({percent(1 - inside)} of it)"
         made.append(Location(channel.name, float(energy / total), _windows(channel.times, change), where))
     return tuple(made)
 
 
-def _touch(capture: Capture) -> float:
+def _touch(capture: CaptureRecording) -> float:
     """When a force first stands out of its start [s]; not a number without a sensor or a contact."""
     for body, force in capture.measured.force.items():
         size = np.linalg.norm(np.nan_to_num(force), axis=1)

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from ...errors import InputError
 from ...models.model import Model
 from ...models.snare.ring_drive import RingDrive
-from ...models.snare.setup import Setup, SnareTree
+from ...models.snare.setup import CaptureSetup, SnareTree
 from ...recordings import read_recording
 from ...recordings.attitude import attitude
 
@@ -54,7 +54,7 @@ class Track:
 
 
 @dataclass(frozen=True)
-class Capture:
+class CaptureRecording:
     """One capture test: its file, times (K,) [s] from the start, what was measured, and the set-up at its start.
 
     ``sensors`` names the sensor of each body in the track's forces; ``zero`` is the time of the recording's first row,
@@ -67,7 +67,7 @@ class Capture:
     times: Array
     measured: Track
     sensors: Mapping[str, str]
-    setup: Setup
+    setup: CaptureSetup
     drive: RingDrive | None
     zero: float
     noise: Mapping[str, float]
@@ -75,12 +75,12 @@ class Capture:
     notes: tuple[str, ...]
 
 
-def load_captures(model: Model, paths: Sequence[str | Path]) -> list[Capture]:
+def load_captures(model: Model, paths: Sequence[str | Path]) -> list[CaptureRecording]:
     """Read recordings of captures; raises InputError for what is missing or cannot be."""
     return [_capture(model, path, read_recording(path, model.signals)) for path in paths]
 
 
-def _capture(model: Model, path: str | Path, data: xr.Dataset) -> Capture:
+def _capture(model: Model, path: str | Path, data: xr.Dataset) -> CaptureRecording:
     assert isinstance(model.tree, SnareTree)
     body = body_of(path, data)
     time = data["time"].values
@@ -123,7 +123,7 @@ def _capture(model: Model, path: str | Path, data: xr.Dataset) -> Capture:
     noise["position"] = _scatter(np.diff(measured.position[:open_snare], axis=0)) / np.sqrt(2)
     setup = replace(model.tree.setup, target=target)
     carried = {of: _scatter(force) for of, force in forces.items()}
-    return Capture(str(path), body, times, measured, sensors, setup, drive, zero, noise, carried, tuple(notes))
+    return CaptureRecording(str(path), body, times, measured, sensors, setup, drive, zero, noise, carried, tuple(notes))
 
 
 def _drive(path: str | Path, data: xr.Dataset, since: Array) -> RingDrive | None:
@@ -150,7 +150,7 @@ def _forces(data: xr.Dataset, since: Array, times: Array, notes: list[str]) -> t
     return forces, sensors
 
 
-def sensed_by(capture: Capture, track: Track | None) -> Capture:
+def sensed_by(capture: CaptureRecording, track: Track | None) -> CaptureRecording:
     """The capture with its force sensor on the body whose force it shows in a simulation, with a note where it moved.
 
     What the cables do to the target they do to the end effector the other way round: a name can be misread, a sign not.
@@ -175,7 +175,7 @@ def sensed_by(capture: Capture, track: Track | None) -> Capture:
     )
 
 
-def check_sensors(captures: Sequence[Capture]) -> None:
+def check_sensors(captures: Sequence[CaptureRecording]) -> None:
     """Raise InputError where captures are not told by forces on the same bodies."""
     for capture in captures:
         if capture.sensors.keys() != captures[0].sensors.keys():

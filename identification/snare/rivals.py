@@ -9,9 +9,9 @@ from ..deciding import ALIKE
 from ..evidence.rival import RivalOdds
 from ..reliability import BOOTSTRAPS
 from .comparison import LONG, SLOW, Blocks, variances
-from .fit import Fit
-from .recording import Capture
-from .trials import Trial
+from .fit import CaptureFit
+from .recording import CaptureRecording
+from .trials import CaptureTrial
 
 Array = NDArray[np.float64]
 
@@ -20,7 +20,11 @@ STRETCH = 4
 
 
 def weigh(
-    captures: Sequence[Capture], best: Trial, others: Sequence[Trial], before: Fit, seed: int
+    captures: Sequence[CaptureRecording],
+    best: CaptureTrial,
+    others: Sequence[CaptureTrial],
+    before: CaptureFit,
+    seed: int,
 ) -> tuple[float, tuple[RivalOdds, ...]]:
     """How often a trial beats all others, and how often each of these does, likeliest first.
 
@@ -61,7 +65,7 @@ def _quarters(block: str) -> int:
     return LONG // SLOW if block.startswith("chatter") else 1
 
 
-def _signal(before: Fit, after: Fit, by: Mapping[str, float]) -> Array:
+def _signal(before: CaptureFit, after: CaptureFit, by: Mapping[str, float]) -> Array:
     """What a candidate changes, whitened by the scales, end to end."""
     pairs = zip(before.residuals, after.residuals, strict=True)
     return np.concatenate([((a[name] - b[name]) / by[name] ** 0.5).ravel() for a, b in pairs for name in a])

@@ -12,13 +12,13 @@ from types import TracebackType
 
 from ...errors import InputError
 from ...models.snare.ring_drive import RingDrive
-from ...models.snare.setup import Setup
-from .recording import EVERY, Capture, Track
+from ...models.snare.setup import CaptureSetup
+from .recording import EVERY, CaptureRecording, Track
 
 SEARCH = (5e-3, 6, 1e-3)
 """Step [s], elements per cable and first steps [s] in a search: within 0.1 mm of finer ones over a capture."""
 FINER = (1e-3, 10, 2.5e-4)
-"""The same where the coarse ones do not converge."""
+"""Step [s], elements per cable and first steps [s] where `SEARCH` does not converge."""
 
 MOST_LOST = 3
 """Times that processes which died are replaced."""
@@ -32,7 +32,7 @@ Key = tuple[int, tuple[tuple[str, float], ...]]
 class Job:
     """A capture as it is to be simulated: set-up at its start, drive, and the number of times in its track."""
 
-    setup: Setup
+    setup: CaptureSetup
     drive: RingDrive | None
     n_times: int
 
@@ -77,17 +77,17 @@ def _run(number: int, values: Values) -> Track | None:
     return simulated(_jobs[number], values)
 
 
-class Runs:
+class CaptureRuns:
     """Simulations of some captures; a context, which ends its processes.
 
     Parameters
     ----------
-    captures : sequence of Capture
+    captures : sequence of CaptureRecording
     workers : int
         Processes; 1 runs everything in this one.
     """
 
-    def __init__(self, captures: Sequence[Capture], workers: int = 2) -> None:
+    def __init__(self, captures: Sequence[CaptureRecording], workers: int = 2) -> None:
         """Start nothing yet."""
         self._jobs = tuple(Job(c.setup, c.drive, len(c.times)) for c in captures)
         self._workers = workers
@@ -95,7 +95,7 @@ class Runs:
         self._lost = 0
         self._known: dict[Key, Track | None] = {}
 
-    def __enter__(self) -> "Runs":
+    def __enter__(self) -> "CaptureRuns":
         """Ready."""
         return self
 

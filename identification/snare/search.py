@@ -11,13 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...errors import InputError
-from ...models.model import Model, Placed
+from ...models.model import Model, PlacedEffect
 from ..evidence.rival import RivalOdds
-from .fit import Fit, evaluate, fit, started, with_slopes
+from .fit import CaptureFit, evaluate, fit, started, with_slopes
 from .library import library, start_of
 from .rivals import weigh
 from .sets import CaptureSet
-from .trials import Trial, try_all
+from .trials import CaptureTrial, try_all
 
 CHANCE = 0.005
 """How often the best of all candidates may beat the bar by chance."""
@@ -32,31 +32,31 @@ RIVAL = 0.2
 
 
 @dataclass(frozen=True)
-class Named:
+class CaptureNaming:
     """An effect taken: its trial, how often it beat its rivals, these, and the held-out captures before and after."""
 
-    trial: Trial
+    trial: CaptureTrial
     margin: float
     rivals: tuple[RivalOdds, ...]
-    held_before: Fit
-    held_after: Fit
+    held_before: CaptureFit
+    held_after: CaptureFit
 
 
 @dataclass(frozen=True)
-class Searched:
+class CaptureSelection:
     """What was named; the fits as the model came, and at the end; the same evaluated on the held-out captures.
 
     ``opening`` is what the first round made of every candidate, ``rejected`` those that passed without being
     confirmed, ``bar`` the score that a candidate had to beat.
     """
 
-    named: tuple[Named, ...]
-    first: Fit
-    last: Fit
-    held_first: Fit
-    held_last: Fit
-    opening: tuple[Trial, ...]
-    rejected: tuple[Placed, ...]
+    named: tuple[CaptureNaming, ...]
+    first: CaptureFit
+    last: CaptureFit
+    held_first: CaptureFit
+    held_last: CaptureFit
+    opening: tuple[CaptureTrial, ...]
+    rejected: tuple[PlacedEffect, ...]
     bar: float
 
 
@@ -67,7 +67,7 @@ def search(
     *,
     progress: Callable[[str], None] = lambda _: None,
     seed: int = 0,
-) -> Searched:
+) -> CaptureSelection:
     """Add effects to a capture's model until no candidate is left that passes and is confirmed.
 
     Parameters
@@ -89,9 +89,9 @@ def search(
     held_first = held = demand_simulated(model, evaluate(locked, found.placed, [found.x])[0])
     pool = library(model)
     bar = float(np.log(max(len(pool), 1) / CHANCE))
-    named: list[Named] = []
-    rejected: dict[str, Placed] = {}
-    opening: tuple[Trial, ...] = ()
+    named: list[CaptureNaming] = []
+    rejected: dict[str, PlacedEffect] = {}
+    opening: tuple[CaptureTrial, ...] = ()
     for number in range(ROUNDS):
         have = {p.effect.name for p in found.placed}
         left = [p for p in pool if p.effect.name not in have]
@@ -110,19 +110,19 @@ def search(
             break
         rivals = [t for t in trials if t is not trial and t.score > RIVAL * trial.score]
         margin, odds = weigh(train.captures, trial, rivals, found, seed)
-        named.append(Named(trial, margin, odds, held, there))
+        named.append(CaptureNaming(trial, margin, odds, held, there))
         found, held = trial.fit, there
     found = with_slopes(train, found)
-    return Searched(tuple(named), first, found, held_first, held, opening, tuple(rejected.values()), bar)
+    return CaptureSelection(tuple(named), first, found, held_first, held, opening, tuple(rejected.values()), bar)
 
 
-def start_at(model: Model, captures: CaptureSet) -> Fit:
+def start_at(model: Model, captures: CaptureSet) -> CaptureFit:
     """The model as given, simulated; raises InputError for a capture that cannot be."""
     return demand_simulated(model, started(captures, model.effects, start_of(model)))
 
 
-def demand_simulated(model: Model, at: Fit) -> Fit:
-    """The same; raises InputError for a capture that cannot be simulated, fitted or held out."""
+def demand_simulated(model: Model, at: CaptureFit) -> CaptureFit:
+    """The fit as it came; raises InputError for a capture, fitted or held out, that cannot be simulated."""
     if not np.isfinite(at.likelihood):
         raise InputError(
             f"{model.path}: the capture cannot be simulated from where the recording starts (the pin inside a cable, "

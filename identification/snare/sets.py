@@ -10,17 +10,17 @@ from ...errors import InputError
 from ...models.model import Model
 from .handles import values_of
 from .library import start_of
-from .recording import Capture, Track, check_sensors, load_captures, sensed_by
-from .runs import Runs, Values
+from .recording import CaptureRecording, Track, check_sensors, load_captures, sensed_by
+from .runs import CaptureRuns, Values
 
 
 @dataclass(frozen=True)
 class CaptureSet:
     """Some of the captures that are simulated: their numbers in the runs, and themselves."""
 
-    runs: Runs
+    runs: CaptureRuns
     numbers: Sequence[int]
-    captures: Sequence[Capture]
+    captures: Sequence[CaptureRecording]
 
     def tracks_at(self, many: Sequence[Values]) -> list[list[Track | None]]:
         """Tracks of all the captures for each of many sets of values."""
@@ -42,7 +42,7 @@ def sets_of(
         raise InputError("recordings: none is given; give one or more")
     captures = load_captures(model, [*recordings, *holdout])
     check_sensors(captures)
-    with Runs(captures, jobs or min(4, os.cpu_count() or 1)) as runs:
+    with CaptureRuns(captures, jobs or min(4, os.cpu_count() or 1)) as runs:
         values = values_of(model.effects, start_of(model))
         tracks = runs([(n, values) for n in range(len(captures))])
         captures = [sensed_by(c, track) for c, track in zip(captures, tracks, strict=True)]

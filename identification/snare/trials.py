@@ -1,7 +1,7 @@
 """One round of the search over a capture's effects: every candidate tried, the best few fitted.
 
 Each candidate is tried at a few values beside what the model has; the likelihood that this would reach, once the
-model's own parameters have moved, is foreseen from their derivatives. The best few are fitted together with everything
+model's own parameters have moved, is expected from their derivatives. The best few are fitted together with everything
 else.
 """
 
@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.model import Model, Placed
+from ...models.model import Model, PlacedEffect
 from .comparison import Blocks, price, variances
-from .fit import Fit, evaluate, fit, step_from, with_slopes
+from .fit import CaptureFit, evaluate, fit, step_from, with_slopes
 from .handles import bounds, handle_of, steps, values_of
 from .library import absent
-from .recording import Capture
+from .recording import CaptureRecording
 from .sets import CaptureSet
 
 Array = NDArray[np.float64]
@@ -24,20 +24,20 @@ Array = NDArray[np.float64]
 FITTED = 3
 """Candidates of a round that are fitted."""
 HOPE = 2.0
-"""A candidate that is foreseen to lose more of the likelihood is not fitted."""
+"""A candidate that is expected to lose more of the likelihood is not fitted."""
 FORESIGHT = 4.0
 """How far derivatives are believed where no simulation follows, in units of the differences."""
 
 
 @dataclass(frozen=True)
-class Trial:
+class CaptureTrial:
     """A candidate beside what was there: its fit, and the share of the weighted residual energy that it explains.
 
     ``score`` is the likelihood gained less the price of a parameter.
     """
 
-    placed: Placed
-    fit: Fit
+    placed: PlacedEffect
+    fit: CaptureFit
     score: float
     explained: float
 
@@ -45,21 +45,21 @@ class Trial:
 def try_all(
     model: Model,
     captures: CaptureSet,
-    found: Fit,
-    candidates: Sequence[Placed],
+    found: CaptureFit,
+    candidates: Sequence[PlacedEffect],
     rejected: Collection[str],
     progress: Callable[[str], None],
-) -> tuple[Trial, ...]:
-    """Try all candidates beside a fit, and fit the best few; best foreseen first.
+) -> tuple[CaptureTrial, ...]:
+    """Try all candidates beside a fit, and fit the best few; best expected first.
 
     Parameters
     ----------
     model : Model
     captures : CaptureSet
         Those that are fitted.
-    found : Fit
+    found : CaptureFit
         Of the model with what was named so far.
-    candidates : sequence of Placed
+    candidates : sequence of PlacedEffect
     rejected : collection of str
         Keys of candidates that are not worth a fit.
     progress : callable
@@ -75,17 +75,17 @@ def try_all(
         tries = evaluate(captures, (*found.placed, p), places[p.key])
         entries.append((*_most_hopeful(captures.captures, found, tries), p, tries))
     trials = []
-    for rank, (foreseen, best, p, tries) in enumerate(sorted(entries, key=lambda e: -e[0])):
-        hopeful = foreseen > found.likelihood - HOPE and np.isfinite(best.likelihood)
+    for rank, (expected, best, p, tries) in enumerate(sorted(entries, key=lambda e: -e[0])):
+        hopeful = expected > found.likelihood - HOPE and np.isfinite(best.likelihood)
         if rank < FITTED and hopeful and p.key not in rejected:
             progress(f"fitting {p.effect.name} at {p.at} together with what is there")
             best = _joint(captures, found, [f for f in tries if f.residuals], absent(model, p))
         score = float(best.likelihood - found.likelihood - price(found.residuals))
-        trials.append(Trial(p, best, score, _explained(captures.captures, found, best)))
+        trials.append(CaptureTrial(p, best, score, _explained(captures.captures, found, best)))
     return tuple(trials)
 
 
-def _joint(captures: CaptureSet, found: Fit, tried: Sequence[Fit], nothing: float) -> Fit:
+def _joint(captures: CaptureSet, found: CaptureFit, tried: Sequence[CaptureFit], nothing: float) -> CaptureFit:
     """Fit a candidate with everything, from the best of its tries and of four more on either side of that.
 
     Its first derivative is the secant to the nearest of them, or to its absence, where its handle is at ``nothing``:
@@ -109,19 +109,21 @@ def _joint(captures: CaptureSet, found: Fit, tried: Sequence[Fit], nothing: floa
         {name: (a[name] - b[name]) / gap for name in a} for a, b in zip(best.residuals, other.residuals, strict=True)
     )
     here = replace(best, slopes=(*found.slopes, last))
-    _, moved = _foreseen(own, found, best)
+    _, moved = _expected(own, found, best)
     if np.any(moved != found.x):
         (start,) = evaluate(captures, placed, [np.append(moved, best.x[-1])])
         here = replace(start, slopes=here.slopes) if start.likelihood > best.likelihood else here
     return fit(captures, here)
 
 
-def _most_hopeful(captures: Sequence[Capture], found: Fit, tries: Sequence[Fit]) -> tuple[float, Fit]:
-    """The try that is foreseen to reach the most of L, after that."""
-    return max(((_foreseen(captures, found, f)[0], f) for f in tries), key=lambda e: e[0])
+def _most_hopeful(
+    captures: Sequence[CaptureRecording], found: CaptureFit, tries: Sequence[CaptureFit]
+) -> tuple[float, CaptureFit]:
+    """The try that is expected to reach the most of L, after that."""
+    return max(((_expected(captures, found, f)[0], f) for f in tries), key=lambda e: e[0])
 
 
-def _foreseen(captures: Sequence[Capture], found: Fit, there: Fit) -> tuple[float, Array]:
+def _expected(captures: Sequence[CaptureRecording], found: CaptureFit, there: CaptureFit) -> tuple[float, Array]:
     """L of a try once the parameters that were there move as their derivatives allow, and where they then stand."""
     if not np.isfinite(there.likelihood) or not len(found.x):
         return there.likelihood, found.x
@@ -130,7 +132,7 @@ def _foreseen(captures: Sequence[Capture], found: Fit, there: Fit) -> tuple[floa
     return float(there.likelihood + gain), found.x + move
 
 
-def _explained(captures: Sequence[Capture], found: Fit, there: Fit) -> float:
+def _explained(captures: Sequence[CaptureRecording], found: CaptureFit, there: CaptureFit) -> float:
     """Share of the residual energy that is gone, each block by its own scale before."""
     if not there.residuals:
         return 0.0

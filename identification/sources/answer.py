@@ -11,15 +11,17 @@ from ..deciding import CLASS
 from ..diagnosis import Candidate, ChannelFit, Estimate, Finding, Limit, Misfit, Rival
 from ..reliability import of_name
 from ..wording import experiment_sentence
-from .decide import Decided
+from .decide import Decision
 from .fit import Covariances, deviations
-from .search import Name
-from .source import At, Linear, Source
+from .search import Naming
+from .source import Linearisation, ModelPoint, Source
 
 Array = NDArray[np.float64]
 
 
-def estimates(source: Source, given: At, here: Linear, covariances: Covariances) -> dict[str, dict[str, Estimate]]:
+def estimates(
+    source: Source, given: ModelPoint, here: Linearisation, covariances: Covariances
+) -> dict[str, dict[str, Estimate]]:
     """Parameters by the effect's key and their own name, the shifts free within their deviations."""
     spread, _ = deviations(source, given, here, covariances)
     std = dict(zip(here.at.keys, spread, strict=True))
@@ -35,8 +37,8 @@ def estimates(source: Source, given: At, here: Linear, covariances: Covariances)
 
 
 def finding(
-    decided: Decided,
-    n: Name,
+    decided: Decision,
+    n: Naming,
     values: Mapping[str, Estimate],
     sentence: str,
     explained: float,
@@ -61,23 +63,23 @@ def finding(
     return Finding(p.effect.name, p.at, sure, n.share * scale, dict(values), sentence, tuple(rivals), n.gain)
 
 
-def with_found(model: Model, at: At) -> Model:
+def with_found(model: Model, at: ModelPoint) -> Model:
     """The model with effects and their values."""
     placed = {p.key: p for p in model.effects} | {p.key: p for p in at.placed}
     return replace(model, effects=tuple(placed.values()), values={**model.values, **at.all_values})
 
 
-def rms(linear: Linear) -> Array:
+def rms(linear: Linearisation) -> Array:
     """RMS of what is left of each channel (c,) in all recordings together."""
     return np.sqrt(np.mean(np.concatenate(linear.residuals) ** 2, axis=0))
 
 
 def channel_fits(
-    decided: Decided, channels: Sequence[str], units: Sequence[str], train: Array, held: Array, floors: Sequence[float]
+    decided: Decision, channels: Sequence[str], units: Sequence[str], train: Array, held: Array, floors: Sequence[float]
 ) -> tuple[ChannelFit, ...]:
     """Errors of every channel before and after; ``train``, ``held``: what they are relative to (c,)."""
 
-    def misfit(before: Linear, after: Linear, sizes: Array, c: int) -> Misfit:
+    def misfit(before: Linearisation, after: Linearisation, sizes: Array, c: int) -> Misfit:
         a, b, size = float(rms(before)[c]), float(rms(after)[c]), float(sizes[c])
         return Misfit(a, b, a / size, b / size)
 
@@ -88,7 +90,7 @@ def channel_fits(
     )
 
 
-def candidates(decided: Decided) -> tuple[Candidate, ...]:
+def candidates(decided: Decision) -> tuple[Candidate, ...]:
     """Every effect by itself on top of the model as given."""
     named = {n.placed.key for n in decided.best.names}
     return tuple(
@@ -97,7 +99,7 @@ def candidates(decided: Decided) -> tuple[Candidate, ...]:
     )
 
 
-def limits(source: Source, decided: Decided) -> tuple[Limit, ...]:
+def limits(source: Source, decided: Decision) -> tuple[Limit, ...]:
     """What would have been named, had it been there."""
     named = {n.placed.key for n in decided.best.names}
     return tuple(
@@ -109,7 +111,7 @@ def limits(source: Source, decided: Decided) -> tuple[Limit, ...]:
     )
 
 
-def not_confirmed(decided: Decided) -> list[str]:
+def not_confirmed(decided: Decision) -> list[str]:
     """Names that only the training recordings asked for, in words."""
     named = {n.placed.key for n in decided.best.names}
     return [

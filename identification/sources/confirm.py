@@ -1,6 +1,6 @@
 """Confirm on the held-out recordings what a search named: log density of them given the others, with and without each.
 
-As in `evidence.confirm`: without an effect the rest is fitted again, and both foretell the held-out recordings, every
+As in `evidence.confirm`: without an effect the rest is fitted again, and both predict the held-out recordings, every
 nuisance integrated out. A name stays if that density falls without it by more than it scatters over blocks of time. By
 the same rule a nameless curve of the last search stays.
 """
@@ -12,31 +12,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..deciding import DISCREPANCY, GATE, TOLERANCES
-from ..evidence.arm import Weighed
+from ..evidence.arm import WeighedRecordings
 from ..evidence.confirm import scatter
-from ..evidence.found import Remainder
 from ..evidence.members import Members
-from ..evidence.projected import Projected
+from ..evidence.projected import ProjectedEvidence
 from ..evidence.rounds import as_names, share_of_residual
-from ..evidence.search import Search, Slot
+from ..evidence.search import MemberOdds, Search
+from ..evidence.selection import Remainder
 from ..evidence.tolerant import searched
 from .fit import fit, linearised, shift_columns
-from .search import Found, Name, opened
-from .source import At, Linear, Source
+from .search import Naming, Selection, opened
+from .source import Linearisation, ModelPoint, Source
 from .weigh import covariances, weigh
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Missed:
+class HeldOutLoss:
     """What the held-out recordings lose without an effect: log density and its scatter; the fit without it, on the
     training and on the held-out recordings."""
 
     gain: float
     scatter: float
-    train: Linear
-    held: Linear
+    train: Linearisation
+    held: Linearisation
 
     @property
     def sure(self) -> float:
@@ -45,21 +45,23 @@ class Missed:
 
 
 @dataclass(frozen=True)
-class Confirmed:
+class Confirmation:
     """Names that stay and what the held-out recordings miss of each, those that do not, the last fit, and the log
     density of the held-out recordings."""
 
-    names: tuple[Name, ...]
-    missed: Mapping[str, Missed]
-    rejected: tuple[Name, ...]
-    train: Linear
-    held: Linear
+    names: tuple[Naming, ...]
+    missed: Mapping[str, HeldOutLoss]
+    rejected: tuple[Naming, ...]
+    train: Linearisation
+    held: Linearisation
     density: float
-    noise: Weighed
+    noise: WeighedRecordings
     """Of all recordings."""
 
 
-def confirm(source: Source, given: At, found: Found, progress: Callable[[str], None] = lambda _: None) -> Confirmed:
+def confirm(
+    source: Source, given: ModelPoint, found: Selection, progress: Callable[[str], None] = lambda _: None
+) -> Confirmation:
     """Take out the name that the held-out recordings miss least, until they miss every one."""
     held, last, names = source.held, found.last, list(found.names)
     shifted, own = shift_columns(last), covariances(found.weighed)
@@ -67,17 +69,17 @@ def confirm(source: Source, given: At, found: Found, progress: Callable[[str], N
     there = linearised(source, held, source.settled(last.at, held))
     beside = shift_columns(there)
     could = [[x[:, c] for x in there.columns] for c in range(len(source.channels))]
-    noise = replace(found.weighed, runs=[*found.weighed.runs, *source.hangs(held, there, could)])
-    whole = _foretold(source, given, last, there, noise)
-    missed: dict[str, Missed] = {}
-    rejected: list[Name] = []
+    noise = replace(found.weighed, runs=[*found.weighed.runs, *source.noise_channels(held, there, could)])
+    whole = _forecast(source, given, last, there, noise)
+    missed: dict[str, HeldOutLoss] = {}
+    rejected: list[Naming] = []
     while names:
         for name in names:
             key = name.placed.key
             rest = fit(source, given, last.at.without(key), own, shifted)
             other = linearised(source, held, source.settled(rest.at, held), beside)
-            density, blocks = _foretold(source, given, rest, other, noise)
-            missed[key] = Missed(whole[0] - density, scatter(0.5 * (blocks - whole[1])), rest, other)
+            density, blocks = _forecast(source, given, rest, other, noise)
+            missed[key] = HeldOutLoss(whole[0] - density, scatter(0.5 * (blocks - whole[1])), rest, other)
         weakest = min(names, key=lambda n: missed[n.placed.key].sure)
         if missed[weakest.placed.key].sure > GATE:
             break
@@ -85,11 +87,13 @@ def confirm(source: Source, given: At, found: Found, progress: Callable[[str], N
         rejected.append(weakest)
         gone = missed.pop(weakest.placed.key)
         last, there = gone.train, gone.held
-        whole = _foretold(source, given, last, there, noise)
-    return Confirmed(tuple(names), missed, tuple(rejected), last, there, whole[0], noise)
+        whole = _forecast(source, given, last, there, noise)
+    return Confirmation(tuple(names), missed, tuple(rejected), last, there, whole[0], noise)
 
 
-def _foretold(source: Source, given: At, here: Linear, there: Linear, known: Weighed) -> tuple[float, Array]:
+def _forecast(
+    source: Source, given: ModelPoint, here: Linearisation, there: Linearisation, known: WeighedRecordings
+) -> tuple[float, Array]:
     """Log density of the held-out recordings given the training ones, averaged over how exactly the shifts may be
     known, and what each block of time takes off it."""
     weighed = weigh(source, [*source.train, *source.held], given, _joined(here, there), known, search=False)
@@ -99,28 +103,28 @@ def _foretold(source: Source, given: At, here: Linear, there: Linear, known: Wei
     priors, ons = [], []
     for tolerance in (*TOLERANCES, *weighed.beside.more) if masses.stop > masses.start else TOLERANCES[:1]:
         weight = weighed.beside.weight(tolerance)
-        own = Projected(evidence, range(n), weight)
+        own = ProjectedEvidence(evidence, range(n), weight)
         priors.append(own.null)
-        ons.append(Projected(evidence, every, weight, own.posterior(evidence.n_always)))
+        ons.append(ProjectedEvidence(evidence, every, weight, own.posterior(evidence.n_always)))
     both = np.array(priors) + [on.null for on in ons]
     always = ons[int(np.argmax(both))].beside([])
     parts = [source.blocks(i, evidence.left(i, always, [])) for i in every]
     return float(np.logaddexp.reduce(both) - np.logaddexp.reduce(priors)), np.concatenate(parts)
 
 
-def _joined(here: Linear, there: Linear) -> Linear:
+def _joined(here: Linearisation, there: Linearisation) -> Linearisation:
     # What is the held-out recordings' own stands there alone.
-    return Linear(there.at, (*here.residuals, *there.residuals), (*here.columns, *there.columns))
+    return Linearisation(there.at, (*here.residuals, *there.residuals), (*here.columns, *there.columns))
 
 
-def remainders(source: Source, given: At, best: Confirmed, barred: Collection[str]) -> tuple[Remainder, ...]:
+def remainders(source: Source, given: ModelPoint, best: Confirmation, barred: Collection[str]) -> tuple[Remainder, ...]:
     """Nameless curves beside the confirmed model that the held-out recordings confirm."""
     train, numbers = range(len(source.train)), [*source.train, *source.held]
     if not source.curves(numbers):
         return ()
     weighed = opened(source, numbers, given, _joined(best.train, best.held), best.noise)
     weighed, made, slots, tolerance = searched(weighed, train, barred, range(len(weighed.noises)))
-    both = Projected(weighed.evidence, range(len(numbers)), weighed.beside.weight(tolerance))
+    both = ProjectedEvidence(weighed.evidence, range(len(numbers)), weighed.beside.weight(tolerance))
     kept = list(as_names(made, slots))
     while True:
         told = {k: _remainder(source, made, both, kept, k) for k, s in enumerate(kept) if _nameless(made, s)}
@@ -139,18 +143,18 @@ def remainders(source: Source, given: At, best: Confirmed, barred: Collection[st
     return tuple(sorted(found, key=lambda r: -r.explained))
 
 
-def _nameless(made: Search, slot: Slot) -> bool:
+def _nameless(made: Search, slot: MemberOdds) -> bool:
     return not made.pool[slot.taken.hypothesis].named
 
 
-def _pairs(slots: Sequence[Slot]) -> list[tuple[int, float]]:
+def _pairs(slots: Sequence[MemberOdds]) -> list[tuple[int, float]]:
     return [(s.taken.item, s.taken.size) for s in slots]
 
 
-def _remainder(source: Source, made: Search, both: Projected, kept: Sequence[Slot], k: int) -> Remainder:
+def _remainder(source: Source, made: Search, both: ProjectedEvidence, kept: Sequence[MemberOdds], k: int) -> Remainder:
     """One curve of a set: what it is, and what the held-out recordings gain by it."""
 
-    def beside(some: Sequence[Slot]) -> tuple[float, Array]:
+    def beside(some: Sequence[MemberOdds]) -> tuple[float, Array]:
         own, all_of_it = Members(made.on, _pairs(some)), Members(both, _pairs(some))
         mean = [(item, own.of(item)) for item, _ in _pairs(some)]
         # Shifts may be a recording's own: what stands beside is its mean on all of them.

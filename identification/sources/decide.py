@@ -4,27 +4,33 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ..deciding import SECOND_CHOICES
-from ..evidence.found import Remainder
-from .confirm import Confirmed, confirm, remainders
+from ..evidence.selection import Remainder
+from ..verdict import Verdict, verdict
+from .confirm import Confirmation, confirm, remainders
 from .fit import residuals
-from .search import Found, Name, search
-from .source import At, Linear, Source
+from .search import Naming, Selection, search
+from .source import Linearisation, ModelPoint, Source
 
 
 @dataclass(frozen=True)
-class Decided:
+class Decision:
     """What recordings say: the search, what was confirmed and was not, nameless curves, and the held-out recordings
     under the model as given."""
 
-    given: At
-    found: Found
-    best: Confirmed
-    rejected: tuple[Name, ...]
+    given: ModelPoint
+    found: Selection
+    best: Confirmation
+    rejected: tuple[Naming, ...]
     left: tuple[Remainder, ...]
-    before: Linear
+    before: Linearisation
+
+    @property
+    def verdict(self) -> Verdict:
+        """By what is named, and by curves without a name."""
+        return verdict(self.best.names, self.left)
 
 
-def decide(source: Source, given: At, progress: Callable[[str], None] = lambda _: None) -> Decided:
+def decide(source: Source, given: ModelPoint, progress: Callable[[str], None] = lambda _: None) -> Decision:
     """Name what a model leaves out of some recordings."""
     found = search(source, given, progress=progress)
     best = last = confirm(source, given, found, progress)
@@ -40,5 +46,5 @@ def decide(source: Source, given: At, progress: Callable[[str], None] = lambda _
             found, best = again, last
     left = remainders(source, given, best, rejected)
     at = source.settled(found.first.at, source.held)
-    before = Linear(at, residuals(source, source.held, at), ())
-    return Decided(given, found, best, tuple(rejected.values()), left, before)
+    before = Linearisation(at, residuals(source, source.held, at), ())
+    return Decision(given, found, best, tuple(rejected.values()), left, before)

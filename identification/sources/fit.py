@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ..deciding import BASELINE_OWN
-from ..fitting.least_squares import Normal, bounded_step
+from ..fitting.least_squares import NormalEquations, bounded_step
 from ..nuisance.covariance import Covariance
-from .source import At, Linear, Source
+from .source import Linearisation, ModelPoint, Source
 
 Array = NDArray[np.float64]
 Covariances = Sequence[Sequence[Covariance]]
@@ -28,66 +28,68 @@ FARTHEST = 4.0
 """Most that a shift is moved [deviations]."""
 
 
-def foretold(source: Source, i: int, at: At) -> Array:
-    """Channels of a recording (n, c); raises InputError where they cannot be foretold."""
+def forecast(source: Source, i: int, at: ModelPoint) -> Array:
+    """Channels of a recording (n, c); raises InputError where they cannot be predicted."""
     found = source.predicted(i, at)
     if found is None:
         raise source.refused(i)
     return found
 
 
-def residuals(source: Source, numbers: Sequence[int], at: At) -> tuple[Array, ...]:
-    """Measurement less what is foretold, 0 where nothing was measured."""
-    return tuple(np.nan_to_num(source.measured(i) - foretold(source, i, at)) for i in numbers)
+def residuals(source: Source, numbers: Sequence[int], at: ModelPoint) -> tuple[Array, ...]:
+    """Measurement less what is predicted, 0 where nothing was measured."""
+    return tuple(np.nan_to_num(source.measured(i) - forecast(source, i, at)) for i in numbers)
 
 
-def linearised(source: Source, numbers: Sequence[int], at: At, shifted: Sequence[Array] | None = None) -> Linear:
+def linearised(
+    source: Source, numbers: Sequence[int], at: ModelPoint, shifted: Sequence[Array] | None = None
+) -> Linearisation:
     """Residuals and slopes about a fit; ``shifted``: the shifts' columns (n, c, S) of each recording, where they are
     known."""
     columns, left = [], []
     for k, i in enumerate(numbers):
-        here = foretold(source, i, at)
+        here = forecast(source, i, at)
         left.append(np.nan_to_num(source.measured(i) - here))
         beside = source.shift_slopes(i, at, here) if shifted is None else shifted[k]
         columns.append(np.concatenate([source.slopes(i, at, here), beside], axis=2))
-    return Linear(at, tuple(left), tuple(columns))
+    return Linearisation(at, tuple(left), tuple(columns))
 
 
-def differences(source: Source, i: int, at: At, here: Array) -> Array:
+def differences(source: Source, i: int, at: ModelPoint, here: Array) -> Array:
     """Slopes (n, c, P) by differences, for what has no derivatives."""
     own = []
     for k, (p, x) in enumerate(at.free):
         size = SMALL * max(abs(at.values[k]), source.size(p, x))
         step = size if at.values[k] + size <= source.bounds(p, x)[1] else -size
         moved = replace(at, values=at.values + step * np.eye(len(at.values))[k])
-        own.append((foretold(source, i, moved) - here) / step)
+        own.append((forecast(source, i, moved) - here) / step)
     return np.stack(own, axis=2) if own else np.zeros((*here.shape, 0))
 
 
-def shift_differences(source: Source, i: int, at: At, here: Array) -> Array:
-    """The same by the shifts (n, c, S)."""
+def shift_differences(source: Source, i: int, at: ModelPoint, here: Array) -> Array:
+    """Derivatives by the shifts (n, c, S), by differences of one deviation."""
     units = np.eye(len(at.shifts))
-    return np.stack([foretold(source, i, replace(at, shifts=at.shifts + u)) - here for u in units], axis=2)
+    return np.stack([forecast(source, i, replace(at, shifts=at.shifts + u)) - here for u in units], axis=2)
 
 
-def shift_columns(linear: Linear) -> list[Array]:
+def shift_columns(linear: Linearisation) -> list[Array]:
     """The shifts' columns of each recording."""
     return [x[:, :, len(linear.at.values) :] for x in linear.columns]
 
 
-def sizes_of(source: Source, at: At) -> Array:
+def sizes_of(source: Source, at: ModelPoint) -> Array:
     """A usual size of each free parameter (P,)."""
     return np.array([source.size(p, x) for p, x in at.free])
 
 
-def bounds_of(source: Source, at: At) -> tuple[Array, Array]:
+def bounds_of(source: Source, at: ModelPoint) -> tuple[Array, Array]:
     """Least and greatest of each free parameter, and of the shifts (P + S,)."""
     pairs = [source.bounds(p, x) for p, x in at.free] + [(-FARTHEST, FARTHEST)] * len(at.shifts)
     low, high = np.array(pairs).reshape(-1, 2).T
     return low, high
 
 
-def priors(source: Source, given: At, at: At) -> tuple[Array, Array]:
+def priors(source: Source, given: ModelPoint, at: ModelPoint) -> tuple[Array, Array]:
     """Mean and standard deviation of each free parameter (P,): of what the model file gives, a share of its value; of
     what it does not, none to speak of."""
     mean, spread = at.values.copy(), np.full(len(at.values), np.inf)
@@ -99,7 +101,7 @@ def priors(source: Source, given: At, at: At) -> tuple[Array, Array]:
     return mean, spread
 
 
-def cost(at: At, left: Sequence[Array], covariances: Covariances, prior: tuple[Array, Array]) -> float:
+def cost(at: ModelPoint, left: Sequence[Array], covariances: Covariances, prior: tuple[Array, Array]) -> float:
     """Twice minus the log posterior."""
     total = float(at.shifts @ at.shifts + np.sum(((at.values - prior[0]) / prior[1]) ** 2))
     for r, row in zip(left, covariances, strict=True):
@@ -108,8 +110,13 @@ def cost(at: At, left: Sequence[Array], covariances: Covariances, prior: tuple[A
 
 
 def fit(
-    source: Source, given: At, at: At, covariances: Covariances, shifted: Sequence[Array] | None = None, most: int = 0
-) -> Linear:
+    source: Source,
+    given: ModelPoint,
+    at: ModelPoint,
+    covariances: Covariances,
+    shifted: Sequence[Array] | None = None,
+    most: int = 0,
+) -> Linearisation:
     """Climb the posterior on the training recordings from a start, ``most`` steps or as many as the source has;
     ``shifted`` as of `linearised`."""
     numbers, prior, n = source.train, priors(source, given, at), len(at.values)
@@ -122,7 +129,7 @@ def fit(
         gradient, matrix = normal(here, covariances, prior)
         theta = np.concatenate([here.at.values, here.at.shifts])
         scale = np.sqrt(np.diag(matrix))
-        move = bounded_step(Normal(0.0, gradient, matrix), scale, DAMPING, low - theta, high - theta)
+        move = bounded_step(NormalEquations(0.0, gradient, matrix), scale, DAMPING, low - theta, high - theta)
         for share in (1.0, 0.5, 0.2):
             there = theta + share * move
             tried = replace(here.at, values=there[:n], shifts=there[n:])
@@ -143,7 +150,7 @@ def fit(
     return here if settled is here.at else linearised(source, numbers, settled, shifted)
 
 
-def normal(here: Linear, covariances: Covariances, prior: tuple[Array, Array]) -> tuple[Array, Array]:
+def normal(here: Linearisation, covariances: Covariances, prior: tuple[Array, Array]) -> tuple[Array, Array]:
     """Gradient and normal matrix of half the cost, over parameters and shifts."""
     at = here.at
     weight = np.concatenate([1 / prior[1] ** 2, np.ones(len(at.shifts))])
@@ -157,7 +164,7 @@ def normal(here: Linear, covariances: Covariances, prior: tuple[Array, Array]) -
     return gradient, matrix
 
 
-def deviations(source: Source, given: At, here: Linear, covariances: Covariances) -> tuple[Array, Array]:
+def deviations(source: Source, given: ModelPoint, here: Linearisation, covariances: Covariances) -> tuple[Array, Array]:
     """Standard deviation of each free parameter (P,), the shifts free within theirs, and the normal matrix (P, P)."""
     _, matrix = normal(here, covariances, priors(source, given, here.at))
     size, n = np.sqrt(np.maximum(np.diag(matrix), 1e-300)), len(here.at.values)

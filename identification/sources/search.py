@@ -6,52 +6,52 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.model import Placed
+from ...models.model import PlacedEffect
 from ..deciding import LAW_ERROR, ROUNDS
-from ..evidence.arm import Weighed
+from ..evidence.arm import WeighedRecordings
 from ..evidence.members import Members, log_bayes
 from ..evidence.rounds import as_names, share_of_residual
-from ..evidence.search import Search, Slot
+from ..evidence.search import MemberOdds, Search
 from ..evidence.tolerant import searched
 from ..nuisance.noise import Noise
 from .fit import fit, linearised, shift_columns
-from .source import At, Linear, Source, Variant
+from .source import GridPoint, Linearisation, ModelPoint, Source
 from .weigh import by_themselves, covariances, weigh
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Name:
+class Naming:
     """An effect taken: where, its log Bayes factor, its posterior share, and who else could stand in its place: effect,
     share."""
 
-    placed: Placed
+    placed: PlacedEffect
     channels: tuple[int, ...]
     gain: float
     share: float
-    rivals: tuple[tuple[Placed, float], ...]
+    rivals: tuple[tuple[PlacedEffect, float], ...]
 
 
 @dataclass(frozen=True)
 class Trial:
     """An effect by itself on top of the model as given: log posterior odds, and share of the whitened residual."""
 
-    placed: Placed
+    placed: PlacedEffect
     odds: float
     explained: float
     smallest: Mapping[str, float]
 
 
 @dataclass(frozen=True)
-class Found:
+class Selection:
     """What a search found: names, the fits as the model came and at the end, the noise at the end, and the first
     round's trials."""
 
-    names: tuple[Name, ...]
-    first: Linear
-    last: Linear
-    weighed: Weighed
+    names: tuple[Naming, ...]
+    first: Linearisation
+    last: Linearisation
+    weighed: WeighedRecordings
     trials: tuple[Trial, ...]
 
     @property
@@ -62,19 +62,19 @@ class Found:
 
 def search(
     source: Source,
-    given: At,
+    given: ModelPoint,
     *,
     barred: Collection[str] = (),
     progress: Callable[[str], None] = lambda _: None,
-) -> Found:
+) -> Selection:
     """Add effects to a model until nothing more that has a name raises the posterior of the training recordings."""
     train = source.train
     progress(f"comparing {len(train)} recordings with the model as given")
     first = here = linearised(source, train, source.settled(given, train))
     shifted = shift_columns(first)
-    names: list[Name] = []
+    names: list[Naming] = []
     trials: tuple[Trial, ...] = ()
-    weighed: Weighed | None = None
+    weighed: WeighedRecordings | None = None
     for number in range(1, ROUNDS + 1):
         progress(f"round {number}: weighing each effect at each place")
         weighed = opened(source, train, given, here)
@@ -96,10 +96,10 @@ def search(
     assert weighed is not None
     if not names:
         here = fit(source, given, here.at, covariances(weighed), shifted)
-    return Found(tuple(names), first, here, weighed, trials)
+    return Selection(tuple(names), first, here, weighed, trials)
 
 
-def _taken_out(first: Linear, here: Linear, weighed: Weighed) -> Array:
+def _taken_out(first: Linearisation, here: Linearisation, weighed: WeighedRecordings) -> Array:
     """Log-likelihood that the names so far took out of each channel (c,): a law that is wrong by a share of itself
     leaves the square of that share of it."""
     taken = np.zeros(len(weighed.noises))
@@ -109,24 +109,30 @@ def _taken_out(first: Linear, here: Linear, weighed: Weighed) -> Array:
     return np.maximum(taken, 0.0)
 
 
-def opened(source: Source, numbers: Sequence[int], given: At, here: Linear, known: Weighed | None = None) -> Weighed:
+def opened(
+    source: Source,
+    numbers: Sequence[int],
+    given: ModelPoint,
+    here: Linearisation,
+    known: WeighedRecordings | None = None,
+) -> WeighedRecordings:
     """Recordings under a fit with every hypothesis; laws without amplitudes fitted by themselves."""
     weighed = weigh(source, numbers, given, here, known, search=True)
     if not any(h.named and h.items[0].whole for h in weighed.pool):
         return weighed
     n = len(source.train)
-    train = Linear(here.at, here.residuals[:n], here.columns[:n])
+    train = Linearisation(here.at, here.residuals[:n], here.columns[:n])
     own = by_themselves(source, given, train, weighed)
     return weigh(source, numbers, given, here, known or weighed, search=True, alone=own)
 
 
-def _large(made: Search, slot: Slot, error: Array) -> bool:
+def _large(made: Search, slot: MemberOdds, error: Array) -> bool:
     """Does a name add more than the error of the laws that are there?"""
     reached = made.on.evidence.reached(made.on.evidence.items[slot.taken.item])
     return not made.pool[slot.taken.hypothesis].named or slot.gain >= float(np.sum(error[reached]))
 
 
-def _chosen(made: Search, slots: Sequence[Slot]) -> list[tuple[Slot, Sequence[Slot]]]:
+def _chosen(made: Search, slots: Sequence[MemberOdds]) -> list[tuple[MemberOdds, Sequence[MemberOdds]]]:
     """Names to take, with what stands beside each: one at a time on every channel, for what is not in proportion to its
     size leaves a rest, which others would take up.
 
@@ -136,7 +142,7 @@ def _chosen(made: Search, slots: Sequence[Slot]) -> list[tuple[Slot, Sequence[Sl
     evidence, odds = made.on.evidence, made.scan([]).odds.copy()
     odds[[h for h, x in enumerate(made.pool) if h in made.barred or not x.named]] = -np.inf
 
-    def reached(slot: Slot) -> set[int]:
+    def reached(slot: MemberOdds) -> set[int]:
         return set(evidence.reached(evidence.items[slot.taken.item]))
 
     found, taken = [], set()
@@ -156,10 +162,10 @@ def _chosen(made: Search, slots: Sequence[Slot]) -> list[tuple[Slot, Sequence[Sl
     return found
 
 
-def _started(made: Search, slot: Slot, beside: Sequence[Slot]) -> tuple[Placed, dict[str, float]]:
+def _started(made: Search, slot: MemberOdds, beside: Sequence[MemberOdds]) -> tuple[PlacedEffect, dict[str, float]]:
     """An effect that was taken, and the values that its parameters start from."""
     item = made.on.evidence.items[slot.taken.item]
-    variant: Variant = item.label
+    variant: GridPoint = item.label
     amplitude = item.spread * made.members([s.taken for s in beside]).of(slot.taken.item)
     values = dict(variant.values)
     bounds = {f"{variant.placed.key}.{x.name}": (x.low, x.high) for x in variant.placed.effect.parameters}
@@ -168,12 +174,12 @@ def _started(made: Search, slot: Slot, beside: Sequence[Slot]) -> tuple[Placed, 
     return variant.placed, values
 
 
-def _name(weighed: Weighed, slot: Slot) -> Name:
+def _name(weighed: WeighedRecordings, slot: MemberOdds) -> Naming:
     own = weighed.pool[slot.taken.hypothesis]
     order = [h for h in np.argsort(-slot.shares[:-1]) if weighed.pool[h].named and h != slot.taken.hypothesis]
     rivals = [(weighed.pool[h].label, float(slot.shares[h])) for h in order[:6]]
     channels = weighed.evidence.reached(weighed.evidence.items[slot.taken.item])
-    return Name(own.label, tuple(channels), slot.gain, float(slot.shares[slot.taken.hypothesis]), tuple(rivals))
+    return Naming(own.label, tuple(channels), slot.gain, float(slot.shares[slot.taken.hypothesis]), tuple(rivals))
 
 
 def _trials(made: Search) -> tuple[Trial, ...]:
@@ -196,7 +202,7 @@ def _smallest(made: Search, h: int) -> dict[str, float]:
     if x.items[0].whole:
         k = min((k for k, item in enumerate(x.items) if item.whole), key=lambda k: x.items[k].label.size)
     item, curvature, found = x.items[k], made.on.own(start + k), {}
-    v: Variant = item.label
+    v: GridPoint = item.label
     spread = np.full(1, 1 / v.size) if item.whole else item.spread
     t = np.geomspace(1e-4, 1e2, 400)
     first = v.placed.effect.parameters[0]

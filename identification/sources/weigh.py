@@ -7,19 +7,19 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.model import Placed
+from ...models.model import PlacedEffect
 from ..deciding import DISCREPANCY, LAW_ERROR
-from ..evidence.arm import Weighed, principal
-from ..evidence.beside import Beside
-from ..evidence.evidence import Channel, Evidence
+from ..evidence.arm import WeighedRecordings, principal
+from ..evidence.evidence import Evidence, ResidualChannel
 from ..evidence.hypotheses import pool
-from ..evidence.pool import Columns, Item
-from ..evidence.projected import Projected
+from ..evidence.nuisance_columns import NuisanceColumns
+from ..evidence.pool import CandidateColumns, Item
+from ..evidence.projected import ProjectedEvidence
 from ..evidence.search import Search
 from ..nuisance.curve import SMALL
 from ..nuisance.noise import Noise, learn
 from .fit import Covariances, fit, priors, shift_columns
-from .source import At, Linear, Source, Variant
+from .source import GridPoint, Linearisation, ModelPoint, Source
 
 Array = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ STRONGEST = 10
 """Directions of what could explain a residual beside which its noise is learnt."""
 
 
-def covariances(weighed: Weighed) -> Covariances:
+def covariances(weighed: WeighedRecordings) -> Covariances:
     """Of every recording and channel."""
     return [[channel.covariance for channel in row] for row in weighed.evidence.channels]
 
@@ -35,13 +35,13 @@ def covariances(weighed: Weighed) -> Covariances:
 def weigh(
     source: Source,
     numbers: Sequence[int],
-    given: At,
-    linear: Linear,
-    known: Weighed | None = None,
+    given: ModelPoint,
+    linear: Linearisation,
+    known: WeighedRecordings | None = None,
     *,
     search: bool,
-    alone: Mapping[str, Variant] | None = None,
-) -> Weighed:
+    alone: Mapping[str, GridPoint] | None = None,
+) -> WeighedRecordings:
     """Recordings under a fit.
 
     Parameters
@@ -49,18 +49,18 @@ def weigh(
     source : Source
     numbers : sequence of int
         Recordings, those for training first.
-    given : At
+    given : ModelPoint
         The model as given.
-    linear : Linear
+    linear : Linearisation
         The fit on these recordings.
-    known : Weighed, optional
+    known : WeighedRecordings, optional
         Has the noise, which is learnt without it.
     search : bool
         False leaves out all hypotheses: only the evidence of the fit itself is wanted.
-    alone : mapping of str to Variant, optional
+    alone : mapping of str to GridPoint, optional
         Laws that were fitted by themselves, by their key: a point more of their grid.
     """
-    columns, scale = Columns([len(r) for r in linear.residuals]), source.scale()
+    columns, scale = CandidateColumns([len(r) for r in linear.residuals]), source.scale()
     named = _named(source, numbers, linear.at, columns, alone or {}) if search else {}
     spread = np.concatenate([_spread(source, given, linear.at), np.ones(len(linear.at.shifts))])
     curves = {k: x for k, x in source.curves(numbers).items() if search or k[1] in SMALL}
@@ -76,7 +76,7 @@ def weigh(
         return principal(parts, STRONGEST)
 
     beside_laws = [could(c, True) for c in range(len(scale))] if known is None else []
-    runs = source.hangs(numbers, linear, beside_laws) if known is None else known.runs
+    runs = source.noise_channels(numbers, linear, beside_laws) if known is None else known.runs
 
     def noise(c: int, beside: Sequence[Array]) -> Noise:
         n = len(source.train)
@@ -108,7 +108,7 @@ def weigh(
     channels = [
         [
             # The shifts' prior is about what the set-up is said to be, not about where they now are.
-            Channel(r[:, c] + x[:, c] @ known_shifts, noises[c].covariance(row_of[c]), *row[c])
+            ResidualChannel(r[:, c] + x[:, c] @ known_shifts, noises[c].covariance(row_of[c]), *row[c])
             for c in range(len(scale))
         ]
         for r, x, row_of, row in zip(linear.residuals, linear.columns, runs, beside, strict=True)
@@ -117,19 +117,21 @@ def weigh(
     items = [item for h in hypotheses for item in h.items]
     evidence = Evidence(channels, columns, items, total)
     tolerant = slice(placed.start, placed.stop if source.anew else placed.start)
-    others = Beside([], total, tolerant, [], (1.0,))
+    others = NuisanceColumns([], total, tolerant, [], (1.0,))
     bare = functools.cache(lambda c: noise(c, could(c, False)))
-    return Weighed(evidence, hypotheses, tuple(noises), others, scale, len(source.train), runs, bare)
+    return WeighedRecordings(evidence, hypotheses, tuple(noises), others, scale, len(source.train), runs, bare)
 
 
-def by_themselves(source: Source, given: At, linear: Linear, weighed: Weighed) -> dict[str, Variant]:
+def by_themselves(
+    source: Source, given: ModelPoint, linear: Linearisation, weighed: WeighedRecordings
+) -> dict[str, GridPoint]:
     """Every law without amplitudes fitted by itself from the best point of its grid: between two of them it explains
     much less."""
-    on, found = Projected(weighed.evidence, range(len(source.train))), {}
+    on, found = ProjectedEvidence(weighed.evidence, range(len(source.train))), {}
     best, shifted = Search(on, weighed.pool).scan([]).item, shift_columns(linear)
     for h, x in enumerate(weighed.pool):
         if x.named and x.items[0].whole:
-            v: Variant = weighed.evidence.items[best[h]].label
+            v: GridPoint = weighed.evidence.items[best[h]].label
             at = linear.at.with_effects([v.placed], v.values)
             fitted = fit(source, given, at, covariances(weighed)[: len(source.train)], shifted)
             found[x.key] = replace(v, values={k: fitted.at.all_values[k] for k in v.values})
@@ -137,10 +139,10 @@ def by_themselves(source: Source, given: At, linear: Linear, weighed: Weighed) -
 
 
 def _named(
-    source: Source, numbers: Sequence[int], at: At, columns: Columns, alone: Mapping[str, Variant]
-) -> dict[str, tuple[Placed, list[Item]]]:
+    source: Source, numbers: Sequence[int], at: ModelPoint, columns: CandidateColumns, alone: Mapping[str, GridPoint]
+) -> dict[str, tuple[PlacedEffect, list[Item]]]:
     """Every effect that is not there, with its columns at each point of its grid."""
-    found: dict[str, tuple[Placed, list[Item]]] = {}
+    found: dict[str, tuple[PlacedEffect, list[Item]]] = {}
     for p in source.library(at.placed):
         items = [_item(source, numbers, at, columns, v) for v in source.variants(p)]
         if p.key in alone:
@@ -151,7 +153,9 @@ def _named(
     return found
 
 
-def _item(source: Source, numbers: Sequence[int], at: At, columns: Columns, v: Variant) -> Item | None:
+def _item(
+    source: Source, numbers: Sequence[int], at: ModelPoint, columns: CandidateColumns, v: GridPoint
+) -> Item | None:
     parts = [source.columns(i, at, v) for i in numbers]
     size = _size(source, parts)
     if not np.all(np.isfinite(size)) or np.any(size <= 0):
@@ -164,7 +168,9 @@ def _item(source: Source, numbers: Sequence[int], at: At, columns: Columns, v: V
     return Item(index, np.full(len(size), v.size) if v.size else 1 / size, positive, label=v)
 
 
-def _fitted(source: Source, numbers: Sequence[int], at: At, columns: Columns, v: Variant) -> Item | None:
+def _fitted(
+    source: Source, numbers: Sequence[int], at: ModelPoint, columns: CandidateColumns, v: GridPoint
+) -> Item | None:
     """A law where it was fitted by itself, and what each parameter's own size more would add: no more than the law."""
     there = at.with_effects([v.placed], v.values)
     parts, n = [], len(at.values)
@@ -187,13 +193,13 @@ def _size(source: Source, parts: Sequence[Array]) -> Array:
     return np.max(np.sqrt(np.mean(whole**2, axis=0)) / source.scale()[:, None], axis=0)
 
 
-def _added(columns: Columns, parts: Sequence[Array]) -> NDArray[np.int_]:
+def _added(columns: CandidateColumns, parts: Sequence[Array]) -> NDArray[np.int_]:
     """Columns entered on every channel that they reach."""
     reached = np.any([np.any(x, axis=(0, 2)) for x in parts], axis=0)
     return columns.add({int(c): [x[:, c] for x in parts] for c in np.flatnonzero(reached)})
 
 
-def _spread(source: Source, given: At, at: At) -> Array:
+def _spread(source: Source, given: ModelPoint, at: ModelPoint) -> Array:
     """Prior deviation of the free parameters (P,)."""
     _, own = priors(source, given, at)
     return np.where(np.isfinite(own), own, np.maximum(np.abs(at.values), 1e-12))
@@ -203,7 +209,7 @@ def _rms_of_curve(parts: Sequence[Array]) -> float:
     return float(np.sqrt(np.mean(np.concatenate([np.sum(x**2, axis=1) for x in parts])))) or 1.0
 
 
-def _wrong(source: Source, linear: Linear, c: int) -> float:
+def _wrong(source: Source, linear: Linearisation, c: int) -> float:
     """How large the small curves are beside every explanation [share of the channel]: no law of the model is exact."""
     n = len(linear.at.values)
     laws = [x[:, c, :n] @ linear.at.values for x in linear.columns[: len(source.train)]]

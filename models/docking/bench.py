@@ -48,7 +48,7 @@ _AXES = [axes(i) for i in range(BALLS)]
 
 
 @dataclass(frozen=True)
-class Motion:
+class DockingCommand:
     """What a docking test was told to do.
 
     Parameters
@@ -77,7 +77,7 @@ def numbers_of(setup: BenchSetup) -> dict[str, float]:
     return found | {"bumper_damping": found["damping"]}
 
 
-def _hermite(motion: Motion) -> tuple[Array, Array]:
+def _hermite(motion: DockingCommand) -> tuple[Array, Array]:
     """Square and cube of each stretch's cubic (n,): it meets travel and rate at both ends."""
     h, gone = np.diff(motion.times), np.diff(motion.travel)
     first, last = motion.rate[:-1], motion.rate[1:]
@@ -114,7 +114,7 @@ class DockingBench:
         self._steps = DormandPrince(ca.Function("rate", [t, x, u], [ca.cse(rate)]), floor, tolerance)
         self._balls = SampleFunction(ca.Function("balls", [x, u], [ca.densify(balls)]))
 
-    def run(self, setup: BenchSetup, values: Mapping[str, float], motion: Motion) -> Array:
+    def run(self, setup: BenchSetup, values: Mapping[str, float], motion: DockingCommand) -> Array:
         """Means (n, 16) of `SEEN` over each window; raises StepFault where no step is short enough.
 
         ``values``: parameters of effects by ``effect.place.parameter``, and set-up numbers by their name; what is not

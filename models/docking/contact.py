@@ -31,7 +31,7 @@ RELAX = 0.01
 """Time constant of a bristle out of contact [s]; chosen."""
 
 
-class Contact(NamedTuple):
+class ContactForce(NamedTuple):
     """Normal force [N]; tangential force along both tangents [N]; the bristle's rates; stored energy [J] and power
     lost in damping and in friction [W]."""
 
@@ -57,7 +57,7 @@ def damping_number(restitution: float) -> float:
 
 def contact(
     gap: ca.SX, approach: ca.SX, slip: ca.SX, bristle: ca.SX, p: dict[str, ca.SX], rub: Rub | None = None
-) -> Contact:
+) -> ContactForce:
     """Write the law out.
 
     Parameters
@@ -83,7 +83,7 @@ def contact(
     presliding = bristle / p["breakaway"] + p["bristle_damping"] * held
     own = {"normal_force": normal, "presliding": presliding}
     tangential = -(rub(normal, presliding) if rub else FRICTION.law(own, {"coefficient": p["friction"]}))
-    return Contact(
+    return ContactForce(
         normal,
         tangential,
         rate,

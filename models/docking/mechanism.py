@@ -29,7 +29,7 @@ class Laws(NamedTuple):
     latch: Callable[[ca.SX], ca.SX]
 
 
-class Docked(NamedTuple):
+class DockingForces(NamedTuple):
     """What the docking does.
 
     Force (3,) and moment (3,) on the end effector about its origin [N, N·m], of contacts and latches together; rates of
@@ -70,7 +70,7 @@ def docked(
     held: ca.SX,
     p: dict[str, ca.SX],
     laws: Laws | None = None,
-) -> Docked:
+) -> DockingForces:
     """Write the mechanism out.
 
     Parameters
@@ -121,7 +121,7 @@ def docked(
         push += grip
         force += push
         moment += ca.cross(arm, push)
-    return Docked(
+    return DockingForces(
         force,
         moment,
         ca.vertcat(*rates),

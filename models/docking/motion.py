@@ -17,7 +17,7 @@ from ..dormand_prince import DormandPrince, Steps
 from ..floating import symbols
 from ..floating.arm import FloatingArm
 from ..floating.joint_drive import Drive
-from ..hung import hung
+from ..hanging import hanging_wrench
 from ..inertia import Array
 from ..rotation import quaternion_of, quaternion_rate, rotation_of
 from ..snare.target import Target
@@ -223,7 +223,7 @@ class DockingMotion:
         on_foot -= ca.vertcat(bumps[:3], bumps[3:] + ca.cross(carriage_place - foot, bumps[:3]))
         cables, on_carriage = on_carriage, on_carriage + bumps
         if self.target.hangs:
-            held, suspended, cradled = hung(self.target, foot, turn, spin)
+            held, suspended, cradled = hanging_wrench(self.target, foot, turn, spin)
             on_foot += held
 
         drawn = carriage(

@@ -112,7 +112,7 @@ class FloatingArm:
         return tuple(link.name for link in self.tree.links if not is_physical(link.phi))
 
     def projected(self) -> "FloatingArm":
-        """The same with every inertia replaced by the nearest that a body can have (`nearest_physical`)."""
+        """This arm with every impossible inertia replaced by the nearest that a body can have (`nearest_physical`)."""
         links = tuple(Link(k.name, k.phi if is_physical(k.phi) else _nearest(k.phi)) for k in self.tree.links)
         base = self.base if is_physical(self.base) else _nearest(self.base)
         return replace(self, tree=replace(self.tree, links=links), base=base, as_published=False)

@@ -40,7 +40,7 @@ class JointPath:
 
 
 @dataclass(frozen=True, eq=False)
-class Followed:
+class BaseTrajectory:
     """Motion of the base at n samples: position (n, 3) and quaternion (n, 4; w, x, y, z) in the world, twist and
     acceleration (n, 6), the latter as an observer at rest sees it, along the base's own axes, linear part first."""
 
@@ -83,7 +83,7 @@ class CarriedBase:
         _, twist, acceleration = self._equations(*given)
         self._seen = SampleFunction(ca.Function("seen", given, [ca.cse(ca.vertcat(twist, acceleration))]))
 
-    def follow(self, path: JointPath, position: Array, quaternion: Array, twist: Array | None = None) -> Followed:
+    def follow(self, path: JointPath, position: Array, quaternion: Array, twist: Array | None = None) -> BaseTrajectory:
         """Go along a path from a pose in the world and a twist (6,) in the base's axes; None: without any momentum.
 
         Raises
@@ -111,7 +111,7 @@ class CarriedBase:
             states[k + 1], size = done.state, done.size
         seen = self._seen(states, path.time[:, None], path.q, path.qd, path.qdd, lines, first[3:])[0][:, :, 0]
         unit = states[:, 3:7] / np.linalg.norm(states[:, 3:7], axis=1, keepdims=True)
-        return Followed(states[:, :3], unit, seen[:, :6], seen[:, 6:])
+        return BaseTrajectory(states[:, :3], unit, seen[:, :6], seen[:, 6:])
 
     def _momentum(self, q: Array, qd: Array, twist: Array, start: Array) -> Array:
         """Momentum (6,) in the world that goes with a twist."""

@@ -27,7 +27,7 @@ SINGULAR = 1e6
 """Condition number of a Jacobian from which on it has no inverse worth using."""
 
 
-class Pose(NamedTuple):
+class TipPose(NamedTuple):
     """Rotation (n, 3, 3) and translation (n, 3) [m] of the tip's frame in the base's."""
 
     rotation: Array
@@ -66,10 +66,10 @@ def generalized_inertia(arm: FloatingArm, q: ArrayLike) -> Array:
     return whole[:, 6:, 6:] - coupling.transpose(0, 2, 1) @ np.linalg.solve(whole[:, :6, :6], coupling)
 
 
-def tip_pose(arm: FloatingArm, q: ArrayLike) -> Pose:
+def tip_pose(arm: FloatingArm, q: ArrayLike) -> TipPose:
     """Pose of the tip on the base."""
     rotation, translation, _, _ = _compiled(arm).tip(*_joints(arm, q=q))
-    return Pose(rotation, translation[:, :, 0])
+    return TipPose(rotation, translation[:, :, 0])
 
 
 def link_origins(arm: FloatingArm, q: ArrayLike) -> Array:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from ...errors import InputError
 from ..hidden_state import SIGNALS
-from ..model import Placed
+from ..model import PlacedEffect
 from ..tree import Joint
 from .arm import FloatingArm
 
@@ -20,7 +20,7 @@ _KNOWN = {"q", "qd", "qdd", "load", "inertia", "time", "speed_scale"}
 _NEWTON = 3  # exact after two for a law that is linear in the size of the load
 
 
-class Taken(NamedTuple):
+class DriveTorque(NamedTuple):
     """Torque (J,) at the joints, what the effects take of it per acceleration (J,), and the hidden states' rates."""
 
     torque: ca.SX
@@ -31,13 +31,13 @@ class Taken(NamedTuple):
 class Law(NamedTuple):
     """A drive written out for one arm: number of hidden states, parameters with their values and units, the expression.
 
-    ``expression(time, q, qd, hidden, inertia, target, on, values)`` gives `Taken`.
+    ``expression(time, q, qd, hidden, inertia, target, on, values)`` gives `DriveTorque`.
     """
 
     n_states: int
     start: dict[str, float]
     units: dict[str, str]
-    expression: Callable[..., Taken]
+    expression: Callable[..., DriveTorque]
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +52,7 @@ class Drive:
     ----------
     stiffness, damping : array (J,) or None
         Gains of the servo [N·m/rad, N·m·s/rad; or N/m, N·s/m]; None: zero, a joint that is always passive.
-    effects : sequence of Placed
+    effects : sequence of PlacedEffect
         Effects of a joint that act as a torque, one entry a joint.
     values : mapping of str to float
         Their parameters by ``effect.joint.parameter``; those left out are the effect's usual ones (``zero``).
@@ -60,7 +60,7 @@ class Drive:
 
     stiffness: ArrayLike | None = None
     damping: ArrayLike | None = None
-    effects: Sequence[Placed] = ()
+    effects: Sequence[PlacedEffect] = ()
     values: Mapping[str, float] = field(default_factory=dict)
 
     def law(self, arm: FloatingArm) -> Law:
@@ -97,7 +97,7 @@ class Drive:
 
         def expression(
             time: ca.SX, q: ca.SX, qd: ca.SX, hidden: ca.SX, inertia: ca.SX, target: ca.SX, on: ca.SX, values: ca.SX
-        ) -> Taken:
+        ) -> DriveTorque:
             given = dict(zip(start, ca.vertsplit(values), strict=True))
             torques, inertias, rates = [], [], []
             states = iter(ca.vertsplit(hidden) if n_states else [])
@@ -123,7 +123,7 @@ class Drive:
                 torques.append(torque)
                 inertias.append(per_acceleration)
                 rates.append(rate)
-            return Taken(ca.vertcat(*torques), ca.vertcat(*inertias), ca.vertcat(*rates))
+            return DriveTorque(ca.vertcat(*torques), ca.vertcat(*inertias), ca.vertcat(*rates))
 
         return Law(n_states, start, units, expression)
 
@@ -150,7 +150,7 @@ def _unit(form: str, joint: Joint) -> str:
     return re.sub(r"\bS\b", position, re.sub(r"\bT\b", torque, form))
 
 
-def _check(arm: FloatingArm, placed: Placed, names: Sequence[str]) -> None:
+def _check(arm: FloatingArm, placed: PlacedEffect, names: Sequence[str]) -> None:
     """Refuse an effect that these joints cannot have, or whose law reads what a simulation does not know."""
     effect, name = placed.effect, arm.tree.name
     if effect.at != "joint" or effect.acts_on != "torque":

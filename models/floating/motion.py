@@ -32,7 +32,7 @@ _BASE_STATES = 13  # position, quaternion, linear and angular momentum
 
 
 @dataclass(frozen=True, eq=False)
-class Observed:
+class Observation:
     """What shows of a motion; n states in, all in the world frame, linear before angular.
 
     Parameters
@@ -103,7 +103,7 @@ class FloatingMotion:
 
     @property
     def units(self) -> dict[str, str]:
-        """The same parameters' units, in pint's spelling."""
+        """Units of the `parameters`, in pint's spelling."""
         return dict(self._law.units)
 
     def check(self, values: Mapping[str, float]) -> None:
@@ -181,12 +181,12 @@ class FloatingMotion:
         held[2 + 3 * n :] = list(({**self._law.start, **values} if values else self._law.start).values())
         return self._steps.advance(time, state, end, held, size, longest, log)
 
-    def observe(self, states: Array) -> Observed:
+    def observe(self, states: Array) -> Observation:
         """What shows at states (n, n_states)."""
         rows = self._observed(np.atleast_2d(states))[0][:, :, 0]
         parts = np.split(rows, np.cumsum([3, 4, 6, 3, 4, 6, 3, 4, 6, 6]), axis=1)
         parts[-1] = parts[-1][:, 0]
-        return Observed(*parts)
+        return Observation(*parts)
 
     def joints(self, states: Array) -> tuple[Array, Array]:
         """Joint positions and rates, each (n, J), of states (n, n_states)."""

@@ -20,7 +20,7 @@ from .arm import FloatingArm
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class PlantRun:
     """A simulated motion, at the steps that the integrator took.
 
     Parameters
@@ -98,7 +98,7 @@ class FloatingPlant:
         q: ArrayLike | None = None,
         qd: ArrayLike | None = None,
         longest: float = 1.0,
-    ) -> Run:
+    ) -> PlantRun:
         """Move from positions q and rates qd (J,) (none: zero), base at rest, to ``target`` (J,) for ``duration`` [s].
 
         Steps are as long as the error allows and at most ``longest`` [s].
@@ -127,14 +127,14 @@ class FloatingPlant:
         self._simulator.AdvanceTo(duration)
         return self._read(log.sample_times().copy(), log.data().T.copy())
 
-    def _read(self, time: Array, states: Array) -> Run:
+    def _read(self, time: Array, states: Array) -> PlantRun:
         n_joints, n = self.arm.n_joints, len(time)
         if not self.arm.floating:
             still = np.zeros((n, 3))
             upright = np.tile([1.0, 0.0, 0.0, 0.0], (n, 1))
-            return Run(time, still, upright, still, still, states[:, :n_joints], states[:, n_joints:])
+            return PlantRun(time, still, upright, still, still, states[:, :n_joints], states[:, n_joints:])
         positions, rates = states[:, : 7 + n_joints], states[:, 7 + n_joints :]
-        return Run(
+        return PlantRun(
             time,
             positions[:, 4:7],
             positions[:, :4],

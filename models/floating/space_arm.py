@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ...errors import InputError
 from ..effects import get_effect
 from ..inertia import Array, from_central, transform
-from ..model import Placed
+from ..model import PlacedEffect
 from ..tree import Joint, Link, Tree
 from .arm import FloatingArm
 from .dynamics import generalized_inertia
@@ -102,7 +102,7 @@ def space_arm_drive(arm: FloatingArm, bandwidth: float = 1.0, pose: ArrayLike = 
     placed, values = [], {}
     for joint in arm.tree.joints:
         for effect, numbers in [(get_effect("makkar_friction"), FRICTION), *rotor]:
-            placed.append(Placed(effect, joint.name))
+            placed.append(PlacedEffect(effect, joint.name))
             values |= {f"{effect.name}.{joint.name}.{name}": value for name, value in numbers.items()}
     inertia = np.diag(generalized_inertia(arm, np.asarray(pose, float)[None, :])[0]) + ROTOR_INERTIA
     return Drive(bandwidth**2 * inertia, 2 * bandwidth * inertia, placed, values)

@@ -2,8 +2,8 @@
 
 Base and arm are Exudyn's own kinematic tree, six joints of which carry the base. Cables end on rings at the tip: their
 18 constraints reach into the tree's coordinates. A pin that is fixed to the base gives the contact's wrench to the
-tree; a floating target is a rigid body of its own, as in `Assembly`. Joint friction is Makkar's law, rotors add to the
-tree's mass matrix.
+tree; a floating target is a rigid body of its own, as in `SnareAssembly`. Joint friction is Makkar's law, rotors add to
+the tree's mass matrix.
 """
 
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ from ...errors import InputError
 from ..exudyn_build import exudyn, items
 from ..floating.arm import FloatingArm
 from ..inertia import Array, to_central
-from ..snare.assembly import Assembly
+from ..snare.assembly import SnareAssembly
 from ..snare.contact import CONTACT_SIZE, MOST_CONTACTS
 from ..snare.drive import Pose, ring_ends, ring_motion
 from ..snare.ends import REACTION
@@ -26,13 +26,13 @@ from ..snare.target import Target
 from .kinematics import TreeFrames
 
 
-class MonolithicAssembly(Assembly):
-    """`Assembly` with base and arm inside; positions are from where the tip starts.
+class MonolithicAssembly(SnareAssembly):
+    """`SnareAssembly` with base and arm inside; positions are from where the tip starts.
 
     Parameters
     ----------
     parameters, target, nodes, effector
-        As `Assembly` takes them; a ``moved`` target is fixed to the base, at the arm's mount.
+        As `SnareAssembly` takes them; a ``moved`` target is fixed to the base, at the arm's mount.
     arm : FloatingArm
         Its tip is the end effector.
     start : array (6 + J,)

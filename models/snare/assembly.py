@@ -29,7 +29,7 @@ Drive = Callable[[float], tuple[float, float]]
 
 
 @dataclass
-class Assembly:
+class SnareAssembly:
     """The built system, and the arrays through which the compiled functions see it.
 
     Parameters

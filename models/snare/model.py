@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ...errors import InputError
-from .assembly import Assembly, Drive
+from .assembly import Drive, SnareAssembly
 from .contact import start_overlap
 from .drive import Pose, fill_path, go_on
 from .history import SnareHistory
@@ -125,7 +125,7 @@ class SnareModel:
         near = replace(target, position=tuple(np.asarray(target.position) - self.origin))
         start = Pose(np.zeros(3), start.rotation, start.velocity, start.angular_velocity)
         nodes = settled(parameters, self.accuracy.n_elements) @ start.rotation.T
-        self.assembly = Assembly(parameters, near, nodes, start, drive)
+        self.assembly = SnareAssembly(parameters, near, nodes, start, drive)
         if abs(turned := self.assembly.ring_at(time)[0]) > OPEN:
             raise InputError(
                 f"snare: at the start, {time:g} s, the ring has turned by {turned:.3g} rad; start with the snare open, "
@@ -162,7 +162,7 @@ class SnareModel:
         self._move(0, pose)
 
     def move_target(self, pose: Pose) -> None:
-        """The same for a target with support ``moved``."""
+        """Say where a target with support ``moved`` will be, and how it will move, at the end of the next step."""
         self._move(1, pose)
 
     def _move(self, body: int, pose: Pose) -> None:

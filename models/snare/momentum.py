@@ -6,7 +6,7 @@ changes by outside forces alone, step by step, as the elements' mass matrix is c
 
 import numpy as np
 
-from .assembly import Assembly
+from .assembly import SnareAssembly
 from .cubic import MASS_POINTS, combine, weights
 from .vector import add, compiled, cross, rotate, rotate_back, row, scale
 
@@ -56,7 +56,7 @@ def left_over(gained, effector, foot, on_pin):
     return result
 
 
-def momentum(assembly: Assembly) -> np.ndarray:
+def momentum(assembly: SnareAssembly) -> np.ndarray:
     """Momentum (6,) of the cables and of a target that floats; a moved one belongs to whoever moves it.
 
     Linear first [N·s], then angular about the origin of the assembly's positions [N·m·s].

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from .assembly import Assembly
+from .assembly import SnareAssembly
 from .energy import KINETIC, OVERLAP, STRAIN
 from .forces import measure
 from .history import SnareHistory
@@ -27,12 +27,12 @@ class Recorder:
 
     Parameters
     ----------
-    assembly : Assembly
+    assembly : SnareAssembly
     origin : array (3,)
         Of the assembly's positions in the world [m].
     """
 
-    def __init__(self, assembly: Assembly, origin: np.ndarray) -> None:
+    def __init__(self, assembly: SnareAssembly, origin: np.ndarray) -> None:
         """Nothing recorded."""
         self._origin = origin
         self._assembly = assembly

@@ -24,7 +24,7 @@ SUPPORTS = ("spring", "pendulum", "free")
 
 
 @dataclass(frozen=True)
-class Applied:
+class SetupField:
     """What an effect sets: its place in a model file, its parameter, and the field of set-up or target."""
 
     at: str
@@ -36,20 +36,20 @@ class Applied:
 
 
 APPLIED = {
-    "contact_friction": Applied("pin", "coefficient", "friction", False, 0.0),
-    "contact_damping": Applied("pin", "coefficient", "contact_damping", False, 0.0),
-    "contact_stiffness": Applied("pin", "stiffness", "hertz_stiffness", False, None),
-    "cable_damping": Applied("cables", "time", "bending_damping", False, None),
-    "cable_pretension": Applied("cables", "tension", "cable_pretension", False, 0.0),
-    "umbilical_stiffness": Applied("target", "stiffness", "umbilical", True, 0.0),
-    "hang_point_clearance": Applied("target", "clearance", "clearance", True, 0.0),
+    "contact_friction": SetupField("pin", "coefficient", "friction", False, 0.0),
+    "contact_damping": SetupField("pin", "coefficient", "contact_damping", False, 0.0),
+    "contact_stiffness": SetupField("pin", "stiffness", "hertz_stiffness", False, None),
+    "cable_damping": SetupField("cables", "time", "bending_damping", False, None),
+    "cable_pretension": SetupField("cables", "tension", "cable_pretension", False, 0.0),
+    "umbilical_stiffness": SetupField("target", "stiffness", "umbilical", True, 0.0),
+    "hang_point_clearance": SetupField("target", "clearance", "clearance", True, 0.0),
 }
 """The vocabulary's effects that a capture can have."""
 
 NUMBERS = {
-    "ring_radius": Applied("capture", "value", "ring_radius", False, None),
-    "pin_radius": Applied("capture", "value", "pin_radius", False, None),
-    "mass": Applied("capture", "value", "mass", True, None),
+    "ring_radius": SetupField("capture", "value", "ring_radius", False, None),
+    "pin_radius": SetupField("capture", "value", "pin_radius", False, None),
+    "mass": SetupField("capture", "value", "mass", True, None),
 }
 """Numbers of the set-up that nobody has stated for the built-in one: a diagnosis may find that they are others, where
 the model file does not give them. Cables then lie against the wall of a ring of that radius, as they do by default."""
@@ -63,14 +63,14 @@ _KEYS = ("target", "orientation", *_TARGET, *_NUMBERS)
 
 
 @dataclass(frozen=True)
-class Setup:
+class CaptureSetup:
     """A snare and its target without any effect, and the keys that the model file gave."""
 
     parameters: SnareParameters
     target: Target
     given: Mapping[str, Any] = field(default_factory=dict)
 
-    def with_values(self, values: Mapping[str, float]) -> "Setup":
+    def with_values(self, values: Mapping[str, float]) -> "CaptureSetup":
         """With effects' parameters by ``effect.place.parameter``, and numbers of the set-up; others are no matter."""
         snare, target = {}, {}
         for name, a in (APPLIED | NUMBERS).items():
@@ -81,7 +81,7 @@ class Setup:
             snare["cable_length"] = wall_length(snare["ring_radius"], self.parameters.ring_distance)
         return replace(self, parameters=self.parameters.with_values(**snare), target=replace(self.target, **target))
 
-    def corrected(self, values: Mapping[str, float]) -> "Setup":
+    def corrected(self, values: Mapping[str, float]) -> "CaptureSetup":
         """With numbers of the set-up that a diagnosis found, as if the model file had given them."""
         own = {name: values[key] for name in NUMBERS if (key := f"{name}.capture.value") in values}
         numbers = self.with_values({f"{name}.capture.value": value for name, value in own.items()})
@@ -99,7 +99,7 @@ class Setup:
 class SnareTree(Tree):
     """A capture has no joints: what stands for them is the set-up."""
 
-    setup: Setup
+    setup: CaptureSetup
 
     def __post_init__(self) -> None:
         """Nothing that the recursions of joints could refuse."""
@@ -147,7 +147,7 @@ def read_setup(path: Path, name: str, table: Any, gravity: list[float]) -> Snare
         target = Target(support, gravity=gravity, **body)
     except InputError as error:
         raise InputError(f"{path}: [capture] {error}") from None
-    return SnareTree(name, (), (), np.array(gravity, float), Setup(snare, target, dict(given)))
+    return SnareTree(name, (), (), np.array(gravity, float), CaptureSetup(snare, target, dict(given)))
 
 
 def _value(path: Path, key: str, value: Any) -> Any:

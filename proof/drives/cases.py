@@ -20,6 +20,8 @@ from .robots import Rng, believed, random_robot
 from .springs import NAMES, SPRINGS, makers
 
 CLEAN, SINGLE, PAIR, LAWLESS = "clean", "single", "pair", "nameless"
+FAULTY = "faulty"
+"""Recordings at fault, which only the third generator makes."""
 GROUPS = (CLEAN, SINGLE, PAIR, LAWLESS)
 DECK = (*[CLEAN] * 25, *[SINGLE] * 15, *[PAIR] * 4, *[LAWLESS] * 6)
 """Fifty cases: 50, 30, 8 and 12 %."""

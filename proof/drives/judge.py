@@ -2,13 +2,15 @@
 
 A told class is the name given and the rivals that the tool says cannot be told from it. It is right if one of its
 members is concealed in the case, at that joint (joint2, link2 and tau.joint2 are one place). A name that is true of
-every case's background (a URDF that is off, bristles that the model lacks) is neither right nor wrong.
+every case's background (a URDF that is off, bristles that the model lacks) is neither right nor wrong. A law that was
+drawn as one without a name and has got one since is told rightly by that name, and as unknown.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from .nameless import NAMED_SINCE
 from .places import joint
 
 Line = Mapping[str, Any]
@@ -80,7 +82,9 @@ def judge(line: Line) -> Judged:
     """Judge a line of `score`."""
     truth = line["truth"]
     named = [e for e in truth["effects"] if e["name"]]
-    right = {(e["name"], joint(e["at"])) for e in named}
+    lawless = [e for e in truth["effects"] if not e["name"]]
+    since = {(NAMED_SINCE[e["law"]], joint(e["at"])) for e in lawless if e["law"] in NAMED_SINCE}
+    right = {(e["name"], joint(e["at"])) for e in named} | since
     told, classes = [], []
     for effect in line["effects"]:
         members = [(effect["name"], effect["at"])]
@@ -98,7 +102,7 @@ def judge(line: Line) -> Judged:
                 not any(hits) and effect["name"] in truth["background"],
             )
         )
-    lawless = [e for e in truth["effects"] if not e["name"]]
+    by_name = any((e["name"], joint(e["at"])) in since for e in line["effects"])
     location = line.get("location", {})
     loudest = max(location, key=lambda channel: location[channel], default="")
     return Judged(
@@ -108,7 +112,7 @@ def judge(line: Line) -> Judged:
         line["verdict"],
         tuple(told),
         tuple(_found(e, line["effects"], classes) for e in named),
-        bool(lawless) and line["verdict"] == "unknown_effect",
+        bool(lawless) and (by_name or line["verdict"] == "unknown_effect"),
         bool(lawless) and loudest == lawless[0]["channel"],
         tuple(_known(line)),
         float(line["seconds"]),

@@ -1,4 +1,4 @@
-"""Laws without a name in the tool's vocabulary: what is right is ``unknown_effect``.
+"""Laws that have no name in the tool's vocabulary, or had none when they were made: ``unknown_effect`` is right.
 
 Sized by what is left of each beside a fit of the named laws that come nearest at its joint, so that none is a name in
 disguise: level, viscous and quadratic friction, load, rotor inertia, harness, bias and drift.
@@ -148,6 +148,14 @@ LAWLESS: dict[str, Lawless] = {
 
 LIMITED = "motor limit that is not logged"
 NAMELESS = (*LAWLESS, LIMITED)
+
+NAMED_SINCE = {
+    "gear that costs only when it drives": "gear_efficiency",
+    "grease that warms": "heating_friction",
+    "iron that saturates": "motor_saturation",
+    LIMITED: "motor_saturation",
+}
+"""Laws that the vocabulary got a name for after they were made: that name, at their place, is right as well."""
 
 
 def lawless(motion: tuple[NDArray, NDArray, NDArray]) -> dict[str, Lawless]:

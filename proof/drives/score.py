@@ -71,7 +71,7 @@ def asked(folder: Path, limit: float, run: Diagnose) -> dict[str, Any]:
     except InputError as error:
         found = {"verdict": "failed", "effects": [], "notes": [str(error)]}
     seconds = time.perf_counter() - start
-    kept = ("name", "at", "probability", "margin", "gain", "parameters", "rivals")
+    kept = ("name", "at", "probability", "margin", "gain", "explained", "parameters", "rivals")
     effects = [{key: e[key] for key in kept if key in e} for e in found["effects"] if e["name"] != "empirical"]
     for effect in effects:
         effect["rivals"] = [

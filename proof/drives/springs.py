@@ -1,4 +1,4 @@
-"""Drives with a spring or with play, sized in the simulated closed loop: their torque hangs on how the link swings.
+"""Drives with a spring or with play, sized in the simulated closed loop: their torque depends on how the link swings.
 
 The motor turns with its own inertia and carries the encoder; the spring hands its torque to the link.
 """

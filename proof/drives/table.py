@@ -9,7 +9,7 @@ import numpy as np
 
 from proof.statistics import clopper_pearson
 
-from .cases import CLEAN, LAWLESS, PAIR, SINGLE, SIZES
+from .cases import CLEAN, FAULTY, LAWLESS, PAIR, SINGLE, SIZES
 from .judge import Judged, judge
 from .motions import KINDS, WANDERING
 
@@ -91,6 +91,11 @@ def figures(cases: Sequence[Judged]) -> list[Figure]:
             "laws without a name: told as unknown, loudest at its channel", [c.unknown and c.located for c in lawless]
         ),
         _count("laws without a name: a wrong name instead", [bool(c.wrong) for c in lawless]),
+    ]
+    faulty = [c for c in cases if c.group == FAULTY]
+    rows += [
+        _count("faulty recordings: told as a fault of the data", [c.verdict == "data_fault" for c in faulty]),
+        _count("faulty recordings: physics named", [bool(c.told) for c in faulty]),
     ]
     claims = [(t.probability, t.member) for c in cases for t in c.told if not t.background]
     strict = [(t.probability, t.first) for c in cases for t in c.told]

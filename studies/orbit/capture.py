@@ -14,7 +14,7 @@ from ...models.inertia import Array
 from ...models.snare.parameters import SnareParameters
 from ..outcome import Quantity, table, write_result
 from ..page import Section, write_page
-from .docked import Docked, docked_of, is_latched
+from .docked import DockingRun, docked_of, is_latched
 from .docked import measure as measure_docked
 from .docked_figures import pictures
 from .figures import PAPER_CONTACT, PAPER_Y, PAPER_Z, base_motion, displacement, forces, ledgers, passive_map
@@ -26,9 +26,9 @@ from .setting import (
     DURATION,
     MACRO_STEP,
     SNARE,
-    Capture,
     CaseName,
-    Passive,
+    JointResistance,
+    OrbitCapture,
     Setting,
     capture_of,
     co_simulate,
@@ -49,17 +49,17 @@ class Result:
 
     start: Setting
     run: Run
-    capture: Capture
+    capture: OrbitCapture
     processor: tuple[float, float]
-    single: Capture
+    single: OrbitCapture
     single_momentum: Array
     controlled: Run
-    controlled_capture: Capture
-    narrow: Capture
+    controlled_capture: OrbitCapture
+    narrow: OrbitCapture
     momentum: Momentum
     energies: dict[str, Array]
     cells: list[Cell]
-    docked: Docked
+    docked: DockingRun
     docked_processor: float
 
 
@@ -95,7 +95,7 @@ def study(case: CaseName) -> int:
 
 
 def _run(case: CaseName, name: str, frames: list[tuple[float, Array]]) -> Result:
-    start, passive = setting(case), Passive()
+    start, passive = setting(case), JointResistance()
     _say(f"Capture of {DURATION:g} s, co-simulated in steps of {1e3 * MACRO_STEP:g} ms ...")
     marks = [time.process_time()]
     run = co_simulate(start, passive)
@@ -230,7 +230,7 @@ def _sections(result: Result) -> list[Section]:
     ]
 
 
-def _latched(d: Docked) -> str:
+def _latched(d: DockingRun) -> str:
     """How the run to the latch ended."""
     good, why = is_latched(d, DockingParameters())
     if not good:
@@ -261,7 +261,7 @@ def _range(values: Array) -> tuple[float, float]:
     return float(values.min()), float(values.max())
 
 
-def _contact(capture: Capture) -> float:
+def _contact(capture: OrbitCapture) -> float:
     return np.inf if capture.first_contact is None else capture.first_contact
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ...cosim.docked import (
-    Docked,
+    DockingRun,
     ball_shares,
     docked_of,
     energies,
@@ -16,15 +16,15 @@ from ...cosim.docked import (
 from ...models.docking.parameters import PRELOAD_WINDOW, DockingParameters
 from ..outcome import Quantity
 from .ledger import force_error, position_error
-from .setting import Capture
+from .setting import OrbitCapture
 
-__all__ = ["Docked", "docked_of", "energies", "is_latched", "mean_wrist", "measure", "momentum_drift"]
+__all__ = ["DockingRun", "docked_of", "energies", "is_latched", "mean_wrist", "measure", "momentum_drift"]
 
 END = 10.0
 """Until then the ring moves as in the soft capture by itself [s]."""
 
 
-def measure(d: Docked, p: DockingParameters, single: Capture, soft: float, spent: float) -> list[Quantity]:
+def measure(d: DockingRun, p: DockingParameters, single: OrbitCapture, soft: float, spent: float) -> list[Quantity]:
     """The numbers of the whole end effector; ``single`` is the soft capture as one system, ``soft`` and ``spent`` are
     the processor times of both runs [s]."""
     latched, _ = is_latched(d, p)

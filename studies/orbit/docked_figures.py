@@ -10,12 +10,12 @@ from ...models.inertia import Array
 from ...report.drawing import AFTER, BEFORE, GREY, MEASURED, SHADE, drawing, line, svg
 from ..page import Picture
 from .axes import panels, plain
-from .docked import Docked, energies, mean_wrist
+from .docked import DockingRun, energies, mean_wrist
 
 _THIRD = "#009E73"
 
 
-def marked(axes: Axes, d: Docked, named: bool = True) -> None:
+def marked(axes: Axes, d: DockingRun, named: bool = True) -> None:
     """Shade every other state of the program, and name those that there is room for."""
     span = d.times[-1] - d.times[0]
     for k, (state, begin, end) in enumerate(d.whole.phases):
@@ -28,12 +28,12 @@ def marked(axes: Axes, d: Docked, named: bool = True) -> None:
             )  # fmt: skip
 
 
-def pictures(d: Docked, p: DockingParameters) -> list[Picture]:
+def pictures(d: DockingRun, p: DockingParameters) -> list[Picture]:
     """All of them."""
     return [_way(d, p), _forces(d), _flanks(d), _motion(d), _ledger(d)]
 
 
-def _way(d: Docked, p: DockingParameters) -> Picture:
+def _way(d: DockingRun, p: DockingParameters) -> Picture:
     with drawing():
         figure, axes = panels(3, 5.6)
         line(axes[0], d.times, 1e3 * d.travel, AFTER, 1.4, "travel of the carriage")
@@ -49,7 +49,7 @@ def _way(d: Docked, p: DockingParameters) -> Picture:
         return Picture(svg(figure), "Travel, gap and misalignment over time", text)
 
 
-def _forces(d: Docked) -> Picture:
+def _forces(d: DockingRun) -> Picture:
     with drawing():
         figure, axes = panels(3, 5.6)
         line(axes[0], d.times, 1e-3 * d.motor, AFTER, 1.2, "carriage's motor")
@@ -68,7 +68,7 @@ def _forces(d: Docked) -> Picture:
         return Picture(svg(figure), "Forces over time", text)
 
 
-def _flanks(d: Docked) -> Picture:
+def _flanks(d: DockingRun) -> Picture:
     with drawing():
         figure, axes = plain(3.0)
         for k, colour in enumerate((AFTER, BEFORE, _THIRD)):
@@ -82,7 +82,7 @@ def _flanks(d: Docked) -> Picture:
         return Picture(svg(figure), "Normal forces over time", "Normal forces of the six flanks.")
 
 
-def _motion(d: Docked) -> Picture:
+def _motion(d: DockingRun) -> Picture:
     with drawing():
         figure, axes = panels(2, 4.0)
         for panel, frame, name in ((axes[0], d.capture.base, "base"), (axes[1], d.capture.pin, "pin's foot")):
@@ -94,7 +94,7 @@ def _motion(d: Docked) -> Picture:
         return Picture(svg(figure), "Motion over time", "How far base and target have moved, in the world.")
 
 
-def _ledger(d: Docked) -> Picture:
+def _ledger(d: DockingRun) -> Picture:
     ledger = energies(d)
     colours = (
         MEASURED,

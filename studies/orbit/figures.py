@@ -12,13 +12,13 @@ from ..page import Picture
 from .axes import panels, plain
 from .ledger import WINDOW, Momentum
 from .map import LEVELS, STIFFNESSES, Cell
-from .setting import Capture
+from .setting import OrbitCapture
 
 PAPER_CONTACT, PAPER_Y, PAPER_Z = 7.0, 0.005, 0.010
 """First contact [s], and below what both radial displacements end [m] (Li et al., figure 10 and its text)."""
 
 
-def displacement(capture: Capture, reference: Capture) -> Picture:
+def displacement(capture: OrbitCapture, reference: OrbitCapture) -> Picture:
     """Like the paper's figure 10."""
     with drawing():
         figure, axes = plain(3.2)
@@ -37,7 +37,7 @@ def displacement(capture: Capture, reference: Capture) -> Picture:
         return Picture(svg(figure), "Radial displacements over time", caption)
 
 
-def forces(capture: Capture, reference: Capture) -> Picture:
+def forces(capture: OrbitCapture, reference: OrbitCapture) -> Picture:
     """Force on the end effector, both ways."""
     with drawing():
         figure, axes = panels(3, 5.0)
@@ -50,7 +50,7 @@ def forces(capture: Capture, reference: Capture) -> Picture:
         return Picture(svg(figure), "Force over time", "Force on the end effector, world frame, averaged over 50 ms.")
 
 
-def base_motion(capture: Capture) -> Picture:
+def base_motion(capture: OrbitCapture) -> Picture:
     """Where the base goes and turns to."""
     with drawing():
         figure, axes = panels(2, 4.0)
@@ -66,7 +66,7 @@ def base_motion(capture: Capture) -> Picture:
         )
 
 
-def ledgers(capture: Capture, energies: Mapping[str, Array], momentum: Momentum) -> list[Picture]:
+def ledgers(capture: OrbitCapture, energies: Mapping[str, Array], momentum: Momentum) -> list[Picture]:
     """Energy shares, and the momentum's with the total's change."""
     colours = (MEASURED, BEFORE, SHADE, "#009E73", AFTER, "#E69F00", GREY, "#CC79A7", "#CC1111")
     shown = {"motor and cables' strain": energies["motor"] - energies["cables, strain"]}

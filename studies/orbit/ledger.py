@@ -9,7 +9,7 @@ from ...models.floating.dynamics import kinetic_energy
 from ...models.floating.space_arm import ROTOR_INERTIA
 from ...models.inertia import Array
 from ...models.monolithic.assembly import makkar
-from .setting import Capture, Passive, Setting, column, columns
+from .setting import JointResistance, OrbitCapture, Setting, column, columns
 
 WINDOW = 0.05
 """Over which forces are averaged before they are compared [s]."""
@@ -41,7 +41,7 @@ class Momentum:
         return float((np.linalg.norm(change, axis=2).max(axis=0) / self.scale).max())
 
 
-def momentum_ledger(run: Run, capture: Capture) -> Momentum:
+def momentum_ledger(run: Run, capture: OrbitCapture) -> Momentum:
     """Read from a run's recording."""
     shares = [
         np.hstack([columns(run.recording, f"{owner}.momentum.{kind}") for kind in ("linear", "angular")])
@@ -53,7 +53,7 @@ def momentum_ledger(run: Run, capture: Capture) -> Momentum:
     return Momentum(shares[0], shares[1], np.maximum(scale, 1e-300))
 
 
-def energy_ledger(run: Run, capture: Capture, start: Setting, passive: Passive) -> dict[str, Array]:
+def energy_ledger(run: Run, capture: OrbitCapture, start: Setting, passive: JointResistance) -> dict[str, Array]:
     """Energies (n,) since the start [J]: ``motor`` is what the ring's motor has put in, the others where it is now.
 
     ``residual``: the motor's work less all else, the error of all steps and couplings.
@@ -85,14 +85,14 @@ def _middle(values: Array) -> Array:
     return 0.5 * (values[1:] + values[:-1])
 
 
-def position_error(capture: Capture, reference: Capture, end: float = np.inf) -> float:
+def position_error(capture: OrbitCapture, reference: OrbitCapture, end: float = np.inf) -> float:
     """Largest distance [m] between the pin's places in the end effector's frame, at the reference's times to ``end``
     [s]."""
     own = np.column_stack([np.interp(reference.times, capture.times, x) for x in capture.relative.T])
     return float(np.linalg.norm(own - reference.relative, axis=1)[reference.times < end + 1e-9].max())
 
 
-def force_error(capture: Capture, reference: Capture, end: float = np.inf, window: float = WINDOW) -> float:
+def force_error(capture: OrbitCapture, reference: OrbitCapture, end: float = np.inf, window: float = WINDOW) -> float:
     """RMS of the difference of the forces on the end effector over the RMS of the reference's, both means over a
     ``window`` [s], to ``end`` [s]."""
     (_, ours), (middles, theirs) = capture.mean_force(window), reference.mean_force(window)
@@ -101,6 +101,6 @@ def force_error(capture: Capture, reference: Capture, end: float = np.inf, windo
     return float(np.sqrt(np.sum((ours - theirs) ** 2) / np.sum(theirs**2)))
 
 
-def peak_force(capture: Capture) -> float:
+def peak_force(capture: OrbitCapture) -> float:
     """Largest force on the end effector, averaged over 10 ms [N]."""
     return float(np.linalg.norm(capture.mean_force(0.01)[1], axis=1).max())

@@ -12,15 +12,15 @@ from ...models.inertia import Array
 from ...models.snare.parameters import SnareParameters
 from ...report.playback import Playback
 from ...report.snare_scene import CABLES, KNOB, PIN, RINGS
-from .docked import Docked
-from .setting import TARGET_SIDE, Capture, Setting
+from .docked import DockingRun
+from .setting import TARGET_SIDE, OrbitCapture, Setting
 
 _ARM, _BASE, _TARGET = "#0072B2", "#9AA3AB", "#C9B37A"
 _PER_SECOND = 15
 
 
 def orbit_scene(
-    start: Setting, capture: Capture, snare: SnareParameters, frames: Sequence[tuple[float, Array]]
+    start: Setting, capture: OrbitCapture, snare: SnareParameters, frames: Sequence[tuple[float, Array]]
 ) -> Playback:
     """The scene in the world; ``frames`` are times and the cables' nodes (3, n_nodes, 3) at them, see `co_simulate`."""
     scene, p = Playback(_PER_SECOND), snare
@@ -72,7 +72,7 @@ _COLOURS = {
 }  # fmt: skip
 
 
-def add_phases(scene: Playback, docked: Docked) -> None:
+def add_phases(scene: Playback, docked: DockingRun) -> None:
     """Show the program's state as a ball above the carriage, one colour a state."""
     capture = docked.capture
     times = np.arange(0.0, capture.times[-1], 1 / _PER_SECOND)

@@ -14,9 +14,9 @@ from ...cosim.orbit_capture import (
     MACRO_STEP,
     SNARE,
     TARGET_SIDE,
-    Capture,
     CaseName,
-    Passive,
+    JointResistance,
+    OrbitCapture,
     Setting,
     arrival,
     capture_of,
@@ -30,9 +30,27 @@ from ...cosim.orbit_capture import (
 from ...models.inertia import Array
 
 __all__ = [
-    "AHEAD", "DURATION", "END", "MACRO_STEP", "OFFSET", "SNARE", "TARGET_SIDE", "TILT", "Capture", "CaseName",
-    "Passive", "Setting", "capture_of", "co_simulate", "column", "columns", "radial_end", "resistance", "setting",
-    "step_control", "system",
+    "AHEAD",
+    "DURATION",
+    "END",
+    "MACRO_STEP",
+    "OFFSET",
+    "SNARE",
+    "TARGET_SIDE",
+    "TILT",
+    "CaseName",
+    "JointResistance",
+    "OrbitCapture",
+    "Setting",
+    "capture_of",
+    "co_simulate",
+    "column",
+    "columns",
+    "radial_end",
+    "resistance",
+    "setting",
+    "step_control",
+    "system",
 ]  # fmt: skip
 
 OFFSET, AHEAD, TILT = 0.02, 0.12, np.deg2rad(2.0)
@@ -47,7 +65,7 @@ def setting(case: CaseName, offset: float = OFFSET, ahead: float = AHEAD, tilt: 
     return arrival(case, [ahead, offset, offset], Rotation.from_euler("xyz", [tilt, tilt, tilt]))
 
 
-def radial_end(capture: Capture) -> Array:
+def radial_end(capture: OrbitCapture) -> Array:
     """Radial displacement of the pin's foot at the paper's end, `END` (2,) [m]; of a shorter capture, at its own."""
     row = min(int(np.searchsorted(capture.times, END - 1e-9)), len(capture.times) - 1)
     return capture.relative[row, 1:]

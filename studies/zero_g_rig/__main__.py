@@ -21,6 +21,7 @@ from ...models.model_write import save_model
 from ...models.rig.rig import built_in_rig
 from ...progress import stages
 from ...report.provenance import provenance
+from ...report.words import percent
 from ..outcome import FOLDER, Quantity, table, write_json, write_result
 from ..page import Clock, Section, write_page
 from . import figures
@@ -172,7 +173,7 @@ def paper_sections(friction: Friction, flown: Flight) -> list[Section]:
                 "Unloading ratio: of the moment that a joint would bear from the weight beyond it without the rig, "
                 "the share that its torque does not show. The same friction predicts a flight arm of the same size "
                 f"and mass. Nearest to the limit of {TORQUE_LIMIT:g} N·m (chosen) comes joint {nearest + 1}, with "
-                f"{100 * flown.loads[nearest]:.0f} % of it, the band included.",
+                f"{percent(flown.loads[nearest])} of it, the band included.",
             ],
             [figures.flight(flown.time, flown.measured, flown.predicted, flown.band)],
         ),

@@ -49,7 +49,7 @@ class Boom:
 
 
 @dataclass(frozen=True, eq=False)
-class Link:
+class RigLink:
     """A moving body and the joint before it.
 
     Parameters
@@ -72,7 +72,7 @@ class Link:
 
 
 @dataclass(frozen=True, eq=False)
-class Unit:
+class HangUnit:
     """A hang unit: the sling pulls at ``point`` [m] of link number ``link`` with ``weight`` [N] when all is well.
 
     A load cell in the sling reads ``hardware`` [N] more: the unit's own rods and plate.
@@ -86,7 +86,7 @@ class Unit:
 
 
 @dataclass(frozen=True, eq=False)
-class Contact:
+class SlideContact:
     """A slide's contact (the paper's G or F) on link number ``link``: point [m, link's frame] and normal load [N]."""
 
     link: int
@@ -98,9 +98,9 @@ class Contact:
 class Arm:
     """Links from the base outwards, hang units and the slides' contacts."""
 
-    links: Sequence[Link]
-    units: Sequence[Unit]
-    contacts: Sequence[Contact]
+    links: Sequence[RigLink]
+    units: Sequence[HangUnit]
+    contacts: Sequence[SlideContact]
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -135,9 +135,9 @@ def arm_of(rig: Rig) -> Arm:
         xx, xy, xz, yy, yz, zz = about
         inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) - shift(mass, com)
         axis = "xyz"[int(np.argmax(np.abs(joint.axis)))]
-        links.append(Link(axis, joint.translation, float(mass), com, inertia, BOOMS.get(i)))
-    units = [Unit(s.name, s.link, s.point, s.weight, s.hardware) for s in rig.slings]
-    contacts = [Contact(s.link, point, s.weight / len(s.slide)) for s in rig.slings for point in s.slide]
+        links.append(RigLink(axis, joint.translation, float(mass), com, inertia, BOOMS.get(i)))
+    units = [HangUnit(s.name, s.link, s.point, s.weight, s.hardware) for s in rig.slings]
+    contacts = [SlideContact(s.link, point, s.weight / len(s.slide)) for s in rig.slings for point in s.slide]
     return Arm(links, units, contacts)
 
 

@@ -26,7 +26,7 @@ KINDS = (
 
 
 @dataclass(frozen=True, eq=False)
-class Concealed:
+class ConcealedCase:
     """A plant, and the name, place and size of what it has and the model has not; ``None`` everywhere for nothing."""
 
     plant: Plant
@@ -51,7 +51,7 @@ class Concealed:
         return {"effect": effect, "friction": friction}
 
 
-def conceal(kind: str, seed: int) -> Concealed:
+def conceal(kind: str, seed: int) -> ConcealedCase:
     """A rig with friction of its own that conceals one kind of effect.
 
     Raises
@@ -72,24 +72,30 @@ def conceal(kind: str, seed: int) -> Concealed:
     if kind == "link_torsion":
         boom, misfit = 2, sign * 0.0015 * spread
         hung = replace(plant, arm=arm.with_boom(boom, misfit=misfit), suspension=Suspension(height_stiffness=700.0))
-        return Concealed(hung, kind, f"link{boom + 1}", misfit, "rad")
+        return ConcealedCase(hung, kind, f"link{boom + 1}", misfit, "rad")
     if kind == "sling_tension_error":
         one[outer] = sign * 0.03 * spread
-        return Concealed(replace(plant, suspension=Suspension(error=one)), kind, arm.units[outer].name, one[outer], "1")
+        return ConcealedCase(
+            replace(plant, suspension=Suspension(error=one)), kind, arm.units[outer].name, one[outer], "1"
+        )
     if kind == "hang_point_clearance":
         one[outer] = 0.012 * spread
-        return Concealed(replace(plant, suspension=Suspension(play=one)), kind, arm.units[outer].name, one[outer], "m")
+        return ConcealedCase(
+            replace(plant, suspension=Suspension(play=one)), kind, arm.units[outer].name, one[outer], "m"
+        )
     if kind == "suspension_sway":
         one[:] = Suspension.lag
         one[outer] = 1.0 * spread
-        return Concealed(replace(plant, suspension=Suspension(lag=one)), kind, arm.units[outer].name, one[outer], "s")
+        return ConcealedCase(
+            replace(plant, suspension=Suspension(lag=one)), kind, arm.units[outer].name, one[outer], "s"
+        )
     if kind == "sensor_drift":
         joint = int(rng.integers(0, len(arm.links)))
         drift = np.zeros(len(arm.links))
         drift[joint] = sign * 4.0 * spread
         hung = replace(plant, sensors=Sensors(torque_drift=tuple(drift)))
-        return Concealed(hung, kind, f"tau.{arm.joints[joint]}", drift[joint], "N*m")
-    return Concealed(plant, None, None, None, None)
+        return ConcealedCase(hung, kind, f"tau.{arm.joints[joint]}", drift[joint], "N*m")
+    return ConcealedCase(plant, None, None, None, None)
 
 
 def _slides(arm: Arm, rng: np.random.Generator) -> Slide:

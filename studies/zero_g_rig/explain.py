@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 
 from ...identification.diagnosis import Diagnosis
 from ...models.effects import get_effect
-from ...models.model import Placed, places
+from ...models.model import PlacedEffect, places
 from ...models.rig.rig import Rig
-from .alike import Alike, compare
+from ...report.words import percent
+from .stand_ins import StandIns, compare
 from .study import Friction
 
 Array = NDArray[np.float64]
@@ -44,15 +45,15 @@ def suspected_boom(rig: Rig, found: Diagnosis) -> str:
     return [*named, *(c.at for c in tried), *places(get_effect(torsion), rig)][0]
 
 
-def explanations(rig: Rig, boom: str) -> dict[str, list[Placed]]:
+def explanations(rig: Rig, boom: str) -> dict[str, list[PlacedEffect]]:
     """Explanations of what is left on joints 2 and 6, each with the parameters that would be free.
 
     ``boom`` is the link that may be twisted.
     """
 
-    def placed(name: str, at: str, *free: str) -> Placed:
+    def placed(name: str, at: str, *free: str) -> PlacedEffect:
         effect = get_effect(name)
-        return Placed(effect, at, tuple(p.name for p in effect.parameters if p.name not in free))
+        return PlacedEffect(effect, at, tuple(p.name for p in effect.parameters if p.name not in free))
 
     last = rig.links[-1].name
     return {
@@ -63,7 +64,7 @@ def explanations(rig: Rig, boom: str) -> dict[str, list[Placed]]:
     }
 
 
-def tell_apart(rig: Rig, friction: Friction, boom: str) -> list[Alike]:
+def tell_apart(rig: Rig, friction: Friction, boom: str) -> list[StandIns]:
     """Every pair of explanations, and what all but the first can do together, with and without measurements."""
     named = explanations(rig, boom)
     others = {name: placed for name, placed in named.items() if name != TWIST}
@@ -79,25 +80,25 @@ def after(some: Sequence[str]) -> str:
     return f"{TOGETHER}, with {' and '.join(some)}"
 
 
-def alike_in_words(pairs: Sequence[Alike]) -> list[str]:
+def alike_in_words(pairs: Sequence[StandIns]) -> list[str]:
     """One sentence a pair of single explanations that is hard to tell apart, worst first."""
     hard = [p for p in pairs if p.mimicked > ALIKE and TOGETHER not in p.name + p.other]
     return [
-        f"{p.other[0].upper()}{p.other[1:]} can pose as {p.name}: {100 * p.mimicked:.0f} % of its torque, "
+        f"{p.other[0].upper()}{p.other[1:]} can pose as {p.name}: {percent(p.mimicked)} of its torque, "
         f"smallest angle {p.angle:.1f} degrees."
         for p in sorted(hard, key=lambda p: -p.mimicked)
     ]
 
 
-def remedy(pairs: Sequence[Alike], boom: str) -> str:
+def remedy(pairs: Sequence[StandIns], boom: str) -> str:
     """What torques and joint angles alone could not have settled, and the fewest measurements that would."""
     taken = {p.other: p.mimicked for p in pairs if p.name == TWIST}
-    shares = ", ".join(f"{100 * taken[other]:.0f} % by {other}" for other in (TENSION, PAYLOAD, DRIFT))
+    shares = ", ".join(f"{percent(taken[other])} by {other}" for other in (TENSION, PAYLOAD, DRIFT))
     best = [min((some for some in SETS if len(some) == n), key=lambda some: taken[after(some)]) for n in (1, 2)]
-    steps = "; ".join(f"{100 * taken[after(some)]:.0f} % with {' and '.join(some)}" for some in best)
+    steps = "; ".join(f"{percent(taken[after(some)])} with {' and '.join(some)}" for some in best)
     direct = get_effect("link_torsion").experiment.format(at=boom)
     return (
         f"From torques and joint angles alone, as the paper had them, {TWIST} ({boom}) can be mimicked to {shares}, "
-        f"and to {100 * taken[TOGETHER]:.0f} % by all of these. The best of further measurements leave {steps}. "
+        f"and to {percent(taken[TOGETHER])} by all of these. The best of further measurements leave {steps}. "
         f"What settles it directly: {direct}."
     )

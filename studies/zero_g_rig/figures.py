@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ...report.drawing import AFTER, BEFORE, GREY, MEASURED, SHADE, drawing, line, svg
 from ..page import Picture
-from .friction import Curve
+from .friction import SlideFrictionCurve
 
 Array = NDArray[np.float64]
 
@@ -118,7 +118,7 @@ def errors(joints: Sequence[str], steps: Mapping[str, Array], caption: str) -> P
     return Picture(picture, "Bars of the mean torque error of each joint under each model.", caption)
 
 
-def friction(drawn: Sequence[Curve], truth: Mapping[str, Array]) -> Picture:
+def friction(drawn: Sequence[SlideFrictionCurve], truth: Mapping[str, Array]) -> Picture:
     """Identified friction curves with 2σ bands, and the plant's own steady friction (n_speeds,) [N]."""
     with drawing():
         figure = Figure(figsize=(9.0, 5.2), layout="constrained")

@@ -17,7 +17,7 @@ from ...models.model import Model
 from ...models.rigid_body import RigidBody
 from ...recordings.write import write_recording
 from .concealed import conceal
-from .motion import DURATION, TRAIN, Joints, varied
+from .motion import DURATION, TRAIN, JointMoves, varied
 from .plant import Plant, simulate
 from .study import Friction
 
@@ -54,7 +54,7 @@ def flight_arm(model: Model, friction: Friction, folder: Path, kind: str, seed: 
     booms = [link.boom for link in rig.arm.links if link.boom is not None]
     arm = rig.arm.with_booms(torsion=STIFFER * booms[0].torsion, misfit=0.0)
     plant: Plant = replace(rig, arm=arm)
-    motion = Joints(varied(TRAIN, np.random.default_rng(_SEED)))
+    motion = JointMoves(varied(TRAIN, np.random.default_rng(_SEED)))
     record = simulate(plant, motion, DURATION, seed=_SEED)
     columns = {f"q.{joint}": ("time", record.q[:, k]) for k, joint in enumerate(arm.joints)}
     columns |= {f"tau.{joint}": ("time", record.tau[:, k]) for k, joint in enumerate(arm.joints)}

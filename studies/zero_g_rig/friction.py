@@ -14,14 +14,14 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ...identification.fitting.assembly import Assembly
+from ...identification.fitting.assembly import TorqueModel
 from ...identification.fitting.experiment import Experiment, scales
 from ...identification.fitting.fit import Fit, fit
 from ...identification.fitting.problem import Problem
 from ...identification.fitting.starts import best_start
 from ...models.effects import get_effect
 from ...models.hidden_state import evaluate_law
-from ...models.model import Model, Placed
+from ...models.model import Model, PlacedEffect
 from ...models.rig.kinematics import slide_map
 from ...models.rig.rig import Rig
 
@@ -34,7 +34,7 @@ BINS = 4
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class SlideFrictionCurve:
     """Friction force at each contact of one joint's slide over the joint's speed; arrays (n_speeds,).
 
     Parameters
@@ -62,11 +62,11 @@ def tip_to_base(model: Model, train: Sequence[Experiment], progress: Callable[[s
     """Friction parameters by key, fitted joint by joint from the tip, each to its own torque."""
     known, values = scales(train), dict(model.values)
     rng = np.random.default_rng(0)
-    done: list[Placed] = []
+    done: list[PlacedEffect] = []
     for p in reversed([p for p in model.effects if p.effect.name == FRICTION]):
         joint = model.joints.index(p.at)
         progress(f"friction of {p.at}, with all beyond it known")
-        assembly = Assembly(model.tree, [p, *done], None, known, values)
+        assembly = TorqueModel(model.tree, [p, *done], None, known, values)
         problem = Problem(assembly, tuple(train), np.array([joint]), np.arange(len(assembly.slots)))
         sigma = np.sqrt(np.mean(np.concatenate([e.measured[:, joint] for e in train]) ** 2, keepdims=True))
         theta, _, _ = best_start(problem, assembly.start, sigma, rng)
@@ -78,11 +78,11 @@ def tip_to_base(model: Model, train: Sequence[Experiment], progress: Callable[[s
 
 def jointly(model: Model, train: Sequence[Experiment], values: dict[str, float]) -> Fit:
     """All slides' friction fitted to all torques together, from what tip to base found."""
-    assembly = Assembly(model.tree, model.effects, None, scales(train), values)
+    assembly = TorqueModel(model.tree, model.effects, None, scales(train), values)
     return fit(assembly, train, multi_start=False)
 
 
-def curves(found: Fit, train: Sequence[Experiment], points: int = 40) -> list[Curve]:
+def curves(found: Fit, train: Sequence[Experiment], points: int = 40) -> list[SlideFrictionCurve]:
     """Each slide's curve over the speeds that its joint travelled at, with its standard deviation.
 
     Two parts: what noise leaves open (delta method), and the misfit of the law's form, from what is left of the joint's
@@ -104,7 +104,7 @@ def curves(found: Fit, train: Sequence[Experiment], points: int = 40) -> list[Cu
         variance += _misfit(found, train, joint, speed) ** 2
         good = found.std[index] < 0.5 * np.abs(found.theta[index])
         drawn.append(
-            Curve(
+            SlideFrictionCurve(
                 p.at,
                 speed,
                 law.values[:, 0],

@@ -77,7 +77,7 @@ DURATION = 190.0
 
 
 @dataclass(frozen=True)
-class Joints:
+class JointMoves:
     """Moves as a motion: time [s] (n,) to position and rate, each (n, 7) [rad, rad/s], zero at the start."""
 
     moves: Sequence[Move]
@@ -96,7 +96,7 @@ class Joints:
 
 
 def varied(moves: Sequence[Move], rng: np.random.Generator) -> tuple[Move, ...]:
-    """The same sequence with every speed and change up to 15 % smaller, so that no move starts before the last ends.
+    """The moves with every speed and change up to 15 % smaller, so that no move starts before the last ends.
 
     A joint's changes shrink alike: what comes back still comes back. On slings that keep their height, a joint 2 or 6
     left at 2 mrad is a twist like the one that is concealed.

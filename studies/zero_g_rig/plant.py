@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ...models.exudyn_build import exudyn as exu
 from ...models.exudyn_build import items
-from .arm import GRAVITY, Arm, Boom, Link, shift
+from .arm import GRAVITY, Arm, Boom, RigLink, shift
 from .slide import Slide
 from .suspension import Slings, Suspension
 
@@ -65,7 +65,7 @@ class Plant:
 
 
 @dataclass(frozen=True, eq=False)
-class Record:
+class RigRecord:
     """What was measured, and what only the plant knows; n samples.
 
     Parameters
@@ -117,7 +117,7 @@ class _Tree:
                 self.flexible += [(self.twists[-1] + k, s, boom.damping) for k, s in enumerate(springs)]
                 self._parts[-1].append((last, reach))
 
-    def _add(self, axis: str, offset: Array, body: Link | None) -> int:
+    def _add(self, axis: str, offset: Array, body: RigLink | None) -> int:
         self.kinds.append(_JOINT[axis])
         self.offsets.append(offset)
         self.masses.append(0.0 if body is None else body.mass)
@@ -134,7 +134,7 @@ class _Tree:
         return body, point - origin
 
 
-def _halves(link: Link, boom: Boom) -> tuple[Link, Link]:
+def _halves(link: RigLink, boom: Boom) -> tuple[RigLink, RigLink]:
     """Inner and outer part of a link with a boom; the outer one's frame starts at the cut."""
     mass, half = boom.mass / 2, boom.length / 2
     middle = boom.cut + np.array([half / 2, 0.0, 0.0])
@@ -143,10 +143,10 @@ def _halves(link: Link, boom: Boom) -> tuple[Link, Link]:
     rest = link.mass - mass
     com = (link.mass * link.com - mass * middle) / rest
     inertia = link.inertia - tube - shift(mass, middle - link.com) - shift(rest, com - link.com)
-    return Link(link.axis, link.offset, rest, com, inertia), Link("z", boom.cut, mass, middle - boom.cut, tube)
+    return RigLink(link.axis, link.offset, rest, com, inertia), RigLink("z", boom.cut, mass, middle - boom.cut, tube)
 
 
-def simulate(plant: Plant, motion: Motion, duration: float, rate: float = 100.0, seed: int = 0) -> Record:
+def simulate(plant: Plant, motion: Motion, duration: float, rate: float = 100.0, seed: int = 0) -> RigRecord:
     """Run the rig through a motion and record it.
 
     Parameters
@@ -326,7 +326,7 @@ class _Run:
         settings.linearSolver.solverType = exu.LinearSolverType.EXUdense
         self._mbs.SolveDynamic(settings)
 
-    def record(self) -> Record:
+    def record(self) -> RigRecord:
         """What was logged, through the torque sensors."""
         tau, tension, q, qd, friction, twist = (np.array(column) for column in zip(*self._log, strict=True))
         sensors, rng = self._plant.sensors, self._rng
@@ -337,4 +337,4 @@ class _Run:
         seen = tau + sensors.torque_noise * rng.standard_normal(tau.shape) + np.outer(time / time[-1], drift)
         if sensors.torque_step:
             seen = np.round(seen / sensors.torque_step) * sensors.torque_step
-        return Record(time, read, seen, tension, q, qd, tau, friction, twist)
+        return RigRecord(time, read, seen, tension, q, qd, tau, friction, twist)

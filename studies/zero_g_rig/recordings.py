@@ -10,9 +10,9 @@ import numpy as np
 import xarray as xr
 
 from ...recordings.write import write_recording
-from .concealed import Concealed, conceal
-from .motion import DURATION, HOLDOUT, TRAIN, Joints, varied
-from .plant import Record, simulate
+from .concealed import ConcealedCase, conceal
+from .motion import DURATION, HOLDOUT, TRAIN, JointMoves, varied
+from .plant import RigRecord, simulate
 
 ANSWER = "answer.json"
 
@@ -47,7 +47,7 @@ def make_recordings(
     hidden = conceal(kind, seed)
     rng = np.random.default_rng([seed, 99])
     for k, (name, moves) in enumerate((("train", TRAIN), ("holdout", HOLDOUT))):
-        motion = Joints(varied(moves, rng) if seed else moves)
+        motion = JointMoves(varied(moves, rng) if seed else moves)
         if name not in names:
             continue
         record = simulate(hidden.plant, motion, DURATION, seed=1000 * seed + k)
@@ -68,7 +68,7 @@ def open_answer(folder: Path, digest: str) -> dict[str, Any]:
     return json.loads((folder / ANSWER).read_text(encoding="utf-8"))
 
 
-def _table(record: Record, hidden: Concealed, tensions: bool) -> xr.Dataset:
+def _table(record: RigRecord, hidden: ConcealedCase, tensions: bool) -> xr.Dataset:
     columns = {}
     for k, joint in enumerate(hidden.plant.arm.joints):
         columns[f"q.{joint}"] = ("time", record.q[:, k])

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...identification.diagnosis import Diagnosis
-from .friction import Curve
+from .friction import SlideFrictionCurve
 from .slide import Slide
 
 Array = NDArray[np.float64]
@@ -39,7 +39,7 @@ class Score:
     coverage: float
 
 
-def score(answer: Mapping[str, Any], diagnosis: Diagnosis, drawn: Sequence[Curve]) -> Score:
+def score(answer: Mapping[str, Any], diagnosis: Diagnosis, drawn: Sequence[SlideFrictionCurve]) -> Score:
     """Compare a diagnosis and the friction curves with the plant's answer.
 
     Parameters
@@ -47,7 +47,7 @@ def score(answer: Mapping[str, Any], diagnosis: Diagnosis, drawn: Sequence[Curve
     answer : mapping
         From `recordings.open_answer`.
     diagnosis : Diagnosis
-    drawn : sequence of Curve
+    drawn : sequence of SlideFrictionCurve
     """
     effect = answer["effect"]
     covered = coverage(drawn, true_curves(answer, drawn))
@@ -66,7 +66,7 @@ def score(answer: Mapping[str, Any], diagnosis: Diagnosis, drawn: Sequence[Curve
     )
 
 
-def true_curves(answer: Mapping[str, Any], drawn: Sequence[Curve]) -> dict[str, Array]:
+def true_curves(answer: Mapping[str, Any], drawn: Sequence[SlideFrictionCurve]) -> dict[str, Array]:
     """The plant's steady friction force at one contact over each curve's speeds [N]."""
     found = {}
     for c in drawn:
@@ -76,7 +76,7 @@ def true_curves(answer: Mapping[str, Any], drawn: Sequence[Curve]) -> dict[str, 
     return found
 
 
-def coverage(drawn: Sequence[Curve], truth: Mapping[str, Array]) -> float:
+def coverage(drawn: Sequence[SlideFrictionCurve], truth: Mapping[str, Array]) -> float:
     """Share of all points of all curves that lie inside the 2σ band."""
     inside = np.concatenate([np.abs(truth[c.joint] - c.force) <= 2 * c.std for c in drawn])
     return float(np.mean(inside))

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...identification.fitting.assembly import Assembly
+from ...identification.fitting.assembly import TorqueModel
 from ...identification.fitting.experiment import Experiment, load_experiments, scales
 from ...identification.fitting.fit import Fit
 from ...models.model import Model
 from ...models.rigid_body import RigidBody
-from .friction import Curve, curves, jointly, tip_to_base
+from .friction import SlideFrictionCurve, curves, jointly, tip_to_base
 
 Array = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ class Friction:
     """Friction as identified: the joint fit, its curves, and both recordings."""
 
     fit: Fit
-    curves: list[Curve]
+    curves: list[SlideFrictionCurve]
     train: Traces
     holdout: Traces
     experiments: list[Experiment]
@@ -61,8 +61,8 @@ def friction_study(model: Model, train: Path, holdout: Path, progress: Callable[
     values = tip_to_base(model, experiments, progress)
     progress("friction of all joints together")
     found = jointly(model, experiments, values)
-    bare = Assembly(model.tree, [], None, scales(experiments), {})
-    first = Assembly(model.tree, model.effects, None, scales(experiments), values)
+    bare = TorqueModel(model.tree, [], None, scales(experiments), {})
+    first = TorqueModel(model.tree, model.effects, None, scales(experiments), values)
 
     def traces(e: Experiment) -> Traces:
         band = e.motion.to_band

@@ -38,7 +38,7 @@ def printed_law(speed: Array) -> dict[str, Array]:
 
 
 def registered_law(speed: Array) -> Array:
-    """The same by the vocabulary's `makkar_friction`, whose parameters are speeds and levels."""
+    """The printed friction by the vocabulary's `makkar_friction`, whose parameters are speeds and levels."""
     g = PRINTED
     values = {
         "stribeck_level": g["gamma1"],

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from snarelab.errors import InputError
-from snarelab.models.docking.bench import SEEN, DockingBench, Motion
+from snarelab.models.docking.bench import SEEN, DockingBench, DockingCommand
 from snarelab.models.docking.bench_setup import GROOVES, Bench, BenchSetup, docking_effects, read_bench
 from snarelab.models.docking.closed_forms import seated_stiffness
 from snarelab.models.docking.parameters import DockingParameters
@@ -37,7 +37,7 @@ def motion(knots, travels, *, latch=LATCH, start=(-0.0801, 0.0, 0.0)):
     gone = np.diff(travels)[k]
     travel = np.array(travels)[k] + gone * x * x * (3 - 2 * x)
     rate = gone / length * 6 * x * (1 - x)
-    return Motion(times, travel, rate, np.array(start), np.array([1.0, 0, 0, 0]), latch)
+    return DockingCommand(times, travel, rate, np.array(start), np.array([1.0, 0, 0, 0]), latch)
 
 
 WHOLE = motion([0, 0.5, 3, 6.5, 8.5, 9, 11, 11.5], [0.03, 0.03, PRELOAD, PRELOAD, BACK, BACK, OFF, OFF])

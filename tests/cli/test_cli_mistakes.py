@@ -203,7 +203,7 @@ def test_a_holdout_that_is_fitted_is_refused(arm_folder, capfd, command, same):
     [
         ("none/x", "folder does not exist"),
         ("arm.urdf/x", "folder does not exist"),
-        (".", "no plain file"),
+        (".", "not a regular file"),
         ("train.csv", "recording that is read"),
     ],
 )

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from snarelab.cosim.iteration import Iteration, NotConverged, QuasiNewton
+from snarelab.cosim.iteration import ConvergenceError, Iteration, QuasiNewton
 from snarelab.errors import InputError
 
 
@@ -24,7 +24,7 @@ def test_quasi_newton_remembers():
 
 
 def test_quasi_newton_says_when_there_is_no_solution():
-    with pytest.raises(NotConverged):
+    with pytest.raises(ConvergenceError):
         QuasiNewton(Iteration(limit=10)).solve(lambda y: y + 1.0, np.zeros(1), np.ones(1))
 
 
@@ -76,7 +76,7 @@ def test_an_iteration_ends_with_its_limit_and_says_how_far_off_it_was():
         return y + 2.0
 
     solver = QuasiNewton(Iteration(limit=3))
-    with pytest.raises(NotConverged, match=r"residual 5\.0e-01 of the values' magnitude after 3 evaluations"):
+    with pytest.raises(ConvergenceError, match=r"residual 5\.0e-01 of the values' magnitude after 3 evaluations"):
         solver.solve(never, np.zeros(1), np.array([4.0]))
     assert len(calls) == 3
     assert solver._residuals == solver._results == []  # what was learnt on the way led nowhere
@@ -89,7 +89,7 @@ def test_an_iteration_stops_at_what_is_no_number():
         calls.append(y)
         return np.array([np.nan])
 
-    with pytest.raises(NotConverged, match="after 1 evaluations"):
+    with pytest.raises(ConvergenceError, match="after 1 evaluations"):
         QuasiNewton(Iteration()).solve(bad, np.zeros(1), np.ones(1))
     assert len(calls) == 1
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from snarelab.cosim.iteration import Iteration
-from snarelab.cosim.macro_step import Taken
+from snarelab.cosim.macro_step import AcceptedStep
 from snarelab.cosim.master import Master
 from snarelab.cosim.participants.oscillator import LeftOscillator, RightOscillator
 from snarelab.cosim.step_control import StepControl
@@ -70,7 +70,7 @@ def test_a_macro_step_is_positive_and_finite(step):
     ],
 )
 def test_an_error_is_the_worst_miss_of_what_is_coupled_in_tolerances(changed, error):
-    """Constant hold: outputs were foretold to stay. Masses stand 1 m apart on 3 N/m."""
+    """Constant hold: outputs were predicted to stay. Masses stand 1 m apart on 3 N/m."""
     one = master(hold="constant", control=StepControl(0.1, {"left.x": 2.0}))
     assert one._step._error(outputs(one, **changed), 0.1) == pytest.approx(error, rel=1e-12)
 
@@ -79,19 +79,19 @@ def test_the_largest_magnitude_so_far_is_kept():
     """-3 N at first; once 6 N were passed, a miss of 1.2 N is a fifth."""
     one = master(hold="constant", control=StepControl(0.1))
     for change in (9.0, -5.0):
-        one._step.remember(Taken(outputs(one, right_force=change), 0.1, None))
+        one._step.remember(AcceptedStep(outputs(one, right_force=change), 0.1, None))
     assert one.value("right.force") == pytest.approx(1.0)
     assert one._step._error(outputs(one, right_force=1.2), 0.1) == pytest.approx(1.2 / 6.0 / 0.1)
 
 
 def test_what_is_foretold_follows_the_hold_through_the_last_points():
     """Forces of -3, -1 and 5 N at equal steps: the parabola leads to 15 N, the line to 11 N."""
-    for hold, foretold in (("constant", 5.0), ("linear", 11.0), ("midpoint", 11.0), ("quadratic", 15.0)):
+    for hold, forecast in (("constant", 5.0), ("linear", 11.0), ("midpoint", 11.0), ("quadratic", 15.0)):
         one = master(hold=hold, iterate=True)
         for change in (2.0, 6.0):
-            one._step.remember(Taken(outputs(one, right_force=change), 0.1, None))
+            one._step.remember(AcceptedStep(outputs(one, right_force=change), 0.1, None))
         at = one.system.layout.outputs.index("right.force")
-        assert one._step._predicted(0.1)[at] == pytest.approx(foretold)
+        assert one._step._predicted(0.1)[at] == pytest.approx(forecast)
         assert one._step._predicted(0.1)[one.system.layout.outputs.index("left.x")] == pytest.approx(1.0)
 
 

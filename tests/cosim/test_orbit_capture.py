@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from snarelab.cosim.orbit_capture import (
     ALONG_TIP,
-    Capture,
-    Passive,
+    JointResistance,
+    OrbitCapture,
     arrival,
     capture_of,
     column,
@@ -79,7 +79,11 @@ def test_friction_scales_as_a_whole_and_its_shape_stays():
     assert levels < set(FRICTION)
     assert dict(twice.friction) == pytest.approx({k: (2 if k in levels else 1) * v for k, v in FRICTION.items()})
     assert twice.stiffness == 40.0
-    assert (dict(Passive().friction), Passive().stiffness, resistance(usual).stiffness) == (FRICTION, 0.0, 0.0)
+    assert (dict(JointResistance().friction), JointResistance().stiffness, resistance(usual).stiffness) == (
+        FRICTION,
+        0.0,
+        0.0,
+    )
 
 
 @pytest.mark.parametrize(("case", "bodies"), [("inspection", 2), ("hover", 1)])
@@ -132,7 +136,7 @@ def capture(**given):
     nothing = np.zeros((4, 3))
     fields = {"times": TIMES, "tip": frame, "pin": frame, "base": frame, "q": nothing, "qd": nothing,
               "impulse": nothing, "angular_impulse": nothing, "first_contact": None}  # fmt: skip
-    return Capture(**{**fields, **given})
+    return OrbitCapture(**{**fields, **given})
 
 
 def test_the_pin_is_told_in_the_end_effectors_axes():

@@ -162,8 +162,9 @@ def numbers(code, name):
 def test_thresholds_are_those_of_the_code():
     """Of the table written from the code, too: each number is set in one place alone."""
     sources = [path for folder in ("recordings", "identification") for path in (ROOT / folder).rglob("*.py")]
-    # The searches over captures and encoders have thresholds of their own, under names that mean the same.
-    code = "\n".join(read(path) for path in sources if path.parent.name not in ("snare", "links"))
+    # Captures, encoders and checks have thresholds of their own, under names that mean the same.
+    apart = {"snare", "links", "checks"}
+    code = "\n".join(read(path) for path in sources if not apart & set(path.relative_to(ROOT).parts))
     page = read(DOCS / "method.md")
     heads = [m.start() for m in re.finditer(re.escape("| constant | value |"), page)]
     decide, others = (rows(page[at:], "| constant | value |") for at in heads)

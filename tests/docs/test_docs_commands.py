@@ -34,7 +34,7 @@ NOT_RUN = {
 PARSED = {
     r"snarelab tolerance STUDY\.toml .*": "minutes of captures; test_tolerance_study.py runs a small study",
     r"snarelab (diagnose|identify) capture\.toml .*": "minutes of captures; test_snare_recordings.py runs short ones",
-    r"snarelab (diagnose|identify|simulate) .*(docking|foretold).*": "a minute; test_docking_recordings.py runs them",
+    r"snarelab (diagnose|identify|simulate) .*(docking|predicted).*": "a minute; test_docking_recordings.py runs them",
     r"snarelab simulate new\.toml --out capture\.csv": "of the model that the diagnosis left; test_snare_recordings.py",
 }
 NOT_RUN_PYTHON = {

@@ -12,14 +12,14 @@ from scipy.integrate import solve_ivp
 from bench.fmu_models import everywhere, made_slave, write_model
 from snarelab.cosim.participants.floating_arm import FloatingArmParticipant
 from snarelab.errors import InputError
-from snarelab.fmu.arm import Servo, arm_equations
+from snarelab.fmu.arm import ServoGains, arm_equations
 from snarelab.fmu.elements import ELEMENTS
 from snarelab.fmu.export import model_equations
 from snarelab.models.effects import get_effect
 from snarelab.models.floating.arm import FloatingArm
 from snarelab.models.floating.ets_vii import ets_vii
 from snarelab.models.floating.joint_drive import Drive
-from snarelab.models.model import Model, Placed
+from snarelab.models.model import Model, PlacedEffect
 from snarelab.models.model_file import load_model
 
 ENGINE: Any = pin  # its stubs lack most names
@@ -205,7 +205,9 @@ def test_a_servo_on_a_floating_base_moves_as_the_participant_does(tmp_path):
     tree = replace(tree, joints=tuple(replace(j, speed=0.5) for j in tree.joints))
     base = np.array([300.0, 0, 0, 15.0, 90.0, 2.0, 0.0, 80.0, 0.0, 110.0])
     arm = FloatingArm(tree, base, 1, tip_translation=np.array([0.1, 0.0, 0.3]))
-    effects = [Placed(get_effect(n), j) for j in ("joint1", "joint2") for n in ("makkar_friction", "rotor_inertia")]
+    effects = [
+        PlacedEffect(get_effect(n), j) for j in ("joint1", "joint2") for n in ("makkar_friction", "rotor_inertia")
+    ]
     values = {f"rotor_inertia.{j}.inertia": 0.4 for j in ("joint1", "joint2")}
     friction = {"coulomb_level": 2.0, "coulomb_speed": 0.05, "viscous_coefficient": 3.0, "stribeck_level": 0.5}
     friction |= {"stribeck_speed": 0.05, "stribeck_ratio": 4.0}
@@ -214,7 +216,7 @@ def test_a_servo_on_a_floating_base_moves_as_the_participant_does(tmp_path):
     whole = FloatingArmParticipant(arm, Drive(*gains, effects, values), q=first, servo=True)
     whole.initialize()
     model = Model(Path("x"), "servo_arm", "free_floating_arm", None, tree, "fixed", tuple(effects), {}, None, values)
-    equations = arm_equations(model, arm, stiff=False, servo=Servo(*gains), start=first)
+    equations = arm_equations(model, arm, stiff=False, servo=ServoGains(*gains), start=first)
     given = {"servo": 1.0, "target.joint1": 0.5, "target.joint2": -0.6, "force.tip.y": 4.0, "torque.tip.x": -1.5}
     s = made_slave(tmp_path, equations, 2, **given)
     inputs = np.array([given.get(v.name, v.start) for v in whole.variables if v.causality == "input"])

@@ -7,7 +7,7 @@ import pytest
 
 from bench.fmu_models import write_model
 from snarelab.errors import InputError
-from snarelab.fmu.archive import open_fmu
+from snarelab.fmi.archive import open_fmu
 from snarelab.fmu.command import add_parser
 from snarelab.fmu.elements import ELEMENTS
 from snarelab.fmu.export import model_equations

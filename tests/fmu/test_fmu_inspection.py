@@ -5,7 +5,7 @@ import importlib.util
 import pytest
 
 from bench.ecos_inspection import apart, in_ecos, write_system
-from snarelab.cosim.orbit_capture import Passive, capture_of, co_simulate
+from snarelab.cosim.orbit_capture import JointResistance, capture_of, co_simulate
 from snarelab.studies.orbit.setting import setting
 
 
@@ -25,6 +25,8 @@ def test_both_fmus_in_ecos_move_as_the_study_does(tmp_path):
         if "libtbb" in str(fault):
             pytest.skip("ecospy finds no oneTBB: pip install tbb")
         raise
-    place, force = apart(table, capture_of(co_simulate(setting("inspection"), Passive(), duration=0.3), "inspection"))
+    place, force = apart(
+        table, capture_of(co_simulate(setting("inspection"), JointResistance(), duration=0.3), "inspection")
+    )
     assert place < 1e-11  # the tip moves by 17 nm
     assert force < 1e-3

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from bench.fmu_models import Slave, everywhere, write_model
 from snarelab.cli import main
 from snarelab.fmu.export import export, model_equations
-from snarelab.identification.fitting.assembly import Assembly
+from snarelab.identification.fitting.assembly import TorqueModel
 from snarelab.identification.fitting.experiment import load_experiments, scales
 from snarelab.identification.fitting.floating_terms import base_signals
 from snarelab.identification.simulate import simulate
@@ -193,7 +193,7 @@ def test_follows_a_floating_base_with_its_effects(tmp_path):
     columns |= {f"torque.wheels.{a}": told[:, k] for k, a in enumerate("xyz")}
     pd.DataFrame(columns).to_csv(tmp_path / "motion.csv", index=False)
     (experiment,) = load_experiments(model, [tmp_path / "motion.csv"], RigidBody(model.tree))
-    assembly = Assembly(model.tree, model.effects, None, scales([experiment]), model.values)
+    assembly = TorqueModel(model.tree, model.effects, None, scales([experiment]), model.values)
     wanted = assembly.torque(experiment, np.array([model.values[s.key] for s in assembly.slots]))
     wanted += experiment.carried  # the fit has the base's own momentum on the measured side
     recorded, read = experiment.motion, base_signals(experiment)

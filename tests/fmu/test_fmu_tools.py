@@ -17,7 +17,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from bench.fmu_models import Slave, everywhere, rewritten, tool_environment, write_model
-from snarelab.fmu.archive import open_fmu
+from snarelab.fmi.archive import open_fmu
 from snarelab.fmu.build import write_fmu
 from snarelab.fmu.elements import ELEMENTS
 from snarelab.fmu.export import export, model_equations

@@ -4,23 +4,23 @@ from typing import Any
 
 import numpy as np
 
-from snarelab.identification.snare.fit import Fit
+from snarelab.identification.snare.fit import CaptureFit
 from snarelab.identification.snare.handles import handle_of, key_of
-from snarelab.identification.snare.recording import EVERY, Capture, Track
+from snarelab.identification.snare.recording import EVERY, CaptureRecording, Track
 from snarelab.identification.snare.sets import CaptureSet
 from snarelab.models.effects import get_effect
-from snarelab.models.model import Placed
+from snarelab.models.model import PlacedEffect
 from snarelab.models.snare.parameters import SnareParameters
-from snarelab.models.snare.setup import Setup
+from snarelab.models.snare.setup import CaptureSetup
 from snarelab.models.snare.target import Target
 
-FRICTION = Placed(get_effect("contact_friction"), "pin")
+FRICTION = PlacedEffect(get_effect("contact_friction"), "pin")
 """Its handle is the coefficient itself: from 0 to 1.5, differences of 0.03, tried at 0.08 and 0.25."""
-PRETENSION = Placed(get_effect("cable_pretension"), "cables")
+PRETENSION = PlacedEffect(get_effect("cable_pretension"), "cables")
 """Its handle is the tension itself: from 0 to 5000 N, differences of 60 N."""
-CLEARANCE = Placed(get_effect("hang_point_clearance"), "target")
+CLEARANCE = PlacedEffect(get_effect("hang_point_clearance"), "target")
 """Its handle is the play itself: from 0 to 0.1 m, differences of 0.4 mm."""
-UMBILICAL = Placed(get_effect("umbilical_stiffness"), "target")
+UMBILICAL = PlacedEffect(get_effect("umbilical_stiffness"), "target")
 """Its handle is the stiffness' root: from 0 to 100, differences of 1, tried at 20, 100 and 500 N/m."""
 
 
@@ -34,11 +34,11 @@ def track(position, quaternion=None, **force):
 def capture(measured, *, path="a.csv", zero=0.0, noise=1e-4, target=None, carried=1.0, sensor="wrist"):
     """What was measured, all its forces by one sensor, with the same noise on position and force."""
     times = np.asarray(EVERY * np.arange(len(measured.position)), float)
-    setup = Setup(SnareParameters(), target or Target("free"))
+    setup = CaptureSetup(SnareParameters(), target or Target("free"))
     scatter: dict[str, float] = dict.fromkeys(["position", *measured.force], noise)
     bodies = dict.fromkeys(measured.force, sensor)
     forces = dict.fromkeys(measured.force, carried)
-    return Capture(path, "target", times, measured, bodies, setup, None, zero, scatter, forces, ())
+    return CaptureRecording(path, "target", times, measured, bodies, setup, None, zero, scatter, forces, ())
 
 
 def along(*directions):
@@ -76,4 +76,4 @@ def captures_of(runs, *measured, **options):
 
 def fit_of(placed, x, likelihood, residuals=(), tracks=(), slopes=None):
     """A fit as it came."""
-    return Fit(tuple(placed), np.array(x, float), likelihood, tuple(tracks), tuple(residuals), slopes)
+    return CaptureFit(tuple(placed), np.array(x, float), likelihood, tuple(tracks), tuple(residuals), slopes)

@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from snarelab.checks.run import check_file
+from snarelab.identification.checks.run import check_file
 
 MODEL = 'urdf = "arm.urdf"\neffects = ["viscous_friction", "coulomb_friction"]\n'
 

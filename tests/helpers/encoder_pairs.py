@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 
 from snarelab.identification.fitting.experiment import Scales
-from snarelab.identification.links.run import Run
+from snarelab.identification.links.run import EncoderPair
 from snarelab.identification.links.source import Links
 from snarelab.models.effects import get_effect
-from snarelab.models.model import Placed
+from snarelab.models.model import PlacedEffect
 from snarelab.recordings import JointKind
 from snarelab.recordings.condition import Motion
 
@@ -19,7 +19,7 @@ SCALES = Scales(speed=2.0, travel=0.5, torque=8.0)
 
 
 def placed(name, at, **given):
-    return Placed(get_effect(name), at, **given)
+    return PlacedEffect(get_effect(name), at, **given)
 
 
 def motion(
@@ -39,7 +39,7 @@ def run(q, difference, load=None, inertia=1.0, joint=0, **given):
     """Loaded by nothing unless said otherwise."""
     made = motion(q, difference, **given)
     n = len(made.time)
-    return Run(made, joint, np.broadcast_to(0.0 if load is None else load, n).copy(), np.full(n, inertia))
+    return EncoderPair(made, joint, np.broadcast_to(0.0 if load is None else load, n).copy(), np.full(n, inertia))
 
 
 def links(*runs, kind: JointKind = "revolute", scales=SCALES, n_train=None):

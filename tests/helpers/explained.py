@@ -8,9 +8,9 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.stats import multivariate_normal
 
-from snarelab.identification.evidence.evidence import Channel, Evidence
-from snarelab.identification.evidence.pool import Columns, Hypothesis, Item
-from snarelab.identification.nuisance.covariance import Covariance, Remembering
+from snarelab.identification.evidence.evidence import Evidence, ResidualChannel
+from snarelab.identification.evidence.pool import CandidateColumns, Hypothesis, Item
+from snarelab.identification.nuisance.covariance import Covariance, FirstOrderNoise
 
 STEP = 0.02
 
@@ -19,8 +19,8 @@ STEP = 0.02
 class Explained:
     """Recordings i of channels c; ``pieces[i][c]``: residual, its covariance, positions and columns beside."""
 
-    pieces: list[list[Channel]]
-    columns: Columns
+    pieces: list[list[ResidualChannel]]
+    columns: CandidateColumns
     items: list[Item]
     n_always: int
 
@@ -61,7 +61,7 @@ class Explained:
 
 def covariance(rng, n) -> Covariance:
     """Of unequal samples, coloured and wandering noise, and encoders'."""
-    processes = [Remembering(0.4, 0.1), Remembering(0.3, 8.0)]
+    processes = [FirstOrderNoise(0.4, 0.1), FirstOrderNoise(0.3, 8.0)]
     return Covariance(rng.uniform(0.5, 1.5, n), processes, rng.uniform(0.1, 0.6, n), STEP, (slice(0, n),))
 
 
@@ -70,7 +70,7 @@ def explained(seed: int, sizes=((40, 40), (30, 30))) -> Explained:
     on either channel, of three on one, one that cannot be negative, a whole law, and one that shares columns
     with others."""
     rng = np.random.default_rng(seed)
-    columns = Columns([n for n, _ in sizes])
+    columns = CandidateColumns([n for n, _ in sizes])
 
     def add(channels, k):
         return columns.add({c: [rng.normal(size=(n[c], k)) for n in sizes] for c in channels})
@@ -97,7 +97,7 @@ def explained(seed: int, sizes=((40, 40), (30, 30))) -> Explained:
             own, x = covariance(rng, n[c]), rng.normal(size=(n[c], 3))
             effect = columns.some(i, c, both).sum(axis=1) + (columns.some(i, 1, three)[:, 0] if c else 0.0)
             noise = np.linalg.cholesky(own.dense()) @ rng.normal(size=n[c])
-            row.append(Channel(noise + x @ rng.normal(size=3) + 0.4 * effect, own, beside[c], x))
+            row.append(ResidualChannel(noise + x @ rng.normal(size=3) + 0.4 * effect, own, beside[c], x))
         pieces.append(row)
     return Explained(pieces, columns, items, 5)
 
@@ -112,11 +112,11 @@ def hypotheses(items: Sequence[Item], odds: float, named: Sequence[bool] | None 
 
 def white(rng, n_columns: int, planted: dict[int, float], n=200, spread=1.0) -> Explained:
     """One channel of unit white noise, single columns of unit RMS, and effects planted: column number, amplitude."""
-    columns = Columns([n])
+    columns = CandidateColumns([n])
     x = rng.normal(size=(n, n_columns))
     x /= np.sqrt(np.mean(x**2, axis=0))
     index = columns.add({0: [x]})
     items = [Item(np.array([k]), np.array([spread]), np.zeros(1, bool)) for k in index]
     residual = rng.normal(size=n) + sum(a * x[:, k] for k, a in planted.items())
     own = Covariance(np.ones(n), [], None, STEP, (slice(0, n),))
-    return Explained([[Channel(residual, own, np.zeros(0, int), np.zeros((n, 0)))]], columns, items, 0)
+    return Explained([[ResidualChannel(residual, own, np.zeros(0, int), np.zeros((n, 0)))]], columns, items, 0)

@@ -7,13 +7,13 @@ import numpy as np
 from explained import Explained, white
 
 from snarelab.identification import deciding
-from snarelab.identification.evidence.evidence import Channel
+from snarelab.identification.evidence.evidence import ResidualChannel
 from snarelab.identification.evidence.hypotheses import pool
-from snarelab.identification.evidence.projected import Projected
+from snarelab.identification.evidence.projected import ProjectedEvidence
 from snarelab.identification.evidence.search import Search
 from snarelab.identification.nuisance.rest import Zone
 from snarelab.models.effects import get_effect
-from snarelab.models.model import Placed
+from snarelab.models.model import PlacedEffect
 
 FACTORS = (0.5, 2.0)
 
@@ -44,7 +44,7 @@ def planted(size: float) -> Explained:
     (x,) = made.columns.parts[0, 0]
     x[:] = np.linalg.qr(x)[0] * np.sqrt(len(x))
     own = made.pieces[0][0]
-    made.pieces[0][0] = Channel(size * x[:, 0].astype(float), own.covariance, own.index, own.columns)
+    made.pieces[0][0] = ResidualChannel(size * x[:, 0].astype(float), own.covariance, own.index, own.columns)
     return made
 
 
@@ -60,12 +60,12 @@ def smallest(named) -> float:
 
 
 def searched(made: Explained, several) -> bool:
-    return bool(Search(Projected(made.evidence(), (0,)), several).answer())
+    return bool(Search(ProjectedEvidence(made.evidence(), (0,)), several).answer())
 
 
 def odds_of(made: Explained):
     """The hypotheses as an arm has them: six effects, the first at five joints; four curves."""
     effects = ("viscous_friction",) * 5 + ("coulomb_friction",)
-    placed = [Placed(get_effect(n), f"joint{k}") for k, n in enumerate(effects)]
+    placed = [PlacedEffect(get_effect(n), f"joint{k}") for k, n in enumerate(effects)]
     named = {p.key: (p, [x]) for p, x in zip(placed, made.items, strict=False)}
     return pool(named, {(0, f"curve {k}"): x for k, x in enumerate(made.items[6:])}, ())

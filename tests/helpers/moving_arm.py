@@ -3,10 +3,10 @@
 import numpy as np
 
 from bench.arm import random_arm
-from snarelab.identification.fitting.assembly import Assembly
+from snarelab.identification.fitting.assembly import TorqueModel
 from snarelab.identification.fitting.experiment import scales
 from snarelab.models.effects import get_effect
-from snarelab.models.model import Placed
+from snarelab.models.model import PlacedEffect
 from snarelab.models.rigid_body import RigidBody
 from snarelab.models.urdf import load_urdf
 from snarelab.recordings.condition import Motion
@@ -17,7 +17,7 @@ JOINTS = ("joint1", "joint2", "joint3")
 
 def placed(*entries):
     """``("viscous_friction", "joint1")`` or with names of held parameters after it."""
-    return [Placed(get_effect(name), at, tuple(hold)) for name, at, *hold in entries]
+    return [PlacedEffect(get_effect(name), at, tuple(hold)) for name, at, *hold in entries]
 
 
 def motion(kinds, n=1200, segments=None, thinning=3, first=0):
@@ -56,7 +56,7 @@ def three_joints(folder):
 
 
 def build(arm, experiment, effects, base=None, values=None):
-    return Assembly(arm[0], effects, base, scales([experiment]), values or {})
+    return TorqueModel(arm[0], effects, base, scales([experiment]), values or {})
 
 
 def jacobian(assembly, experiment, theta):

@@ -175,7 +175,7 @@ def test_text_of_gigabytes(tmp_path, name):
 
 def test_urdf_that_leads_to_a_device(tmp_path):
     (tmp_path / "model.toml").write_text('urdf = "/dev/zero"\n')
-    with pytest.raises(InputError, match="/dev/zero: cannot be read: it is no plain file"):
+    with pytest.raises(InputError, match="/dev/zero: cannot be read: it is not a regular file"):
         load_model(tmp_path / "model.toml")
 
 

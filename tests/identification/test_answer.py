@@ -11,11 +11,11 @@ from small_answers import MODEL, NAMES, experiment, fit
 
 from snarelab.identification import answer
 from snarelab.identification.diagnosis import ChannelFit, Finding, Misfit, Step
-from snarelab.identification.evidence.confirm import Missed
-from snarelab.identification.evidence.diagnose import Decided
-from snarelab.identification.evidence.found import Name, Remainder, Trial
-from snarelab.identification.evidence.left import LeftOver
+from snarelab.identification.evidence.confirm import ArmLoss
+from snarelab.identification.evidence.diagnose import ArmDecision
+from snarelab.identification.evidence.nameless import NamelessParts
 from snarelab.identification.evidence.rival import RivalOdds
+from snarelab.identification.evidence.selection import ArmNaming, ArmTrial, Remainder
 from snarelab.identification.nuisance.bursts import Bursts
 from snarelab.identification.nuisance.noise import Noise
 
@@ -24,21 +24,21 @@ QUIET = Noise(0.1, 0.2, 0.3, 0.4, 8.0, 0.5)
 HEARD = "0.1 N·m from sample to sample, 0.2 N·m over 0.3 s, a wander of 0.4 N·m over 8 s and 5 N·m of the encoders"
 
 
-def name(effect, share=0.5, gain=30.0, rivals=(), channels=(0,)) -> Name:
-    return Name(effect, channels, gain, share, tuple(RivalOdds(*r) for r in rivals))
+def name(effect, share=0.5, gain=30.0, rivals=(), channels=(0,)) -> ArmNaming:
+    return ArmNaming(effect, channels, gain, share, tuple(RivalOdds(*r) for r in rivals))
 
 
-def trial(effect, explained=0.5, odds=3.0, smallest=()) -> Trial:
-    return Trial(effect, explained, odds, dict(smallest))
+def trial(effect, explained=0.5, odds=3.0, smallest=()) -> ArmTrial:
+    return ArmTrial(effect, explained, odds, dict(smallest))
 
 
 def curve(channel, over, explained) -> Remainder:
     return Remainder(channel, over, 20.0, explained, 3.0)
 
 
-def decided(*, names=(), rest=(), bursting=(), rejected=(), missed=None, **found) -> Decided:
+def decided(*, names=(), rest=(), bursting=(), rejected=(), missed=None, **found) -> ArmDecision:
     best: Any = SimpleNamespace(names=tuple(names), missed=missed or {}, found=SimpleNamespace(**found))
-    return Decided(best, LeftOver(tuple(rest), dict(bursting)), tuple(rejected))
+    return ArmDecision(best, NamelessParts(tuple(rest), dict(bursting)), tuple(rejected))
 
 
 @pytest.fixture
@@ -120,7 +120,7 @@ def test_with_a_finding_the_rest_is_told_by_its_channels(reported):
     made = reported(names=[name(COULOMB)], rest=rest, relative=(0.9, 0.001, 0.4))
     assert made.sentence == (
         "The model leaves out Coulomb friction at joint1. With that added, the error of tau.joint1 on the held-out "
-        "recording falls from 90 % to 45 %. Part of what is left on tau.joint1 and tau.joint3 has no name."
+        "recording falls from 90 % to 45 %. Part of the remaining residual of tau.joint1 and tau.joint3 has no name."
     )
     assert made.foremost == "tau.joint1"
     assert made.description == "; ".join(
@@ -132,13 +132,13 @@ def test_with_a_finding_the_rest_is_told_by_its_channels(reported):
     )
     (change,) = cast(Any, made.location)
     assert change.tolist() == [[2.0, 4.0, 6.0]] * 4
-    assert reported(names=[name(COULOMB)]).sentence.endswith("from 10 % to 5 %.")
+    assert reported(names=[name(COULOMB)]).sentence.endswith("from 10 % to 5.0 %.")
 
 
 def test_an_adequate_model_is_told_by_the_worst_channel(reported):
     made = reported(relative=(0.02, 0.03, 0.01))
     assert (made.verdict, made.description) == ("adequate", "")
-    assert made.sentence.endswith(f" is 2 % of tau.joint1. It is noise: {HEARD}.")
+    assert made.sentence.endswith(f" is 2.0 % of tau.joint1. It is noise: {HEARD}.")
     assert (made.model, made.steps, made.moved, made.traces, made.limits) == (
         "arm", (Step("s", 1, 1),), "moved", "traces", "_limits",
     )  # fmt: skip
@@ -157,7 +157,7 @@ def test_notes_tell_the_recordings_first_then_what_was_not_named_then_the_noise(
         "a.csv: n2",
         "b.csv: n3",
         "h.csv: n4",
-        "backlash at joint1 passed on the training recordings, but the held-out ones are foretold no better with it: "
+        "backlash at joint1 passed on the training recordings, but the held-out ones are predicted no better with it: "
         "not named",
     )
     assert made.notes[5] == f"noise of tau.joint1: {HEARD}"
@@ -173,9 +173,9 @@ def test_bursts_have_no_name_unless_they_came_once(reported, again, curves):
     made = reported(rest=curves, bursting=[(2, Bursts(0.36, 12.345, again))], relative=0.1)
     text = (
         "on tau.joint3, 36 % of the residual comes in bursts, at 12 Hz where it is strongest "
-        "(6 % of the channel's torque)"
+        "(6.0 % of the channel's torque)"
     )
-    smooth = [words("joint2", "speed", "49 %", "7 %")] * len(curves)
+    smooth = [words("joint2", "speed", "49 %", "7.0 %")] * len(curves)
     assert made.description == "; ".join([*smooth, *[text] * again])
     assert made.verdict == ("unknown_effect" if again or curves else "adequate")
     knock = "on tau.joint3, 36 % of the residual stands in one window and has not come again: a knock, or an outlier"
@@ -200,7 +200,7 @@ def found(monkeypatch, right, share, rivals) -> Finding:
     final = fit([1, 2, 3], std=[0.1, 0.2, 0.3], at_bound=np.array([True, False, True]),
                 assembly={"slots": slots, "index_of": lambda p: [1, 2]})  # fmt: skip
     own = name(COULOMB, share, rivals=rivals, channels=(2, 0))
-    told = decided(names=[own], missed={COULOMB.key: Missed(5.0, 2.0, 0.08, (0.02, 0.08), 0.9375, cast(Any, None))})
+    told = decided(names=[own], missed={COULOMB.key: ArmLoss(5.0, 2.0, 0.08, (0.02, 0.08), 0.9375, cast(Any, None))})
     return answer._finding(own, told, final, ["tau.a", "tau.b", "tau.c"])
 
 
@@ -222,8 +222,8 @@ def test_an_effect_and_what_cannot_be_told_from_it_share_how_often_such_a_name_w
         "more": (3.0, 0.3, "s", True),
     }
     assert made.evidence.endswith(
-        "it explains 94 % of what the model without it leaves over on tau.c and tau.a; taking it out again raises the "
-        "error on the held-out recording from 2 % to 8 %."
+        "it explains 94 % of the remaining residual of tau.c and tau.a. Without it, the "
+        "error on the held-out recording rises from 2.0 % to 8.0 %."
     )
 
 

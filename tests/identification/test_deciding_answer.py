@@ -10,18 +10,18 @@ from moved_numbers import FACTORS, move, planted
 from snarelab.identification.evidence import confirm as confirming
 from snarelab.identification.evidence import rounds
 from snarelab.identification.evidence.pool import Hypothesis, Item
-from snarelab.identification.evidence.projected import Projected
+from snarelab.identification.evidence.projected import ProjectedEvidence
 from snarelab.identification.evidence.search import Search
 from snarelab.models.effects import get_effect
-from snarelab.models.model import Placed
+from snarelab.models.model import PlacedEffect
 
 
 def confirmed(monkeypatch, sure: float) -> bool:
-    name: Any = SimpleNamespace(placed=Placed(get_effect("sensor_bias"), "tau.joint1"))
+    name: Any = SimpleNamespace(placed=PlacedEffect(get_effect("sensor_bias"), "tau.joint1"))
     monkeypatch.setattr(confirming, "foretold", lambda *_: None)
     monkeypatch.setattr(confirming, "_without", lambda model, _: model)
     monkeypatch.setattr(
-        confirming, "_missed", lambda *_: confirming.Missed(sure, 1.0, 0.2, (0.1, 0.2), 0.75, cast(Any, None))
+        confirming, "_missed", lambda *_: confirming.ArmLoss(sure, 1.0, 0.2, (0.1, 0.2), 0.75, cast(Any, None))
     )
     found: Any = SimpleNamespace(names=(name,), model=None, fit=None)
     return bool(confirming.confirm(found, [], [], {}, lambda _: None).names)
@@ -55,7 +55,7 @@ def rivals(share: float, cosine: float) -> list[bool]:
     items = [Item(i.index, i.spread, i.positive, False, y) for i, y in zip(made.items[:2], labels, strict=True)]
     made = Explained(made.pieces, made.columns, items, 0)
     several = [Hypothesis(f"h{k}", True, (i,), -3.0 * k, f"h{k}") for k, i in enumerate(items)]
-    run = Search(Projected(made.evidence(), (0,)), several)
+    run = Search(ProjectedEvidence(made.evidence(), (0,)), several)
     (slot,) = run.answer()
     object.__setattr__(slot, "shares", np.array([1 - share, share, 0.0]))
     return [r.separable for r in rounds._rivals(run, slot, np.ones(1))]
@@ -89,7 +89,7 @@ def becomes(alike: float) -> bool:
     items = [Item(i.index, i.spread, i.positive, False, y) for i, y in zip(made.items[:2], labels, strict=True)]
     made = Explained(made.pieces, made.columns, items, 0)
     several = [Hypothesis("curve", False, (items[0],), -1.0), Hypothesis("name", True, (items[1],), -12.0)]
-    run = Search(Projected(made.evidence(), (0,)), several)
+    run = Search(ProjectedEvidence(made.evidence(), (0,)), several)
     slots = run.answer()
     assert [s.taken.hypothesis for s in slots] == [0]
     return rounds.as_names(run, slots)[0].taken.hypothesis == 1

@@ -9,20 +9,20 @@ from explained import Explained
 from moved_numbers import FACTORS, move, planted, smallest
 
 from snarelab.identification import deciding
-from snarelab.identification.evidence import beside, tolerant
-from snarelab.identification.evidence.beside import Beside
-from snarelab.identification.evidence.evidence import Channel
+from snarelab.identification.evidence import nuisance_columns, tolerant
+from snarelab.identification.evidence.evidence import ResidualChannel
+from snarelab.identification.evidence.nuisance_columns import NuisanceColumns
 from snarelab.identification.evidence.pool import Hypothesis
 from snarelab.models.effects import get_effect
-from snarelab.models.model import Placed
+from snarelab.models.model import PlacedEffect
 
 
 def spread(monkeypatch, theta=2.0, shape=False) -> float:
     """Prior deviation of a parameter that makes a tenth of its channel's torque a unit."""
     found: Any = SimpleNamespace(theta=np.array([theta]), assembly=None)
-    monkeypatch.setattr(beside, "_shapes", lambda _: np.array([shape]))
+    monkeypatch.setattr(nuisance_columns, "_shapes", lambda _: np.array([shape]))
     baseline = [[(np.zeros(1, int), np.ones((5, 1)))]]
-    return float(beside._spread(found, baseline, np.array([10.0]))[0])
+    return float(nuisance_columns._spread(found, baseline, np.array([10.0]))[0])
 
 
 def test_how_far_the_baseline_may_move(monkeypatch):
@@ -43,12 +43,12 @@ def test_how_far_the_baseline_may_move(monkeypatch):
 
 def small(own_share: float) -> dict[tuple[int, str], float]:
     """Sizes of the small curves beside a friction law that makes this share of the channel's torque."""
-    placed = Placed(get_effect("viscous_friction"), "joint1")
+    placed = PlacedEffect(get_effect("viscous_friction"), "joint1")
     assembly: Any = SimpleNamespace(
         placed=(placed,), index_of=lambda _: [0], joint_of=lambda _: 0, slots=[
             SimpleNamespace(effect="viscous_friction", at="joint1", name="coefficient")])  # fmt: skip
     found: Any = SimpleNamespace(theta=np.array([own_share]), assembly=assembly)
-    return beside._small(found, [[(np.zeros(1, int), 10 * np.ones((5, 1)))]], np.array([10.0]))
+    return nuisance_columns._small(found, [[(np.zeros(1, int), 10 * np.ones((5, 1)))]], np.array([10.0]))
 
 
 def test_small_curves_stand_beside_everything(monkeypatch):
@@ -74,12 +74,12 @@ def test_a_payload_is_named_beyond_what_masses_are_known_to(monkeypatch):
         (x,) = made.columns.parts[0, 0]
         x *= 1000
         own = made.pieces[0][0]
-        made.pieces[0][0] = Channel(
+        made.pieces[0][0] = ResidualChannel(
             size * x[:, 0].astype(float), own.covariance, np.zeros(1, int), x[:, :1].astype(float)
         )
         made = Explained(made.pieces, made.columns, made.items[:1], 1)
         payload = Hypothesis("payload", True, (made.items[0],), -6.0)
-        masses = Beside([], 1, slice(0, 1), [])
+        masses = NuisanceColumns([], 1, slice(0, 1), [])
         weighed: Any = SimpleNamespace(beside=masses, evidence=made.evidence(), pool=(payload,), noises=())
         return bool(tolerant.searched(weighed, (0,), (), range(len(weighed.noises)))[2])
 

@@ -13,7 +13,7 @@ from snarelab.identification import deciding
 from snarelab.identification.evidence import arm
 from snarelab.identification.nuisance import rest
 from snarelab.identification.nuisance.bursts import bursts
-from snarelab.identification.nuisance.noise import Run, learn
+from snarelab.identification.nuisance.noise import NoiseChannel, learn
 from snarelab.identification.nuisance.rest import Zone
 
 
@@ -58,7 +58,7 @@ def test_a_level_that_wanders_must_show(monkeypatch):
     for k in range(1, n):
         walk[k] = decay * walk[k - 1] + np.sqrt(1 - decay**2) * rng.normal()
     nothing = np.zeros(n)
-    run = Run(step, (slice(0, n),), nothing, (nothing,), nothing, 0.0)
+    run = NoiseChannel(step, (slice(0, n),), nothing, (nothing,), nothing, 0.0)
     t = step * np.arange(n)
     x = np.stack([np.sin(2 * np.pi * 0.21 * t), np.cos(2 * np.pi * 0.34 * t)], 1) * np.sqrt(2)
 

@@ -9,14 +9,14 @@ from explained import Explained, hypotheses, white
 from moved_numbers import FACTORS, move, odds_of, planted, searched, smallest
 
 from snarelab.identification.evidence import hypotheses as hypothesising
-from snarelab.identification.evidence.evidence import Channel, Evidence
+from snarelab.identification.evidence.evidence import Evidence, ResidualChannel
 from snarelab.identification.evidence.members import Members
-from snarelab.identification.evidence.pool import Columns, Item
-from snarelab.identification.evidence.projected import Projected
+from snarelab.identification.evidence.pool import CandidateColumns, Item
+from snarelab.identification.evidence.projected import ProjectedEvidence
 from snarelab.identification.evidence.search import Search
-from snarelab.identification.search.candidates import Variant
+from snarelab.identification.search.candidates import EffectVariant
 from snarelab.models.effects import get_effect
-from snarelab.models.model import Placed
+from snarelab.models.model import PlacedEffect
 
 
 def test_priors_are_shared_by_effects_and_by_places():
@@ -73,9 +73,9 @@ def test_how_far_a_whole_law_may_be_from_its_own_size(monkeypatch):
     own = made.pieces[0][0]
 
     def gain(size):
-        made.pieces[0][0] = Channel(size * own.residual * 2, own.covariance, own.index, own.columns)
+        made.pieces[0][0] = ResidualChannel(size * own.residual * 2, own.covariance, own.index, own.columns)
         x = Item(made.items[0].index, 2 * np.ones(1), np.ones(1, bool), True)
-        on = Projected(Evidence(made.pieces, made.columns, [x], 0), (0,))
+        on = ProjectedEvidence(Evidence(made.pieces, made.columns, [x], 0), (0,))
         return Members(on).gains()[0, 0]
 
     def farthest():
@@ -99,9 +99,9 @@ def test_an_effect_that_is_at_one_joint_is_likelier_at_another(monkeypatch):
         made = planted(1.0)
         (x,) = made.columns.parts[0, 0]
         own = made.pieces[0][0]
-        made.pieces[0][0] = Channel(x[:, 0] + size * x[:, 1], own.covariance, own.index, own.columns)
+        made.pieces[0][0] = ResidualChannel(x[:, 0] + size * x[:, 1], own.covariance, own.index, own.columns)
         several = odds_of(made)
-        slots = Search(Projected(made.evidence(), (0,)), several).answer()
+        slots = Search(ProjectedEvidence(made.evidence(), (0,)), several).answer()
         return 1 in {s.taken.hypothesis for s in slots}
 
     before = smallest(told)
@@ -119,20 +119,22 @@ def shaped(monkeypatch, off: float, bent: float, curve: bool) -> float:
     """
     made = planted(1.0)
     x = made.columns.parts[0, 0][0].astype(float)
-    placed = Placed(get_effect("stribeck_friction"), "joint1")
-    grid = [Variant(placed, np.array([1.0, s]), np.zeros(1, int), np.zeros(1), np.ones(1)) for s in (1.0, 2.0, 3.0)]
+    placed = PlacedEffect(get_effect("stribeck_friction"), "joint1")
+    grid = [
+        EffectVariant(placed, np.array([1.0, s]), np.zeros(1, int), np.zeros(1), np.ones(1)) for s in (1.0, 2.0, 3.0)
+    ]
     laws = {v.parameters[1]: x[:, [0]] + (v.parameters[1] - 2) * x[:, [1]] for v in grid}
     monkeypatch.setattr(hypothesising, "_grid", lambda *_: (grid, not curve))
     monkeypatch.setattr(hypothesising, "_made", lambda _, v: {0: [laws[v.parameters[1]]]})
-    columns = Columns([len(x)])
+    columns = CandidateColumns([len(x)])
     over = Item(columns.add({0: [x[:, [2]]]}), np.ones(1), np.zeros(1, bool))
     words = hypothesising.coordinate(placed.effect) or ""
     along: Any = SimpleNamespace(n_train=1, scale=np.ones(1), assembly=SimpleNamespace(joint_of=lambda _: 0), tuned={})
     items = hypothesising._items(along, placed, {(0, words): over} if curve else {}, columns)
     own = made.pieces[0][0]
     residual = 0.3 * 10 * (x[:, 0] + off * x[:, 1] + bent * x[:, 2])
-    channel = Channel(residual, own.covariance, own.index, own.columns)
-    gains = Members(Projected(Evidence([[channel]], columns, items, 0), (0,))).gains()
+    channel = ResidualChannel(residual, own.covariance, own.index, own.columns)
+    gains = Members(ProjectedEvidence(Evidence([[channel]], columns, items, 0), (0,))).gains()
     middle = [k for k, item in enumerate(items) if item.label.parameters[1] == 2.0]
     return float(gains[middle].max())
 

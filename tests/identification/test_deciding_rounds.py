@@ -9,7 +9,7 @@ from snarelab.identification import deciding
 from snarelab.identification.evidence import diagnose as deciding_all
 from snarelab.identification.evidence import rounds
 from snarelab.models.effects import get_effect
-from snarelab.models.model import Placed
+from snarelab.models.model import PlacedEffect
 
 
 def searching(monkeypatch, rounds_with_news: int) -> tuple[int, set[float]]:
@@ -22,7 +22,9 @@ def searching(monkeypatch, rounds_with_news: int) -> tuple[int, set[float]]:
 
     slot = SimpleNamespace(gain=10.0, taken=SimpleNamespace(hypothesis=0))
     made = SimpleNamespace(members=lambda _: SimpleNamespace(value=20.0), scan=lambda _: SimpleNamespace(odds=[1.0]))
-    weighed = SimpleNamespace(noises=(), pool=[SimpleNamespace(named=True, label=Placed(get_effect("backlash"), "a"))])
+    weighed = SimpleNamespace(
+        noises=(), pool=[SimpleNamespace(named=True, label=PlacedEffect(get_effect("backlash"), "a"))]
+    )
     left = iter([[slot]] * rounds_with_news + [[]] * 99)
     model: Any = SimpleNamespace(with_effects=lambda *_: model)
     stubs: dict[str, Any] = {
@@ -57,7 +59,7 @@ def test_how_much_of_a_motion_may_be_driven_is_what_the_search_asks_for(monkeypa
 
 
 def attempts(monkeypatch) -> float:
-    """How well the best attempt foretells, where each foretells better than the last and none is whole."""
+    """How well the best attempt predicts, where each predicts better than the last and none is whole."""
     density = iter(range(99))
     name = SimpleNamespace(placed=SimpleNamespace(key="a"))
     monkeypatch.setattr(deciding_all, "search", lambda *_, **__: None)
@@ -65,10 +67,10 @@ def attempts(monkeypatch) -> float:
     monkeypatch.setattr(
         deciding_all,
         "confirm",
-        lambda *_: SimpleNamespace(rejected=(name,), found=None, foretold=SimpleNamespace(density=next(density))),
+        lambda *_: SimpleNamespace(rejected=(name,), found=None, forecast=SimpleNamespace(density=next(density))),
     )
     model: Any = None
-    return deciding_all.decide(model, None, {}, [], []).best.foretold.density
+    return deciding_all.decide(model, None, {}, [], []).best.forecast.density
 
 
 def test_what_was_not_confirmed_is_looked_for_again_twice(monkeypatch):

@@ -13,7 +13,7 @@ from snarelab.identification.fitting.experiment import load_experiments, scales
 from snarelab.identification.search.candidates import candidate_columns, variants
 from snarelab.identification.search.refit import assemble
 from snarelab.models.effects import get_effect
-from snarelab.models.model import Placed
+from snarelab.models.model import PlacedEffect
 from snarelab.models.model_file import load_model
 from snarelab.models.rigid_body import RigidBody
 
@@ -125,7 +125,7 @@ def test_a_candidate_with_fewer_amplitudes_has_its_own_columns():
     (experiment,) = load_experiments(model, [BUNDLED / "train.csv"], RigidBody(model.tree))
     assembly = assemble(model, None, scales([experiment]))
     state = assembly.evaluate(experiment, assembly.start)
-    whole = variants(assembly, Placed(get_effect("asymmetric_friction"), model.joints[0]))[0]
+    whole = variants(assembly, PlacedEffect(get_effect("asymmetric_friction"), model.joints[0]))[0]
     one = replace(whole, amplitudes=whole.amplitudes[:1], low=whole.low[:1], high=whole.high[:1])
     (_, every), (_, single) = (candidate_columns(assembly, experiment, state, v)[0] for v in (whole, one))
     assert every.shape[1] == 2

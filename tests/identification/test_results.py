@@ -15,8 +15,8 @@ from snarelab import __version__
 from snarelab.errors import InputError
 from snarelab.identification import results
 from snarelab.identification.diagnosis import Step
-from snarelab.identification.report.words import chance
 from snarelab.identification.results import DiagnosisResult, IdentificationResult, ParameterEstimate
+from snarelab.report.words import chance
 
 MODEL: Any = SimpleNamespace(name="arm<6>")
 STEPS = (Step("as <given>", 0.12345, 0.5), Step("+ one", 0.0125, 1.0))
@@ -37,8 +37,8 @@ def test_a_diagnosis_prints_its_sentence_and_a_line_a_step():
     first, *lines = str(one).split("\n")
     assert first == "It is so & so."
     assert lines[:2] == [
-        "  as <given>" + " " * 51 + "training  12.35 %   held-out  50.00 %",
-        "  + one" + " " * 56 + "training   1.25 %   held-out 100.00 %",
+        "  as <given>" + " " * 51 + "training   12.3 %   held-out   50.0 %",
+        "  + one" + " " * 56 + "training   1.25 %   held-out    100 %",
     ]
     assert lines[2:4] == ["", f"  {'what was found':<44} probability   value"]
     assert len(lines[4:]) >= len(SAID.effects)
@@ -70,7 +70,7 @@ def test_a_diagnosis_shows_verdict_steps_cards_and_notes():
     assert '<span class="status">missing physics</span>\n<p>It is so &amp; so.</p>\n' in markup
     assert rows(markup)[0] == [
         ["as <given>", "12.3\u202f%", "50.0\u202f%"],
-        ["+ one", "1.25\u202f%", "100.0\u202f%"],
+        ["+ one", "1.25\u202f%", "100\u202f%"],
     ]
     table = markup[: markup.index("</table>")]
     assert re.findall(r"<thead>.*</thead>", table) == [
@@ -119,8 +119,8 @@ def test_an_identification_prints_parameters_misfits_and_condition():
         "  (at its bound)",
         "coulomb_friction          joint1          level                         -12346        0.5  N·m",
         "tau.joint1 training: RMS residual 2 N·m, 1.23 % of the measured",
-        "tau.joint1 held-out: RMS residual 0.1235 N·m, 50.00 % of the measured",
-        "tau.<2> training: RMS residual 1000 N, 100.00 % of the measured",
+        "tau.joint1 held-out: RMS residual 0.1235 N·m, 50.0 % of the measured",
+        "tau.<2> training: RMS residual 1000 N, 100 % of the measured",
         "condition number 123",
     ]
     assert repr(IDENTIFIED) == str(IDENTIFIED)
@@ -140,7 +140,7 @@ def test_an_identification_shows_its_parameters_with_a_remark_where_they_are_not
     assert misfits == [
         ["tau.joint1", "training", "2.00 N·m", "1.23\u202f%"],
         ["tau.joint1", "held-out", "0.123 N·m", "50.0\u202f%"],
-        ["tau.<2>", "training", "1000 N", "100.0\u202f%"],
+        ["tau.<2>", "training", "1000 N", "100\u202f%"],
     ]
     assert re.findall(r'<th scope="col" class="n">(.*?)</th>', markup) == [
         "Value", "Std", "RMS residual", "Of the measured",

@@ -18,9 +18,9 @@ from snarelab.identification.wording import (
     listed,
     named,
     noise_words,
-    percent,
     verdict_sentence,
 )
+from snarelab.report.words import percent
 
 
 @pytest.mark.parametrize(
@@ -33,8 +33,8 @@ from snarelab.identification.wording import (
         (0.104, "10 %"),
         (0.106, "11 %"),
         (1.234, "123 %"),
-        (-0.056, "-5.6 %"),
-        (-0.25, "-25 %"),
+        (-0.056, "−5.6 %"),
+        (-0.25, "−25 %"),
     ],
 )
 def test_a_share_has_two_digits_below_ten_per_cent_and_whole_ones_above(share, text):
@@ -71,8 +71,8 @@ def test_the_rivals_experiment_is_proposed_where_it_is_another(own, other, text)
 )
 def test_evidence_tells_what_is_explained_where_and_what_happens_without(channels, where):
     assert evidence_sentence(placed("joint1", ""), channels, 0.08, 0.1) == (
-        f"Friction that rubs: it explains 36 % of what the model without it leaves over on {where}; "
-        "taking it out again raises the error on the held-out recording from 8 % to 10 %."
+        f"Friction that rubs: it explains 36 % of the remaining residual of {where}. "
+        "Without it, the error on the held-out recording rises from 8.0 % to 10 %."
     )
 
 
@@ -92,7 +92,7 @@ def test_the_first_sentence_lists_places_by_effect_and_the_channel_that_gained_m
     ]
     assert verdict_sentence(some, FITS, " And more.") == (
         "The model leaves out backlash at a and c and sensor gain at b. With that added, the error of tau.joint2 on "
-        "the held-out recording falls from 25 % to 5 %. And more."
+        "the held-out recording falls from 25 % to 5.0 %. And more."
     )
 
 
@@ -102,7 +102,7 @@ def test_without_a_name_it_is_the_worst_channel_that_is_told():
     )
     assert verdict_sentence([], FITS, "") == (
         "The model is adequate: nothing larger than the limits listed is left out. "
-        "What it leaves over on the held-out recording is 30 % of tau.joint1."
+        "The remaining residual on the held-out recording is 30 % of tau.joint1."
     )
     told = verdict_sentence([], FITS, "", {"tau.joint1": "5 N·m from sample to sample", "tau.joint2": "none"})
     assert told.endswith("is 30 % of tau.joint1. It is noise: 5 N·m from sample to sample.")
@@ -172,7 +172,7 @@ def test_what_a_noise_is_made_of_is_told_with_sizes_and_times():
         (0.1442, 0.1365, "from 14.4 % to 13.7 %"),  # both 14 % to two digits
         (0.0567, 0.0566, "from 5.67 % to 5.66 %"),
         (0.05674, 0.05671, "from 5.674 % to 5.671 %"),
-        (0.05, 0.05, "from 5 % to 5 %"),
+        (0.05, 0.05, "from 5.000 % to 5.000 %"),
     ],
 )
 def test_two_errors_have_the_digits_that_part_them(before, after, text):
@@ -184,11 +184,11 @@ def test_what_is_less_likely_than_not_is_said_last_and_so():
         return SimpleNamespace(name=name, at=at, probability=probability)
 
     some = [finding("backlash", "a", 0.25), finding("sensor_gain", "b", 0.9), finding("rotor_inertia", "c", 0.4)]
-    assert named(some) == "sensor gain at b, and perhaps rotor inertia at c (40\u202f%) and backlash at a (25\u202f%)"
-    assert named(some[:1]) == "something, perhaps backlash at a (25\u202f%)"
+    assert named(some) == "sensor gain at b, and perhaps rotor inertia at c (40 %) and backlash at a (25 %)"
+    assert named(some[:1]) == "something, perhaps backlash at a (25 %)"
 
 
 def test_nothing_explains_more_than_all():
-    assert "it explains all of what the model without it leaves over on a;" in evidence_sentence(
+    assert "it explains all of the remaining residual of a." in evidence_sentence(
         placed("joint1", ""), ["a"], 0.001, 0.26
     )

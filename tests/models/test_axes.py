@@ -16,7 +16,7 @@ from snarelab.fmu.export import model_equations
 from snarelab.fmu.inverse import inverse_equations
 from snarelab.identification.fitting.base_parameters import base_parameters
 from snarelab.identification.fitting.experiment import Experiment
-from snarelab.models.axes import Axis, place
+from snarelab.models.axes import JointAxis, place
 from snarelab.models.effects import get_effect
 from snarelab.models.model import places
 from snarelab.models.model_file import load_model
@@ -125,8 +125,8 @@ def test_a_search_finds_the_coupled_motor(wrist):
 
 
 AXES = (
-    Axis("tie", {"joint1": 1.0, "joint2": -0.5}, {"joint1": 0.8, "joint2": -0.4}, "revolute"),
-    Axis("motor", {"joint1": 2.0}, {"joint1": 0.5}, "revolute"),
+    JointAxis("tie", {"joint1": 1.0, "joint2": -0.5}, {"joint1": 0.8, "joint2": -0.4}, "revolute"),
+    JointAxis("motor", {"joint1": 2.0}, {"joint1": 0.5}, "revolute"),
 )
 LAWS = [
     ("load_dependent_friction", "tie"),

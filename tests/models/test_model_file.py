@@ -9,7 +9,7 @@ import pytest
 from bench.arm import random_arm
 from snarelab.errors import InputError
 from snarelab.models.effects import get_effect
-from snarelab.models.model import Placed, places
+from snarelab.models.model import PlacedEffect, places
 from snarelab.models.model_file import load_model
 from snarelab.models.model_write import save_model
 from snarelab.recordings import Signal
@@ -240,7 +240,7 @@ def test_saved_elsewhere_it_still_finds_its_urdf(folder):
 def test_added_effects_are_saved_with_their_values(folder):
     model = load_model(written(folder, GOOD + 'effects = ["viscous_friction"]\n'))
     friction = get_effect("coulomb_friction")
-    added = [Placed(friction, place) for place in places(friction, model.tree)[:1]]
+    added = [PlacedEffect(friction, place) for place in places(friction, model.tree)[:1]]
     model = model.with_effects(added, {"coulomb_friction.joint1.level": np.float64(1 / 3)})
     save_model(model, folder / "again.toml", "note")
     again = load_model(folder / "again.toml")

@@ -81,7 +81,7 @@ def test_the_skill_of_a_generator_is_that_of_a_map_which_never_saw_it():
     constant = np.mean(right) * (1 - np.mean(right))
     skills = [1 - np.mean((probability(x, b) - right) ** 2) / constant for x in (fitted(a), TRUE)]
     assert found.skill["b"] == pytest.approx(skills[0])
-    assert found.skill["b"] == pytest.approx(skills[1], abs=0.03)  # the map that they follow foretells no better
+    assert found.skill["b"] == pytest.approx(skills[1], abs=0.03)  # the map that they follow predicts no better
     assert skills[1] > 0.1
     assert set(found.skill) == {"a", "b"}
     against = [row._replace(right=not row.right) for row in b]

@@ -213,3 +213,15 @@ def test_sources_are_a_digest_of_the_tool():
     assert sources() == sources()
     assert len(sources()) == 64
     assert np.all([c in "0123456789abcdef" for c in sources()])
+
+
+def test_law_that_has_a_name_by_now_is_told_by_it_and_as_unknown():
+    lawless = line("nameless", [("", "joint2", 2.0, {})], [effect("gear_efficiency", "joint2")])
+    lawless["truth"]["effects"][0]["law"] = "gear that costs only when it drives"
+    found = judge(lawless)
+    assert found.unknown
+    assert found.wrong == []
+    elsewhere = lawless | {"effects": [effect("gear_efficiency", "joint1")]}
+    assert not judge(elsewhere).unknown
+    assert [t.at for t in judge(elsewhere).wrong] == ["joint1"]
+    assert judge(lawless | {"effects": [], "verdict": "unknown_effect"}).unknown

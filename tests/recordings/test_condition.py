@@ -180,12 +180,12 @@ def test_joints_come_in_the_models_order_and_notes_of_the_reader_are_kept():
 
 
 def test_the_encoders_noise_is_what_it_leaves_in_the_band():
-    """Noise alone, through the same filters, deviates as is foretold from a recording of noise and motion."""
+    """Noise alone, through the same filters, deviates as is predicted from a recording of noise and motion."""
     time = clock(60.0)
     noise = 1e-4 * np.random.default_rng(3).normal(size=len(time))
-    foretold = condition(recording(time, sine(time, 0.7)[0] + noise), ["joint1"], BAND).encoder_noise
+    forecast = condition(recording(time, sine(time, 0.7)[0] + noise), ["joint1"], BAND).encoder_noise
     alone = condition(recording(time, noise), ["joint1"], BAND)
-    for of, x in zip(foretold[:, 0], (alone.q, alone.qd, alone.qdd), strict=True):
+    for of, x in zip(forecast[:, 0], (alone.q, alone.qd, alone.qdd), strict=True):
         assert of == pytest.approx(np.std(alone.to_band(x)), rel=0.1)
 
 

@@ -127,20 +127,29 @@ def test_page_unpacks_its_playback_in_a_browser(
     assert all(np.isfinite(extent(shown[700:], channel)[0]) for channel in range(3))
 
 
-def test_paper_has_a_still_of_the_playback(browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_scene_is_as_the_page_and_paper_has_a_light_still(
+    browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scheme
+) -> None:
     """Of the time and the view that were shown last."""
     monkeypatch.chdir(tmp_path)
     path = write_page("demo", "Test", "It moves.", QUANTITIES, [Section("One", (), [picture()])], moving().html(1.0))
-    with opened(browser, path, size=(680, 1000)) as page:
+    with opened(browser, path, scheme, (680, 1000)) as page:
         playing(page)
         page.wait_for_function("document.getElementById('playback-still')?.naturalWidth > 100")
-        page.emulate_media(media="print")
+        for now in (scheme, {"light": "dark", "dark": "light"}[scheme]):
+            page.emulate_media(color_scheme=now)
+            drawn(page.locator("#playback-frame").element_handle().content_frame())
+            sky = imread(io.BytesIO(page.locator("#playback-frame").screenshot()))[20:-60, 5:25, :3]
+            assert sky.max() < 0.3 if now == "dark" else sky.min() > 0.8
+        page.emulate_media(color_scheme=scheme, media="print")
         still = page.locator("#playback-still")
         assert still.is_visible()
         assert "at 1.00 s" in page.locator("#playback-said").inner_text()
         still.scroll_into_view_if_needed()
         shown = imread(io.BytesIO(still.screenshot()))[..., :3]
         assert all(np.isfinite(extent(shown, channel)[0]) for channel in range(3))  # red, green and blue are seen
+        assert shown[5:-5, 5:25].min() > 0.8
 
 
 @pytest.mark.parametrize(("width", "beside"), [(1500, True), (1200, False)])

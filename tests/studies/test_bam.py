@@ -9,7 +9,7 @@ import pytest
 
 from snarelab.errors import InputError
 from snarelab.studies import bam, bam_naming, bam_servo
-from snarelab.studies.bam_naming import START, Fitted, Tried, best, evolve, fit, name_missing, rms
+from snarelab.studies.bam_naming import START, LawTrial, ServoFit, best, evolve, fit, name_missing, rms
 from snarelab.studies.bam_servo import DUTY, GRAVITY, ServoRun, position_error, read_run, simulate
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -141,15 +141,15 @@ def test_steps_are_fine_enough(recorded, monkeypatch):
     assert position_error(recorded[1], values) == pytest.approx(coarse, rel=0.02)
 
 
-def tried(name, parameters, score, *foretold):
+def tried(name, parameters, score, *forecast):
     """A law with so many parameters, that explains a half."""
-    return Tried(
-        name, Fitted(dict.fromkeys(map(str, range(parameters)), 0.0), 0.1), 0.5, dict(enumerate(foretold)), score
+    return LawTrial(
+        name, ServoFit(dict.fromkeys(map(str, range(parameters)), 0.0), 0.1), 0.5, dict(enumerate(forecast)), score
     )
 
 
 def test_of_scores_as_good_as_equal_the_fewest_parameters_are_named():
-    """One gain foretold a little worse says nothing, and turns with the last digits of a fit that sticks."""
+    """One gain predicted a little worse says nothing, and turns with the last digits of a fit that sticks."""
     load, position = tried("load", 7, 42.4, 0.5, 0.7, -0.025), tried("position", 9, 42.6, 0.6, 0.7, -0.045)
     assert best([position, load]) is load
     assert best([load, better := tried("position", 9, 45.0, 0.6, 0.7, 0.1)]) is better

@@ -14,7 +14,7 @@ from snarelab.models.snare.model import Accuracy
 from snarelab.studies.orbit import setting as orbit
 from snarelab.studies.orbit.ledger import energy_ledger, force_error, momentum_ledger, position_error
 from snarelab.studies.orbit.reference import reference
-from snarelab.studies.orbit.setting import Passive, capture_of, co_simulate, setting, step_control
+from snarelab.studies.orbit.setting import JointResistance, capture_of, co_simulate, setting, step_control
 
 FAST = dataclasses.replace(orbit.SNARE, ring_rate=10 * orbit.SNARE.ring_rate, ring_ramp=0.02)
 LENGTH = 0.85
@@ -22,7 +22,7 @@ LENGTH = 0.85
 
 @pytest.fixture(scope="module", params=["inspection", "hover"])
 def pair(request):
-    start, passive = setting(request.param), Passive()
+    start, passive = setting(request.param), JointResistance()
     run = co_simulate(start, passive, FAST, duration=LENGTH)
     single = reference(start, passive, FAST, LENGTH, every=0.005)
     return start, passive, run, capture_of(run, request.param), single
@@ -69,7 +69,7 @@ def test_energy_is_accounted_for(pair):
 
 def test_the_controlled_step_is_rejected_at_first_contact():
     start = setting("hover")
-    run = co_simulate(start, Passive(), FAST, duration=0.76, control=step_control(start))
+    run = co_simulate(start, JointResistance(), FAST, duration=0.76, control=step_control(start))
     contact = capture_of(run, "hover").first_contact
     assert contact is not None
     assert run.rejected > 0
@@ -122,7 +122,7 @@ def test_friction_by_hand_is_the_registrys():
 
 def test_end_stiffness_is_not_for_one_system():
     with pytest.raises(InputError, match=r"end_stiffness is 0.1 N\*m/rad; give 0, or co-simulate"):
-        reference(setting("hover"), Passive(), dataclasses.replace(FAST, end_stiffness=0.1), 0.01)
+        reference(setting("hover"), JointResistance(), dataclasses.replace(FAST, end_stiffness=0.1), 0.01)
 
 
 def test_control_takes_known_names():

@@ -13,8 +13,8 @@ import pytest
 from snarelab.models.rig.rig import built_in_rig
 from snarelab.studies.zero_g_rig.arm import Arm, arm_of
 from snarelab.studies.zero_g_rig.concealed import KINDS, conceal
-from snarelab.studies.zero_g_rig.motion import DURATION, HOLDOUT, TRAIN, Joints, Move, varied
-from snarelab.studies.zero_g_rig.plant import Plant, Record, Sensors, simulate
+from snarelab.studies.zero_g_rig.motion import DURATION, HOLDOUT, TRAIN, JointMoves, Move, varied
+from snarelab.studies.zero_g_rig.plant import Plant, RigRecord, Sensors, simulate
 from snarelab.studies.zero_g_rig.recordings import ANSWER, open_answer, seal
 from snarelab.studies.zero_g_rig.slide import Slide
 from snarelab.studies.zero_g_rig.suspension import Slings, Suspension
@@ -38,12 +38,12 @@ def _pinocchio(arm: Arm) -> pin.Model:
 
 
 @pytest.fixture(scope="module")
-def brisk() -> Record:
+def brisk() -> RigRecord:
     """Four joints at once, without friction, in perfect slings, recorded at every step."""
-    return simulate(Plant(_rigid(), None, Suspension(), PERFECT), Joints(BRISK), 6.0, rate=200.0)
+    return simulate(Plant(_rigid(), None, Suspension(), PERFECT), JointMoves(BRISK), 6.0, rate=200.0)
 
 
-def test_without_friction_the_slings_leave_zero_gravity(brisk: Record):
+def test_without_friction_the_slings_leave_zero_gravity(brisk: RigRecord):
     """What the drives give is inverse dynamics without gravity (pinocchio), to half a percent of the peak torque."""
     model = _pinocchio(_rigid())
     data = model.createData()
@@ -55,7 +55,7 @@ def test_without_friction_the_slings_leave_zero_gravity(brisk: Record):
     assert np.all(error < 0.005 * np.abs(expected).max(axis=0) + 0.02)
 
 
-def test_work_of_the_drives_becomes_kinetic_energy(brisk: Record):
+def test_work_of_the_drives_becomes_kinetic_energy(brisk: RigRecord):
     model = _pinocchio(_rigid())
     data = model.createData()
     power = np.sum(brisk.true_tau * brisk.true_qd, axis=1)
@@ -70,7 +70,7 @@ def test_friction_of_a_slide_is_felt_by_every_parallel_joint_before_it():
     arm = _rigid()
     moving = np.array([c.link == 6 for c in arm.contacts])
     slide = Slide(np.where(moving, 40.0, 1e-9), np.where(moving, 40.0, 1e-9), 2e-3, 0.0)
-    record = simulate(Plant(arm, slide, Suspension(), PERFECT), Joints((Move(0.2, 7, 0.12, 0.02),)), 5.5)
+    record = simulate(Plant(arm, slide, Suspension(), PERFECT), JointMoves((Move(0.2, 7, 0.12, 0.02),)), 5.5)
     cruise = np.abs(record.true_qd[:, 6] - 0.02) < 1e-6
     torque = record.true_tau[cruise][-100:].mean(axis=0)
     expected = 2 * 0.25 * slide.steady(np.full(len(arm.contacts), 0.25 * 0.02))[moving][0]
@@ -83,7 +83,7 @@ def test_a_tension_error_turns_joint_2_by_its_lever_and_leaves_joint_1_alone():
     error = np.zeros(len(arm.units))
     error[8] = 0.05
     hung = Plant(arm, None, Suspension(error=error), PERFECT)
-    record = simulate(hung, Joints((Move(0.0, 4, 0.5, 0.2),)), 9.0)
+    record = simulate(hung, JointMoves((Move(0.0, 4, 0.5, 0.2),)), 9.0)
     unit, links = arm.units[8], arm.links
     elbow = np.sum([link.offset for link in links[:4]], axis=0)
     beyond = np.sum([link.offset for link in links[4 : unit.link + 1]], axis=0) + unit.point
@@ -132,7 +132,7 @@ def test_moves_never_overlap_and_the_rate_is_the_position_s(moves: tuple[Move, .
         own = [m for m in moves if m.joint == joint]
         assert all(a.end <= b.start for a, b in pairwise(own))
     time = np.arange(0.0, DURATION, 1e-2)
-    q, qd = Joints(varied(moves, np.random.default_rng(3)))(time)
+    q, qd = JointMoves(varied(moves, np.random.default_rng(3)))(time)
     np.testing.assert_allclose(np.gradient(q, time, axis=0)[1:-1], qd[1:-1], atol=1e-5)
 
 

@@ -8,15 +8,14 @@ import pytest
 import xarray as xr
 
 from snarelab.identification.diagnosis import Candidate
-from snarelab.identification.fitting.assembly import Assembly
+from snarelab.identification.fitting.assembly import TorqueModel
 from snarelab.identification.fitting.experiment import load_experiments, scales
 from snarelab.models.effects import get_effect
-from snarelab.models.model import Placed
+from snarelab.models.model import PlacedEffect
 from snarelab.models.model_file import load_model
 from snarelab.models.rig.rig import built_in_rig
 from snarelab.models.rigid_body import RigidBody
 from snarelab.recordings.write import write_recording
-from snarelab.studies.zero_g_rig.alike import compare
 from snarelab.studies.zero_g_rig.explain import (
     DRIFT,
     PAYLOAD,
@@ -31,10 +30,11 @@ from snarelab.studies.zero_g_rig.explain import (
     suspected_boom,
     tell_apart,
 )
-from snarelab.studies.zero_g_rig.friction import Curve
-from snarelab.studies.zero_g_rig.motion import Joints, Move
+from snarelab.studies.zero_g_rig.friction import SlideFrictionCurve
+from snarelab.studies.zero_g_rig.motion import JointMoves, Move
 from snarelab.studies.zero_g_rig.scene import rig_scene
 from snarelab.studies.zero_g_rig.score import coverage, score
+from snarelab.studies.zero_g_rig.stand_ins import compare
 from snarelab.studies.zero_g_rig.study import MODEL, Friction, friction_study
 
 LAW = {
@@ -58,7 +58,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Friction:
     folder = tmp_path_factory.mktemp("rig")
     model = load_model(MODEL)
     time = np.arange(0.0, 46.0, 0.02)
-    q, _ = Joints(MOVES)(time)
+    q, _ = JointMoves(MOVES)(time)
     rng = np.random.default_rng(0)
     paths = []
     for name, moved in (("train", q), ("holdout", q[::-1].copy())):
@@ -68,7 +68,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Friction:
         write_recording(xr.Dataset(bare, coords={"time": time}), paths[-1])
         experiment = load_experiments(model, [paths[-1]], RigidBody(model.tree), 4.0)[0]
         values = {f"slide_friction.{j}.{name}": value for j in model.joints for name, value in LAW.items()}
-        assembly = Assembly(model.tree, model.effects, None, scales([experiment]), values)
+        assembly = TorqueModel(model.tree, model.effects, None, scales([experiment]), values)
         tau = assembly.torque(experiment, assembly.start)
         tau = tau + 0.05 * rng.standard_normal(tau.shape)
         kept = np.isin(np.round(time, 6), np.round(experiment.motion.time, 6))
@@ -94,8 +94,8 @@ def test_friction_takes_nearly_all_of_the_error_away_on_both_recordings(study: F
 
 
 def test_an_explanation_is_like_itself_and_like_what_contains_it(study: Friction):
-    one = Placed(get_effect("sling_tension_error"), "sling9", ("lag_loss",))
-    other = Placed(get_effect("sling_tension_error"), "sling5", ("lag_loss",))
+    one = PlacedEffect(get_effect("sling_tension_error"), "sling9", ("lag_loss",))
+    other = PlacedEffect(get_effect("sling_tension_error"), "sling5", ("lag_loss",))
     pairs = compare(study.fit, {"a": [one], "b": [one], "both": [one, other]}, study.experiments, np.ones(7))
     found = {(p.name, p.other): p for p in pairs}
     assert found["a", "b"].angle == pytest.approx(0.0, abs=1e-3)
@@ -149,7 +149,7 @@ class _Diagnosis:
     candidates: list = field(default_factory=list)
 
 
-CURVE = Curve("joint1", np.array([0.01, 0.02]), np.array([10.0, 10.0]), np.array([0.1, 1.0]), (), ())
+CURVE = SlideFrictionCurve("joint1", np.array([0.01, 0.02]), np.array([10.0, 10.0]), np.array([0.1, 1.0]), (), ())
 FRICTION = {
     "joint1": {"coulomb": 11.0, "static": 11.0, "stribeck_speed": 1.0, "viscous": 0.0, "radius": 0.25, "creep": np.inf}
 }

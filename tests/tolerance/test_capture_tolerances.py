@@ -13,7 +13,7 @@ from snarelab.errors import InputError
 from snarelab.tolerance import renew
 from snarelab.tolerance.guard import (
     FARTHEST,
-    Guarded,
+    GuardedNumber,
     arrival_numbers,
     end_holds,
     envelope_end,
@@ -59,7 +59,7 @@ def test_the_papers_hover_capture_to_the_latch():
 
 
 def test_a_number_that_moved_is_told_with_before_after_and_allowed():
-    before = {"peak_force": Guarded(20.0, 1.0, "N"), "first_contact": Guarded(2.6, 0.1, "s")}
+    before = {"peak_force": GuardedNumber(20.0, 1.0, "N"), "first_contact": GuardedNumber(2.6, 0.1, "s")}
     assert not moved("x", before, {"peak_force": 20.9, "first_contact": 2.5001})
     (force,) = moved("x", before, {"peak_force": 21.5, "first_contact": 2.6})
     assert str(force) == "x.peak_force: was 20 N, is 21.5, allowed is a change of 1"

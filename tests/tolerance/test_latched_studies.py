@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from snarelab.errors import InputError
-from snarelab.models.hung import CRADLE, CRADLE_DAMPING, hung
+from snarelab.models.hanging import CRADLE, CRADLE_DAMPING, hanging_wrench
 from snarelab.models.snare.target import Target
 from snarelab.tolerance.box import why_the_box_fails
 from snarelab.tolerance.capture import Outcome, find_capture
@@ -171,7 +171,9 @@ def wrench(target, foot, turned, spin=(0.0, 0.0, 0.0)):
     import casadi as ca
     from scipy.spatial.transform import Rotation
 
-    found = hung(target, ca.SX(list(foot)), ca.SX(Rotation.from_rotvec(turned).as_matrix()), ca.SX(list(spin)))
+    found = hanging_wrench(
+        target, ca.SX(list(foot)), ca.SX(Rotation.from_rotvec(turned).as_matrix()), ca.SX(list(spin))
+    )
     on, energy, power = (np.asarray(ca.DM(ca.evalf(x))).ravel() for x in found)
     return on, float(energy[0]), float(power[0])
 

@@ -10,7 +10,7 @@ from bench.docking_concealed import EFFECTS, program, run_case
 from snarelab.errors import InputError
 from snarelab.identification.diagnose import diagnose
 from snarelab.identification.docking.recording import EVERY, load_records
-from snarelab.identification.docking.runs import SHIFTS, Runs
+from snarelab.identification.docking.runs import SHIFTS, DockingRuns
 from snarelab.identification.simulate import simulate
 from snarelab.models.docking.bench import NEVER
 from snarelab.models.model_file import load_model
@@ -113,7 +113,7 @@ def test_a_simulation_follows_the_test_and_is_remembered(tmp_path, model):
     seen = simulate(model, path)
     assert seen["tau.carriage"].sel(time=9.0, method="nearest") == pytest.approx(20.0 + 200.0 * 0.005, rel=1e-3)
     records = load_records(model, [path])
-    runs = Runs(model.tree.setup, records)
+    runs = DockingRuns(model.tree.setup, records)
     once = runs(0, dict(model.values), np.zeros(len(SHIFTS)))
     again = runs(0, dict(model.values), np.zeros(len(SHIFTS)))
     assert runs.count == 1
@@ -135,7 +135,7 @@ def test_presliding_is_known_to_a_factor_and_stays_above_zero(tmp_path, model, m
             return np.zeros((len(motion.times) - 1, 16))
 
     monkeypatch.setattr("snarelab.identification.docking.runs._bench", Kept)
-    runs = Runs(model.tree.setup, load_records(model, [written(tmp_path, told())]))
+    runs = DockingRuns(model.tree.setup, load_records(model, [written(tmp_path, told())]))
     one = np.eye(len(SHIFTS))[SHIFTS.index("breakaway")]
     for shift in (1.0, -1.0, -5.0):
         runs.seen(0, dict(model.values), shift * one)

@@ -10,21 +10,21 @@ from decided import names as named
 from pendulum import record, recorded
 
 from snarelab.identification.evidence import confirm as module
-from snarelab.identification.evidence.confirm import FEWEST_BLOCKS, Foretold, Missed, blocks, confirm, scatter
+from snarelab.identification.evidence.confirm import FEWEST_BLOCKS, ArmLoss, PredictiveDensity, blocks, confirm, scatter
 from snarelab.models.effects import get_effect
-from snarelab.models.model import Placed
+from snarelab.models.model import PlacedEffect
 
 N = 6
 NAMES = ("sensor_bias", "sensor_gain", "sensor_drift", "viscous_friction", "coulomb_friction", "backlash")
 
 
 def names(n=N):
-    return tuple(cast(Any, SimpleNamespace(placed=Placed(get_effect(x), "joint1"), number=k))
+    return tuple(cast(Any, SimpleNamespace(placed=PlacedEffect(get_effect(x), "joint1"), number=k))
                  for k, x in enumerate(NAMES[:n]))  # fmt: skip
 
 
-def missed_by(gain, fit=None, scatter_=1.0) -> Missed:
-    return Missed(gain, scatter_, 0.2, (0.1, 0.2), 0.75, cast(Any, fit))
+def missed_by(gain, fit=None, scatter_=1.0) -> ArmLoss:
+    return ArmLoss(gain, scatter_, 0.2, (0.1, 0.2), 0.75, cast(Any, fit))
 
 
 def eager(rise) -> set[int]:
@@ -41,7 +41,7 @@ def eager(rise) -> set[int]:
 def confirmed(monkeypatch, some, missed, told=None):
     """`confirm` with a fit that is the set of names it has, and what is missed of each given by a function."""
     densities = iter(range(100))
-    monkeypatch.setattr(module, "foretold", lambda *_: Foretold(float(next(densities)), np.zeros(4)))
+    monkeypatch.setattr(module, "foretold", lambda *_: PredictiveDensity(float(next(densities)), np.zeros(4)))
     monkeypatch.setattr(module, "_missed", missed)
     model: Any = SimpleNamespace(effects=tuple(n.placed for n in some))
     monkeypatch.setattr(module, "_without", lambda m, key: SimpleNamespace(
@@ -61,7 +61,7 @@ def test_trying_few_again_rules_out_what_trying_all_again_would(seed, monkeypatc
     def rise(number: int, left) -> float:
         return float(alone[number] + sum(stands_in[number, k] for k in range(N) if k not in left))
 
-    def missed(name: Any, _model: Any, final: Any, *_: Any) -> Missed:
+    def missed(name: Any, _model: Any, final: Any, *_: Any) -> ArmLoss:
         tried.append(name.number)
         return missed_by(rise(name.number, final), final - {name.number})
 
@@ -77,7 +77,7 @@ def test_trying_few_again_rules_out_what_trying_all_again_would(seed, monkeypatc
 
 
 def test_of_two_twins_one_stays(monkeypatch):
-    def missed(name: Any, _model: Any, final: Any, *_: Any) -> Missed:
+    def missed(name: Any, _model: Any, final: Any, *_: Any) -> ArmLoss:
         return missed_by(0.2 if len(final) == 2 else 5.0, final - {name.number})
 
     done = confirmed(monkeypatch, names(2), missed)
@@ -91,7 +91,7 @@ def test_a_name_stays_if_it_is_missed_by_more_than_its_scatter(monkeypatch, gain
     done: Any = confirmed(monkeypatch, names(1), lambda *_: missed_by(gain, "fit without", scattered), told)
     assert (len(done.names), len(done.rejected)) == ((1, 0) if stays else (0, 1))
     assert done.fit == (frozenset([0]) if stays else "fit without")
-    assert done.foretold.density == (0.0 if stays else 1.0)  # what is left foretells anew
+    assert done.forecast.density == (0.0 if stays else 1.0)  # what is left predicts anew
     assert len(told) == (1 if stays else 2)
 
 

@@ -9,7 +9,7 @@ from explained import white
 from snarelab.identification.evidence.hypotheses import log_share_of_places, pool
 from snarelab.identification.evidence.pool import Hypothesis
 from snarelab.models.effects import get_effect
-from snarelab.models.model import Placed
+from snarelab.models.model import PlacedEffect
 
 
 @pytest.mark.parametrize("n", [1, 2, 5, 7])
@@ -19,9 +19,9 @@ def test_shares_of_all_sets_of_places_add_up_to_one(n):
 
 def hypotheses(name: str, places, there=()) -> list[Hypothesis]:
     made = white(np.random.default_rng(0), len(places), {})
-    placed = [Placed(get_effect(name), p) for p in places]
+    placed = [PlacedEffect(get_effect(name), p) for p in places]
     named = {p.key: (p, [x]) for p, x in zip(placed, made.items, strict=True)}
-    return pool(named, {}, [Placed(get_effect(name), p) for p in there])
+    return pool(named, {}, [PlacedEffect(get_effect(name), p) for p in there])
 
 
 def test_the_next_joint_is_likelier_the_more_joints_have_it():

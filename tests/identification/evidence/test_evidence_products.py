@@ -8,8 +8,8 @@ from scipy.stats import norm
 
 from snarelab.identification import deciding
 from snarelab.identification.evidence.members import SIZES, Members
-from snarelab.identification.evidence.pool import Columns
-from snarelab.identification.evidence.projected import Projected
+from snarelab.identification.evidence.pool import CandidateColumns
+from snarelab.identification.evidence.projected import ProjectedEvidence
 
 FREE = (0, 1, 2, 5)
 """Items whose amplitudes may have either sign."""
@@ -28,7 +28,7 @@ def case(request):
 def test_the_evidence_of_nothing_is_the_density_of_what_stands_beside(case, recordings, weight):
     made, evidence = case
     n = sum(len(own.residual) for i in recordings for own in made.pieces[i])
-    found = Projected(evidence, recordings, weight).null - 0.5 * n * np.log(2 * np.pi)
+    found = ProjectedEvidence(evidence, recordings, weight).null - 0.5 * n * np.log(2 * np.pi)
     assert found == pytest.approx(made.log_density(recordings, (), weight), rel=1e-9)
 
 
@@ -36,7 +36,7 @@ def test_the_evidence_of_nothing_is_the_density_of_what_stands_beside(case, reco
 @pytest.mark.parametrize("recordings", [(0,), (0, 1)])
 def test_a_log_bayes_factor_is_the_ratio_of_densities(case, recordings, weight):
     made, evidence = case
-    on = Projected(evidence, recordings, weight)
+    on = ProjectedEvidence(evidence, recordings, weight)
     gains = Members(on).gains()
     nothing = made.log_density(recordings, (), weight)
     for number in FREE:
@@ -53,7 +53,7 @@ def test_a_log_bayes_factor_is_the_ratio_of_densities(case, recordings, weight):
 def test_an_amplitude_that_cannot_be_negative_has_twice_the_prior_where_it_may_be(case):
     """The Gaussian prior cut at zero, its density doubled, integrated by quadrature."""
     made, evidence = case
-    gains = Members(Projected(evidence, (0, 1))).gains()
+    gains = Members(ProjectedEvidence(evidence, (0, 1))).gains()
     r, k, a, pool = made.stacked((0, 1))
     solved = np.linalg.inv(k + a @ a.T)
     item = made.items[POSITIVE]
@@ -70,7 +70,7 @@ def test_an_amplitude_that_cannot_be_negative_has_twice_the_prior_where_it_may_b
 @pytest.mark.parametrize("before", [((1, 0.3),), ((1, 0.1), (2, 0.3)), ((4, 0.3), (2, 0.03))])
 def test_a_gain_on_top_of_others_is_the_difference_of_two_densities(case, before):
     made, evidence = case
-    on, recordings = Projected(evidence, (0, 1), WEIGHT), (0, 1)
+    on, recordings = ProjectedEvidence(evidence, (0, 1), WEIGHT), (0, 1)
     members = Members(on, before)
     dense = [(number, deciding.WHOLE if made.items[number].whole else size) for number, size in before]
     nothing, own = made.log_density(recordings, (), WEIGHT), made.log_density(recordings, dense, WEIGHT)
@@ -88,7 +88,7 @@ def test_a_gain_on_top_of_others_is_the_difference_of_two_densities(case, before
 def test_amplitudes_and_what_stands_beside_are_the_posterior_mean(case):
     """All unknowns in one Gaussian regression, with the prior's precision."""
     made, evidence = case
-    on, taken = Projected(evidence, (0, 1), WEIGHT), [(1, 0.3), (WHOLE, 1.0)]
+    on, taken = ProjectedEvidence(evidence, (0, 1), WEIGHT), [(1, 0.3), (WHOLE, 1.0)]
     members = Members(on, taken)
     r, k, a, pool = made.stacked((0, 1))
     c = np.concatenate([pool[:, made.items[n].index] * made.items[n].spread for n, _ in taken], axis=1)
@@ -121,7 +121,7 @@ def test_what_is_left_of_each_sample_adds_up_to_the_whitened_energy(case):
 
 def test_curvature_and_score_are_those_of_the_dense_matrices(case):
     made, evidence = case
-    on = Projected(evidence, (0, 1), WEIGHT)
+    on = ProjectedEvidence(evidence, (0, 1), WEIGHT)
     r, k, a, pool = made.stacked((0, 1))
     solved = np.linalg.inv(k + (a * WEIGHT**2) @ a.T)
     for one in FREE:
@@ -140,7 +140,7 @@ def test_channels_that_an_item_reaches(case):
 
 def test_columns_are_given_back_in_the_order_that_was_asked_for():
     rng = np.random.default_rng(0)
-    columns = Columns([7, 5])
+    columns = CandidateColumns([7, 5])
     one, two = ([rng.normal(size=(n, k)) for n in (7, 5)] for k in (2, 3))
     a, b = columns.add({1: one}), columns.add({0: two, 1: two})
     assert (a.tolist(), b.tolist(), columns.count) == ([0, 1], [2, 3, 4], 5)

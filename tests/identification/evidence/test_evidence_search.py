@@ -6,7 +6,7 @@ from explained import Explained, explained, hypotheses, white
 
 from snarelab.identification.evidence.members import Members
 from snarelab.identification.evidence.pool import Hypothesis, Item
-from snarelab.identification.evidence.projected import Projected
+from snarelab.identification.evidence.projected import ProjectedEvidence
 from snarelab.identification.evidence.rounds import likeness, share_of_residual
 from snarelab.identification.evidence.search import Search
 
@@ -14,7 +14,7 @@ DECOYS = 30
 
 
 def search(made: Explained, odds=0.5 / DECOYS, barred=(), named=None) -> Search:
-    return Search(Projected(made.evidence(), (0,)), hypotheses(made.items, odds, named), barred)
+    return Search(ProjectedEvidence(made.evidence(), (0,)), hypotheses(made.items, odds, named), barred)
 
 
 def found(made: Explained, **given) -> list[int]:
@@ -49,7 +49,7 @@ def test_more_places_to_look_at_need_more_evidence():
             break
     else:
         raise AssertionError("never named")
-    gain = Members(Projected(made.evidence(), (0,))).gains()[4].max()
+    gain = Members(ProjectedEvidence(made.evidence(), (0,))).gains()[4].max()
     assert found(made, odds=0.5 * np.exp(-gain)) == []
 
 
@@ -94,7 +94,7 @@ def test_twins_share_their_slot():
     made.items.append(Item(twin.index, twin.spread, twin.positive))
     pool = hypotheses(made.items, 0.1)
     pool[3] = Hypothesis("twin", True, pool[3].items, float(np.log(0.3)))
-    run = Search(Projected(made.evidence(), (0,)), pool)
+    run = Search(ProjectedEvidence(made.evidence(), (0,)), pool)
     (slot,) = run.answer()
     assert slot.taken.hypothesis == 3
     assert slot.shares[3] == pytest.approx(0.75, abs=1e-3)
@@ -104,7 +104,7 @@ def test_twins_share_their_slot():
 def test_a_hypothesis_is_the_average_of_its_shapes():
     """A grid of five shapes of which one is right pays for the other four: its log odds fall by log 5 at most."""
     made = white(np.random.default_rng(7), 5, {2: 0.6})
-    on = Projected(made.evidence(), (0,))
+    on = ProjectedEvidence(made.evidence(), (0,))
     alone = Search(on, hypotheses(made.items, 0.1)).scan([])
     grid = Search(on, [Hypothesis("grid", True, tuple(made.items), float(np.log(0.1)))]).scan([])
     gains = Members(on).gains()
@@ -116,7 +116,7 @@ def test_a_hypothesis_is_the_average_of_its_shapes():
 
 def test_without_a_hypothesis_nothing_is_found():
     made = white(np.random.default_rng(8), 1, {})
-    assert Search(Projected(made.evidence(), (0,)), []).answer() == []
+    assert Search(ProjectedEvidence(made.evidence(), (0,)), []).answer() == []
 
 
 def test_a_curve_wins_over_a_name_that_only_looks_like_it():
@@ -128,7 +128,7 @@ def test_a_curve_wins_over_a_name_that_only_looks_like_it():
     own = made.pieces[0][0]
     made.pieces[0][0] = type(own)(own.residual + 1.5 * x[:, 0], own.covariance, own.index, own.columns)
     pool = hypotheses(made.items, 0.1, named=[False, True])
-    (slot,) = Search(Projected(made.evidence(), (0,)), pool).answer()
+    (slot,) = Search(ProjectedEvidence(made.evidence(), (0,)), pool).answer()
     assert not pool[slot.taken.hypothesis].named
 
 
@@ -150,7 +150,7 @@ def test_likeness_is_the_share_of_what_one_adds_that_another_can_add(cosine):
 
 def test_the_share_of_the_residual_is_of_what_stands_beside_everything_leaves():
     made = explained(4)
-    run = Search(Projected(made.evidence(), (0, 1)), hypotheses(made.items, 0.1))
+    run = Search(ProjectedEvidence(made.evidence(), (0, 1)), hypotheses(made.items, 0.1))
     amplitudes = np.array([0.3, 0.4])
     r, k, a, pool = made.stacked((0, 1))
     solved = np.linalg.inv(k + a @ a.T)

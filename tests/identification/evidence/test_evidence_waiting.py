@@ -8,8 +8,8 @@ import pytest
 from explained import Explained, white
 
 from snarelab.identification.evidence import hypotheses, rounds
-from snarelab.identification.evidence.evidence import Channel
-from snarelab.identification.evidence.pool import Columns
+from snarelab.identification.evidence.evidence import ResidualChannel
+from snarelab.identification.evidence.pool import CandidateColumns
 
 
 def weighed(residual: float, n_train=1) -> Any:
@@ -17,8 +17,8 @@ def weighed(residual: float, n_train=1) -> Any:
     made = white(np.random.default_rng(0), 1, {})
     own = made.pieces[0][0]
     n = len(own.residual)
-    piece = Channel(np.full(n, residual), own.covariance, own.index, own.columns)
-    columns = Columns([n, n])
+    piece = ResidualChannel(np.full(n, residual), own.covariance, own.index, own.columns)
+    columns = CandidateColumns([n, n])
     columns.add({0: [np.ones((n, 1))] * 2})
     evidence = Explained([[piece], [piece]], columns, made.items, 0).evidence()
     return Made(evidence=evidence, n_train=n_train, noises=(None,)), n
@@ -40,7 +40,7 @@ def test_a_late_law_is_told_by_its_derivatives():
     motion = Made(band_segments=lambda: [slice(0, 300), slice(300, 600)])
     along: Any = Made(instruments=[Made(motion=motion)], n_train=1, scale=np.array([2.0, 1.0]))
     law = np.sin(2 * t)[:, None]
-    columns = Columns([n])
+    columns = CandidateColumns([n])
     item = hypotheses.lagging(along, {1: [law]}, columns)
     own = columns.some(0, 1, item.index)
     inside = np.r_[2:298, 302:598]

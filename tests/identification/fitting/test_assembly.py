@@ -8,7 +8,7 @@ from scipy.interpolate import CubicSpline
 
 from bench.arm import random_arm
 from snarelab.errors import InputError
-from snarelab.identification.fitting.assembly import Assembly
+from snarelab.identification.fitting.assembly import TorqueModel
 from snarelab.identification.fitting.base_parameters import base_parameters
 from snarelab.identification.fitting.experiment import Experiment, scales
 from snarelab.models.rigid_body import RigidBody
@@ -97,7 +97,7 @@ def test_a_late_encoder_of_one_joint_whose_inertia_is_free_makes_the_torque_earl
     body = RigidBody(tree)
     recorded, base = Experiment(motion([tree.joints[0].kind]), body), base_parameters(body)
     effects = placed(("sensor_delay", "q.joint1"))
-    assembly = Assembly(tree, effects, base, scales([recorded]), {})
+    assembly = TorqueModel(tree, effects, base, scales([recorded]), {})
     heavier = 1.7 * base.matrix @ tree.links[0].phi
     tau = assembly.torque(recorded, np.append(heavier, 4 * PERIOD))[:, 0]
     m = recorded.motion
@@ -213,8 +213,8 @@ def test_a_link_effect_beside_free_inertia_is_refused(arm, experiment):
 
 def test_no_model_is_evaluated_twice_at_the_same_parameters(arm, experiment, monkeypatch):
     """Of two models in turn, as a report compares them; another inertia is another model."""
-    counted, worked_out = [], Assembly._evaluate
-    monkeypatch.setattr(Assembly, "_evaluate", lambda self, *own: counted.append(self) or worked_out(self, *own))
+    counted, worked_out = [], TorqueModel._evaluate
+    monkeypatch.setattr(TorqueModel, "_evaluate", lambda self, *own: counted.append(self) or worked_out(self, *own))
     models = [build(arm, experiment, placed((name, "joint1"))) for name in ("viscous_friction", "coulomb_friction")]
     for _ in range(3):
         torques = [model.torque(experiment, model.start + 1.0) for model in models]

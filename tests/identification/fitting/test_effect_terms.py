@@ -10,7 +10,7 @@ from snarelab.identification.fitting import effect_terms
 from snarelab.identification.fitting.effect_terms import _RESPONSE as LONGEST
 from snarelab.identification.fitting.effect_terms import _causal, _impulse_response, _link_change, contributions
 from snarelab.models.effects import get_effect
-from snarelab.models.model import Placed
+from snarelab.models.model import PlacedEffect
 
 N, PERIOD = 300, 5e-3
 TIME = PERIOD * np.arange(N)
@@ -41,7 +41,7 @@ def added(e, name, at, parameters, joint=1, load=None, reading=None, scale=1.0, 
     own: Any = tree or Made(joints=[Made(name=f"joint{k}", kind="revolute") for k in (1, 2)], axes=())
     load, reading = (np.zeros((N, 2)) if x is None else np.stack([np.zeros(N), x], 1) for x in (load, reading))
     numbers = np.array(parameters, float)
-    return contributions(e, own, Placed(get_effect(name), at), joint, load, reading, scale, numbers, early_alone)
+    return contributions(e, own, PlacedEffect(get_effect(name), at), joint, load, reading, scale, numbers, early_alone)
 
 
 def test_friction_and_a_spring_act_on_their_own_channel():

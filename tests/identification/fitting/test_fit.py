@@ -6,15 +6,15 @@ import scipy.optimize
 from moving_arm import exact
 
 from bench.arm import random_arm
-from snarelab.identification.fitting.assembly import Assembly
+from snarelab.identification.fitting.assembly import TorqueModel
 from snarelab.identification.fitting.base_parameters import base_parameters
 from snarelab.identification.fitting.experiment import Experiment, scales
 from snarelab.identification.fitting.fit import channel_rms, fit
-from snarelab.identification.fitting.least_squares import Normal, Objective
+from snarelab.identification.fitting.least_squares import NormalEquations, Objective
 from snarelab.identification.fitting.problem import Problem, split
 from snarelab.identification.fitting.projection import minimise_projected
 from snarelab.models.effects import get_effect
-from snarelab.models.model import Placed
+from snarelab.models.model import PlacedEffect
 from snarelab.models.rigid_body import RigidBody
 from snarelab.models.urdf import load_urdf
 
@@ -47,8 +47,8 @@ def recording(body, friction, still=()):
 
 
 def assembly(body, experiment, *names, base=None):
-    placed = [Placed(get_effect(name), joint) for name in names for joint in JOINTS]
-    return Assembly(body.tree, placed, base, scales([experiment]), {})
+    placed = [PlacedEffect(get_effect(name), joint) for name in names for joint in JOINTS]
+    return TorqueModel(body.tree, placed, base, scales([experiment]), {})
 
 
 def sign(qd):
@@ -230,7 +230,7 @@ def test_parts_share_no_parameter_and_add_up_to_the_whole(body, names, free, par
     whole = Problem(model, (run,), np.arange(2), np.arange(len(theta))).normal(theta, np.array([1.0, 2.0]))
     found = split(model, [run], theta)
     assert len(found) == parts
-    together = Normal(0.0, np.zeros_like(whole.gradient), np.zeros_like(whole.matrix))
+    together = NormalEquations(0.0, np.zeros_like(whole.gradient), np.zeros_like(whole.matrix))
     cost = 0.0
     for part in found:
         one = part.normal(theta[part.index], np.array([1.0, 2.0])[part.channels])
@@ -265,7 +265,7 @@ def test_projected_search_ends_where_scipy_does(seed):
         e, f = np.exp(-x[2] * t), np.exp(-x[3] * t)
         jacobian = np.stack([e, f, -x[0] * t * e, -x[1] * t * f], 1)
         r = residual(x)
-        return Normal(0.5 * float(r @ r), jacobian.T @ r, jacobian.T @ jacobian)
+        return NormalEquations(0.5 * float(r @ r), jacobian.T @ r, jacobian.T @ jacobian)
 
     start = np.array([1.0, 1.0, 0.2, 4.0])
     shapes = np.array([False, False, True, True])
@@ -285,10 +285,12 @@ def test_a_model_with_an_effect_taken_out_keeps_the_links_that_its_file_holds(bo
     """By hand: links heavier than the URDF's, and the viscous friction that is left."""
     run = recording(body, lambda qd: 0 * qd)
     links = body.tree.links
-    placed = [Placed(get_effect(name), "joint1") for name in ("viscous_friction", "coulomb_friction")]
-    Assembly(body.tree, placed, None, scales([run]), {}).torque(run, np.array([3.0, 5.0]))  # fills what the run keeps
+    placed = [PlacedEffect(get_effect(name), "joint1") for name in ("viscous_friction", "coulomb_friction")]
+    TorqueModel(body.tree, placed, None, scales([run]), {}).torque(
+        run, np.array([3.0, 5.0])
+    )  # fills what the run keeps
     values = {f"inertia.{link.name}.mass": 1.5 * link.phi[0] for link in links}
-    whole = Assembly(body.tree, placed, None, scales([run]), values)
+    whole = TorqueModel(body.tree, placed, None, scales([run]), values)
     kept = whole.keep(placed[:1], np.array([3.0, 5.0]))
     assert kept.start == pytest.approx([3.0])
     wanted = run.regressor @ np.concatenate([[1.5 * link.phi[0], *link.phi[1:]] for link in links])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.optimize
 
-from snarelab.identification.fitting.least_squares import Normal, Objective, _secant, bounded_step, minimise
+from snarelab.identification.fitting.least_squares import NormalEquations, Objective, _secant, bounded_step, minimise
 
 INF = np.inf
 reference: Any = scipy.optimize.least_squares
@@ -18,7 +18,7 @@ def normal(residual, jacobian):
     def evaluate(theta):
         r, j = residual(theta), jacobian(theta)
         evaluate.seen.append(theta.copy())
-        return Normal(0.5 * float(r @ r), j.T @ r, j.T @ j)
+        return NormalEquations(0.5 * float(r @ r), j.T @ r, j.T @ j)
 
     evaluate.seen = []
     return evaluate
@@ -173,9 +173,9 @@ def test_where_the_model_cannot_be_evaluated_the_step_is_shortened():
 
     def evaluate(theta):
         if theta[0] <= 0:
-            return Normal(np.inf, np.full(1, np.nan), np.full((1, 1), np.nan))
+            return NormalEquations(np.inf, np.full(1, np.nan), np.full((1, 1), np.nan))
         r, j = np.log(theta) + 1.0, 1 / theta
-        return Normal(0.5 * float(r @ r), j * r, np.diag(j**2))
+        return NormalEquations(0.5 * float(r @ r), j * r, np.diag(j**2))
 
     found = minimise(Objective(evaluate, np.full(1, -INF), np.full(1, INF)), np.array([3.0]))
     assert found.theta[0] == pytest.approx(np.exp(-1.0), abs=1e-6)
@@ -208,14 +208,14 @@ def test_running_out_of_steps_is_said():
     ],
 )
 def test_a_step_is_the_bounded_minimum_of_the_damped_quadratic(scale, damping, low, high, wanted):
-    here = Normal(0.0, np.array([-3.0, -3.0]), np.array([[2.0, 1.0], [1.0, 2.0]]))
+    here = NormalEquations(0.0, np.array([-3.0, -3.0]), np.array([[2.0, 1.0], [1.0, 2.0]]))
     found = bounded_step(here, np.array(scale), damping, np.array(low), np.array(high))
     np.testing.assert_allclose(found, wanted, atol=1e-9)
 
 
 def test_the_curvature_learnt_explains_the_last_step_and_is_sized_to_it():
     """Dennis, Gay and Welsch: afterwards it turns the step into what the normal matrix left of the gradient's change.
-    Along the third axis, of which the step says nothing, it is scaled by |3| / |20|, what it foretold."""
+    Along the third axis, of which the step says nothing, it is scaled by |3| / |20|, what it predicted."""
     matrix, move, change = np.diag([1.0, 2.0, 5.0]), np.array([1.0, 1.0, 0.0]), np.array([4.0, 2.0, 0.0])
     for bend, third in ((np.zeros((3, 3)), 0.0), (10.0 * np.eye(3), 1.5), (0.1 * np.eye(3), 0.1)):
         found = _secant(bend, change, matrix, move)

@@ -10,7 +10,7 @@ from snarelab.identification.fitting import problem as module
 from snarelab.identification.fitting.assembly import Block
 from snarelab.identification.fitting.problem import Problem, reached, split
 from snarelab.models.effects import get_effect
-from snarelab.models.model import Placed
+from snarelab.models.model import PlacedEffect
 
 
 def assembly(*placed, n_joints=3, blocks=()) -> Any:
@@ -34,7 +34,7 @@ def assembly(*placed, n_joints=3, blocks=()) -> Any:
 
 
 def placed(name, at, *hold):
-    return Placed(get_effect(name), at, hold)
+    return PlacedEffect(get_effect(name), at, hold)
 
 
 def test_shapes_have_the_grids_of_their_free_parameters_in_the_joints_scale():

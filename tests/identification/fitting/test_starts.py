@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from snarelab.identification.fitting import starts
-from snarelab.identification.fitting.least_squares import Normal, Objective
+from snarelab.identification.fitting.least_squares import NormalEquations, Objective
 from snarelab.identification.fitting.starts import _is_minimum, _projected, _random_start, best_start, grid_starts
 
 SIGMA = np.ones(1)
@@ -143,7 +143,7 @@ def test_amplitudes_are_solved_for_a_shape_between_bounds():
     def normal(theta):
         s, a = theta
         r, columns = x - a * x**s, -np.stack([a * np.log(x) * x**s, x**s], 1)
-        return Normal(0.5 * float(r @ r), columns.T @ r, columns.T @ columns)
+        return NormalEquations(0.5 * float(r @ r), columns.T @ r, columns.T @ columns)
 
     def problem(high):
         objective = Objective(normal, np.array([0.0, 0.0]), np.array([3.0, high]))

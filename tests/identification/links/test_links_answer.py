@@ -12,9 +12,10 @@ from encoder_pairs import SCALES, links, motion, placed, run
 from snarelab.identification.diagnosis import ChannelFit, Estimate, Finding, Location, Misfit, Step
 from snarelab.identification.fitting.experiment import Experiment
 from snarelab.identification.links import answer
-from snarelab.identification.links.diagnose import Compared
+from snarelab.identification.links.diagnose import EncoderComparison
 from snarelab.identification.links.source import Links
-from snarelab.identification.sources.source import At, Linear
+from snarelab.identification.sources.decide import Decision
+from snarelab.identification.sources.source import Linearisation, ModelPoint
 
 NONE = cast(Any, None)
 
@@ -35,8 +36,8 @@ def test_of_a_channel_is_told_the_share_of_its_held_out_energy(before, after, to
 
 
 def left(*sizes, channels=1):
-    at = At.of((), {}, 0)
-    return Linear(at, tuple(np.full((len(x), channels), np.array(x, float)[:, None]) for x in sizes), ())
+    at = ModelPoint.of((), {}, 0)
+    return Linearisation(at, tuple(np.full((len(x), channels), np.array(x, float)[:, None]) for x in sizes), ())
 
 
 def test_a_misfit_is_relative_to_the_link_encoders_own_reading():
@@ -48,7 +49,7 @@ def test_a_misfit_is_relative_to_the_link_encoders_own_reading():
         best=SimpleNamespace(train=left([1, 1], [1]), held=left([0.5])),
         before=left([1, -1]),
     )
-    (made,) = answer._fits(Compared(one, decided, (), ()))
+    (made,) = answer._fits(EncoderComparison(one, decided, (), ()))
     assert (made.channel, made.unit) == ("q_link.joint1", "m")
     assert made.train == Misfit(2.0, 1.0, 0.5, 0.25)
     assert made.holdout == Misfit(1.0, 0.5, 0.5, 0.25)
@@ -103,9 +104,11 @@ def answered(monkeypatch, torques, found=(), told=(1, 1), nameless=""):
     monkeypatch.setattr(answer, "_location", lambda *_: ("places",))
     monkeypatch.setattr(answer, "with_found", lambda model, at: (model, at))
     names = [SimpleNamespace(placed=placed(f.name, f.at)) for f in found]
-    decided: Any = SimpleNamespace(best=SimpleNamespace(names=names, train=SimpleNamespace(at="values")))
+    best = SimpleNamespace(names=names, train=SimpleNamespace(at="values"))
+    none: Any = None
+    decided = Decision(none, none, cast(Any, best), (), cast(Any, tuple(filter(None, [nameless]))), none)
     source: Any = SimpleNamespace(still=lambda p: p.effect.name == "sensor_bias")
-    return answer.with_links(torques, cast(Any, "model"), Compared(source, decided, (), ()))
+    return answer.with_links(torques, cast(Any, "model"), EncoderComparison(source, decided, (), ()))
 
 
 def test_where_the_encoders_find_nothing_the_torques_answer_stands(monkeypatch):
@@ -195,7 +198,7 @@ def test_places_stand_by_the_share_that_is_told_of_each_channel(monkeypatch):
     places = tuple(Location(f"tau.joint{k}", 0.5, (), "") for k in (2, 1, 3))
     said = replace(TORQUES, location=places)
     fits = [channel("q_link.joint1", 4, 1), channel("q_link.joint2", 5, 1)]
-    one, two = answer._location(said, Compared(source, decided, (), train), fits)
+    one, two = answer._location(said, EncoderComparison(source, decided, (), train), fits)
     assert [t.tolist() for t in seen["tau"]] == [[[0, 5], [0, 6], [0, 7]], [[0, 5], [0, 6]]]
     assert [c.tolist() for c in seen["changes"]] == [[[0, 0], [0, 1], [0, 2]], [[0, 3], [0, 4]]]
     assert (one.channel, one.where, two.channel) == ("q_link.joint2", "fast", "tau.joint1")
@@ -209,10 +212,10 @@ def test_a_steps_error_is_the_root_of_the_mean_share_of_every_joints_reading():
     source = Links(["joint1", "joint2"], ("revolute", "revolute"), [SCALES] * 2, rows, 1)
 
     def both(a, b):
-        return Linear(At.of((), {}, 0), (np.tile([a, b], (4, 1)),), ())
+        return Linearisation(ModelPoint.of((), {}, 0), (np.tile([a, b], (4, 1)),), ())
 
     stages = (("as given", both(2.0, 4.0), both(4.0, 8.0)), ("+ more", both(1.0, 4.0), both(0.0, 4.0)))
-    lines = answer._steps(Compared(source, NONE, stages, ()))
+    lines = answer._steps(EncoderComparison(source, NONE, stages, ()))
     assert [x.label for x in lines] == ["as given", "+ more"]
     assert [x.train for x in lines] == pytest.approx([0.5, np.sqrt((1 / 16 + 1 / 4) / 2)])
     assert [x.holdout for x in lines] == pytest.approx([1.0, np.sqrt(1 / 8)])

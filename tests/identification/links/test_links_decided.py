@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 from snarelab.identification.sources.answer import rms
 from snarelab.identification.sources.decide import decide
-from snarelab.identification.sources.source import At
+from snarelab.identification.sources.source import ModelPoint
 
 N = 640
 TIME = np.arange(N) / RATE
@@ -45,7 +45,7 @@ def decided(*differences, seed=0, noise=NOISE):
         own = sum((f(TIME, q, number) for f in differences), noise * rng.standard_normal(N))
         runs.append(run(q, own, load=load, inertia=INERTIA, path=f"/data/{number}.csv"))
     one = links(*runs, n_train=2)
-    return decide(one, At.of((), {}, one.n_shifts))
+    return decide(one, ModelPoint.of((), {}, one.n_shifts))
 
 
 def named(found):

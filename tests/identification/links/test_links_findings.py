@@ -10,10 +10,10 @@ from encoder_pairs import RATE, links, placed, run
 
 from snarelab.identification.diagnosis import Estimate
 from snarelab.identification.links import findings
-from snarelab.identification.links.diagnose import Compared
+from snarelab.identification.links.diagnose import EncoderComparison
 from snarelab.identification.sources import answer
-from snarelab.identification.sources.search import Name
-from snarelab.identification.sources.source import At, Linear
+from snarelab.identification.sources.search import Naming
+from snarelab.identification.sources.source import Linearisation, ModelPoint
 
 GAIN, DELAY = placed("sensor_gain", "q_link.joint1"), placed("sensor_delay", "q_link.joint1")
 SPRING, BIAS = placed("joint_elasticity", "joint1"), placed("sensor_bias", "q_link.joint1")
@@ -40,12 +40,12 @@ def _right(monkeypatch):
 
 
 def left(at, *sizes):
-    return Linear(at, tuple(np.full((4, 1), x) for x in sizes), ())
+    return Linearisation(at, tuple(np.full((4, 1), x) for x in sizes), ())
 
 
 def compared(one, names, values=None, shifts=None, missed=(), rejected=(), curves=(), within=1e-3):
     """A decision by which these names stand; each is missed from ``within`` to 4 mrad unless said otherwise."""
-    at = At.of([n.placed for n in names], values or {}, one.n_shifts)
+    at = ModelPoint.of([n.placed for n in names], values or {}, one.n_shifts)
     at = at if shifts is None else replace(at, shifts=np.array(shifts, float))
     told = {n.placed.key: SimpleNamespace(gain=g, sure=3.0, held=left(at, w)) for n, (g, w) in
             zip(names, missed or [(9.0, 4e-3)] * len(names), strict=True)}  # fmt: skip
@@ -54,11 +54,11 @@ def compared(one, names, values=None, shifts=None, missed=(), rejected=(), curve
     decided: Any = SimpleNamespace(
         given=None, best=best, found=found, rejected=rejected, left=curves, before=left(at, 1.0)
     )
-    return Compared(one, decided, (), ())
+    return EncoderComparison(one, decided, (), ())
 
 
 def name(p, share=0.75, rivals=()):
-    return Name(p, (0,), 30.0, share, tuple(rivals))
+    return Naming(p, (0,), 30.0, share, tuple(rivals))
 
 
 def test_lengths_are_told_in_thousandths_of_the_joints_unit():
@@ -78,9 +78,8 @@ def test_an_effect_shares_its_probability_with_those_it_cannot_be_told_from():
     ]
     assert [r.probability for r in found.rivals] == pytest.approx([0.2, 0.008])
     assert found.evidence == (
-        "The channel lags the others by a constant time: it explains 94 % of what motor and link encoder of joint1 "
-        "differ by without it; taking it out again raises the difference left on the held-out recording from 1 mrad "
-        "to 4 mrad."
+        "The channel lags the others by a constant time: it explains 94 % of the difference of motor and link "
+        "encoder of joint1. Without it, the remaining difference on the held-out recording rises from 1 mrad to 4 mrad."
     )
 
 
@@ -158,17 +157,17 @@ def test_traces_show_the_difference_as_measured_as_given_and_after():
         run([5], [10], path="/d/c.csv", qd=[3]),
     ]
     one = links(*runs, n_train=1)
-    at = At.of((), {}, 2)
+    at = ModelPoint.of((), {}, 2)
 
     def columns(*values):
-        return Linear(at, (np.array(values, float)[:, None],), ())
+        return Linearisation(at, (np.array(values, float)[:, None],), ())
 
     decided: Any = SimpleNamespace(
         found=SimpleNamespace(first=columns(1, 2, 3)),
         before=columns(6),
         best=SimpleNamespace(train=columns(0.1, 0.2, 0.3), held=columns(0.6)),
     )
-    a, c = findings.traces_of(Compared(one, decided, (), ()))
+    a, c = findings.traces_of(EncoderComparison(one, decided, (), ()))
     assert (a.recording, a.role, a.channel, a.unit) == ("a.csv", "train", "q_link.joint1", "rad")
     assert (c.recording, c.role) == ("c.csv", "holdout")
     assert a.time.tolist() == [100.0, 100 + 1 / 64, 100 + 2 / 64]

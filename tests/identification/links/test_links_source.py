@@ -13,7 +13,7 @@ from snarelab.identification.deciding import SIZES
 from snarelab.identification.links import run as module
 from snarelab.identification.links.run import load_links
 from snarelab.identification.links.source import links_of, start
-from snarelab.identification.sources.source import At
+from snarelab.identification.sources.source import ModelPoint
 from snarelab.models.floating.tree import FloatingTree
 
 N = 256
@@ -124,7 +124,7 @@ def test_a_zero_may_be_as_large_as_the_largest_reading():
     one = links(run(WAVE, np.full(N, 2.0)), run(WAVE, np.full(N, -3.0)))
     (bias,) = one.variants(placed("sensor_bias", "q_link.joint1"))
     assert bias.size * SIZES[-1] == pytest.approx(3.0)
-    at = one.settled(At.of((), {}, one.n_shifts), one.train)
+    at = one.settled(ModelPoint.of((), {}, one.n_shifts), one.train)
     np.testing.assert_allclose(one.zeros(at)[:, 0], [2.0, -3.0])
     np.testing.assert_allclose(at.shifts, [2 / 3, -1.0])
 
@@ -137,7 +137,7 @@ def test_what_is_foretold_is_the_sum_of_the_terms_and_the_recordings_own_zero(la
     spring, delay = placed("joint_elasticity", "joint1"), placed("sensor_delay", f"{late}.joint1")
     values = {f"{spring.key}.stiffness": 900.0, f"{spring.key}.damping": 9.0, f"{delay.key}.delay": 0.013}
     values |= {f"{GAIN.key}.error": 0.02}
-    at = replace(At.of((spring, delay, GAIN), values, 2), shifts=np.array([0.5, -0.25]))
+    at = replace(ModelPoint.of((spring, delay, GAIN), values, 2), shifts=np.array([0.5, -0.25]))
     for i, r in enumerate(one.rows):
         terms = [r[0].term(p, at.of_effect(p))[0] for p in at.placed]
         here = one.predicted(i, at)
@@ -155,7 +155,7 @@ def test_what_is_foretold_is_the_sum_of_the_terms_and_the_recordings_own_zero(la
 def test_a_held_parameter_has_no_slope():
     one = links(run(WAVE, WAVE, load=6.0))
     spring = placed("joint_elasticity", "joint1", hold=("damping",))
-    at = At.of([spring], {f"{spring.key}.stiffness": 2000.0, f"{spring.key}.damping": 20.0}, 1)
+    at = ModelPoint.of([spring], {f"{spring.key}.stiffness": 2000.0, f"{spring.key}.damping": 20.0}, 1)
     assert at.keys == (f"{spring.key}.stiffness",)
     slopes = one.slopes(0, at, one.predicted(0, at))
     np.testing.assert_allclose(slopes, np.full((N, 1, 1), 3e-3 / 2000), atol=1e-12)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from loud_windows import LENGTH, STEP, windows
 
-from snarelab.identification.nuisance.bursts import Left, bursts
+from snarelab.identification.nuisance.bursts import ChannelResidual, bursts
 
 
 @pytest.mark.parametrize(
@@ -34,7 +34,7 @@ def test_bursts_are_a_fifth_of_the_energy_beyond_three_times_the_median(energies
 def test_windows_are_whole_half_seconds_in_each_recordings_own_rate():
     """What is left over at the end is no window: six windows and twelve at 40 Hz, the loud ones among them."""
     first, second = windows(1, 1, 1, 1, 1, 16), windows(1, 1, 1, 1, 1, 16, step=0.025)
-    tail = Left(np.append(first.residual, 99.0), np.append(first.energy, 99.0**2), np.ones(301, bool), STEP)
+    tail = ChannelResidual(np.append(first.residual, 99.0), np.append(first.energy, 99.0**2), np.ones(301, bool), STEP)
     found = bursts([tail, second])
     assert found is not None
     assert found.share == pytest.approx(26 / 42)
@@ -46,7 +46,7 @@ def test_the_frequency_is_that_of_the_loudest_window(hertz):
     t = STEP * np.arange(12 * LENGTH)
     loud = (t >= 2.0) & (t < 2.5)
     residual = np.where(loud, 9.0, 1.0) * np.sin(2 * np.pi * np.where(loud, hertz, 7.0) * t)
-    found = bursts([Left(residual, residual**2, np.ones(len(t), bool), STEP)])
+    found = bursts([ChannelResidual(residual, residual**2, np.ones(len(t), bool), STEP)])
     assert found is not None
     assert found.frequency == pytest.approx(hertz, abs=0.15)
 
@@ -56,11 +56,13 @@ def test_what_happens_near_rest_is_no_burst():
     own = windows(*5 * [1.0], 16.0, *5 * [1.0], 16.0)
     loud = own.energy > 1
     assert bursts([own]) is not None
-    assert bursts([Left(own.residual, own.energy, ~loud, STEP)]) is None  # of ten windows a median says nothing
+    assert (
+        bursts([ChannelResidual(own.residual, own.energy, ~loud, STEP)]) is None
+    )  # of ten windows a median says nothing
     energy, moves = own.energy.copy(), np.ones(len(loud), bool)
     energy[np.flatnonzero(loud)[::2]] = 1e6
     moves[np.flatnonzero(loud)[::2]] = False
-    found = bursts([Left(own.residual, energy, moves, STEP)])
+    found = bursts([ChannelResidual(own.residual, energy, moves, STEP)])
     assert found is not None
     assert found.share == pytest.approx((0.5 * 13 + 0.5 * 13) / (0.5 * 16 + 0.5 * 16 + 10))
 
@@ -68,4 +70,4 @@ def test_what_happens_near_rest_is_no_burst():
 def test_what_is_slower_than_a_window_is_none():
     t = STEP * np.arange(12 * LENGTH)
     residual = np.where((t >= 2.0) & (t < 3.0), 9.0, 1.0) * np.cos(2 * np.pi * 0.5 * t)
-    assert bursts([Left(residual, residual**2, np.ones(len(t), bool), STEP)]) is None
+    assert bursts([ChannelResidual(residual, residual**2, np.ones(len(t), bool), STEP)]) is None

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from snarelab.identification.nuisance.covariance import Covariance, Remembering
+from snarelab.identification.nuisance.covariance import Covariance, FirstOrderNoise
 
 STEP = 0.02
 PARTS = (slice(0, 37), slice(40, 41), slice(41, 90))
@@ -40,10 +40,10 @@ def some(seed, n=90):
 
 KINDS = {
     "independent": ((), False),
-    "coloured": ((Remembering(0.7, 0.1),), False),
-    "coloured and wandering": ((Remembering(0.7, 0.1), Remembering(2.0, 8.0)), False),
+    "coloured": ((FirstOrderNoise(0.7, 0.1),), False),
+    "coloured and wandering": ((FirstOrderNoise(0.7, 0.1), FirstOrderNoise(2.0, 8.0)), False),
     "encoders": ((), True),
-    "all": ((Remembering(0.7, 0.1), Remembering(0.0, 1.0), Remembering(2.0, 8.0)), True),
+    "all": ((FirstOrderNoise(0.7, 0.1), FirstOrderNoise(0.0, 1.0), FirstOrderNoise(2.0, 8.0)), True),
 }
 
 
@@ -76,7 +76,7 @@ def test_columns_made_white_have_the_products_of_the_dense_inverse(kind, segment
 
 def test_a_process_of_no_level_and_no_derivative_are_none():
     variance, _, x = some(4)
-    found = Covariance(variance, [Remembering(0.0, 1.0)], np.zeros(90), STEP, PARTS)
+    found = Covariance(variance, [FirstOrderNoise(0.0, 1.0)], np.zeros(90), STEP, PARTS)
     np.testing.assert_allclose(found.solve(x), x / variance[:, None], rtol=1e-14)
     assert found.log_det == pytest.approx(np.log(variance).sum(), rel=1e-14)
 
@@ -91,7 +91,7 @@ def test_noise_that_was_drawn_has_unit_variance_once_it_is_whitened():
     b = 1 + 0.5 * np.sin(np.arange(n) / 50)
     encoders = b * np.convolve(rng.normal(size=n), [1.0, -2.0, 1.0])[:n] / np.sqrt(6)
     r = 0.5 * rng.normal(size=n) + 1.2 * coloured + encoders
-    own = Covariance(np.full(n, 0.25), [Remembering(1.2, 0.1)], b, STEP, (slice(0, n),))
+    own = Covariance(np.full(n, 0.25), [FirstOrderNoise(1.2, 0.1)], b, STEP, (slice(0, n),))
     assert r @ own.solve(r) / n == pytest.approx(1.0, abs=4 * np.sqrt(2 / n))
     white = Covariance(np.full(n, float(np.var(r))), [], None, STEP, (slice(0, n),))
     likelihood = [-0.5 * (r @ k.solve(r) + k.log_det) for k in (own, white)]

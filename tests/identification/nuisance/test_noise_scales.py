@@ -7,15 +7,15 @@ import pytest
 from scipy.linalg import block_diag, cholesky, toeplitz
 from scipy.stats import multivariate_normal
 
-from snarelab.identification.nuisance.noise import Noise, Run, _cost, learn
+from snarelab.identification.nuisance.noise import Noise, NoiseChannel, _cost, learn
 
 STEP, N = 1 / 80, 1600
 TIME = STEP * np.arange(N)
 
 
-def run(encoder=0.0, sticks=None, settles=None, level=0.0, n=N) -> Run:
+def run(encoder=0.0, sticks=None, settles=None, level=0.0, n=N) -> NoiseChannel:
     nothing = np.zeros(n)
-    return Run(
+    return NoiseChannel(
         STEP,
         (slice(0, n),),
         np.full(n, encoder),
@@ -39,7 +39,7 @@ def process(rng, level, time, n=N):
     )
 
 
-def learnt(residual, own: Run) -> Noise:
+def learnt(residual, own: NoiseChannel) -> Noise:
     return learn([residual], [columns(len(residual))], [own])
 
 

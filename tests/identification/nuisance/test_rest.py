@@ -9,7 +9,7 @@ from snarelab.identification.fitting.fit import channel_rms, fit
 from snarelab.identification.search.refit import assemble, refitted
 from snarelab.identification.search.rest import fitted
 from snarelab.models.effects import get_effect
-from snarelab.models.model import Placed
+from snarelab.models.model import PlacedEffect
 from snarelab.models.rigid_body import RigidBody
 
 
@@ -55,12 +55,12 @@ def test_what_a_joint_holds_at_its_stops_does_not_spoil_the_fit(tmp_path, roundi
 def test_what_is_added_leaves_no_more_from_a_bad_start(tmp_path):
     """Beside a sensor's gain, presliding hysteresis once ended at 9e6 N·m, and both names were lost."""
     model = recorded(tmp_path, 5)
-    model = model.with_effects([Placed(get_effect("sensor_gain"), "tau.joint1")], {})
+    model = model.with_effects([PlacedEffect(get_effect("sensor_gain"), "tau.joint1")], {})
     experiments = load_experiments(model, [tmp_path / "train.csv"], RigidBody(model.tree))
     known = scales(experiments)
     assembly = assemble(model, None, known)
     before = fit(assembly, fitted(assembly, experiments))
-    more = Placed(get_effect("presliding_hysteresis"), "joint1")
+    more = PlacedEffect(get_effect("presliding_hysteresis"), "joint1")
     start = {f"{more.key}.level": 1e7, f"{more.key}.travel": 1e-6}
     wider = assemble(model.with_effects([more], start), None, known)
     samples = fitted(wider, experiments)

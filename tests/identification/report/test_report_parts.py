@@ -10,8 +10,8 @@ from snarelab.identification.diagnosis import Trace
 from snarelab.identification.report.curves import binned
 from snarelab.identification.report.findings import missing
 from snarelab.identification.report.fit import changes
-from snarelab.identification.report.words import chance, number, percent, spans, unit_words, with_std, words
 from snarelab.report.drawing import thinned
+from snarelab.report.words import chance, number, percent, spans, unit_words, with_std, words
 
 
 def test_thinning_keeps_peaks_ends_and_gaps() -> None:
@@ -70,8 +70,8 @@ def test_numbers_and_units_in_print() -> None:
         "21600",
         "1.20\u2009×\u200910⁻⁷",
     ]
-    assert [percent(x) for x in (0.83, 0.0161, 0.00001)] == ["83.0\u202f%", "1.61\u202f%", "under 0.01\u202f%"]
-    assert [chance(x) for x in (0.999, 0.87, 0.001)] == ["over 99\u202f%", "87\u202f%", "under 1\u202f%"]
+    assert [percent(x, 3) for x in (0.83, 0.0161, 0.00001)] == ["83.0 %", "1.61 %", "under 0.01 %"]
+    assert [chance(x) for x in (0.999, 0.87, 0.001)] == ["over 99 %", "87 %", "under 1 %"]
     assert [unit_words(u) for u in ("N*m*s/rad", "kg*m**2", "s^-1")] == ["N·m·s/rad", "kg·m²", "s⁻¹"]
     assert [unit_words(u) for u in ("N*m*s^2/rad", "N*s^2/m", "N/m**1.5", "1", "N * m")] == [
         "kg·m²",
@@ -92,19 +92,19 @@ def test_edges_of_numbers_in_print() -> None:
         "0.000123",
         "9.99\u2009×\u200910⁻⁵",
     ]
-    assert [percent(x) for x in (0.0, 4.9e-5, 5e-5, 0.0994, 0.0996)] == [
-        "0.00\u202f%",
-        "under 0.01\u202f%",
-        "0.01\u202f%",
-        "9.94\u202f%",
-        "10.0\u202f%",
+    assert [percent(x, 3) for x in (0.0, 4.9e-5, 5e-5, 0.0994, 0.09996)] == [
+        "0 %",
+        "under 0.01 %",
+        "0.01 %",
+        "9.94 %",
+        "10.0 %",
     ]
     assert [chance(x) for x in (0.0, 0.0099, 0.01, 0.99, 0.991)] == [
-        "under 1\u202f%",
-        "under 1\u202f%",
-        "1\u202f%",
-        "99\u202f%",
-        "over 99\u202f%",
+        "under 1 %",
+        "under 1 %",
+        "1 %",
+        "99 %",
+        "over 99 %",
     ]
     nothing = float("nan")
     assert (number(nothing), percent(float("inf")), chance(nothing), spans(())) == ("–", "–", "–", "–")

@@ -162,9 +162,9 @@ def test_each_step_has_two_bars_in_per_cent_and_its_number_beside_each():
     assert third == (AFTER, 0.19, 25.0)
     assert fourth[:2] == (AFTER, 1.19)
     assert [(x.get_text(), x.xy) for x in cast(Any, axes.texts)] == [
-        ("50.0\u202f%", (50.0, -0.19)),
-        ("12.5\u202f%", (12.5, 0.81)),
-        ("25.0\u202f%", (25.0, 0.19)),
+        ("50.0 %", (50.0, -0.19)),
+        ("12.5 %", (12.5, 0.81)),
+        ("25.0 %", (25.0, 0.19)),
     ]
     assert [x.get_text() for x in figure.legends[0].get_texts()] == ["training", "held-out"]
 
@@ -178,7 +178,7 @@ def test_a_candidate_that_was_named_stands_out_of_those_that_were_not():
     figure = drawn(figures.candidates(rows))
     (axes,) = figure.axes
     assert bars(axes) == [(BEFORE, 0.0, 40.0), (BEFORE, 2.0, 12.5), (GREY, 1.0, 25.0)]
-    assert [x.get_text() for x in cast(Any, axes.texts)] == ["40.0\u202f%", "25.0\u202f%", "12.5\u202f%"]
+    assert [x.get_text() for x in cast(Any, axes.texts)] == ["40.0 %", "25.0 %", "12.5 %"]
     shown = axes.get_yticklabels()
     assert [x.get_text() for x in shown] == ["Coulomb friction, joint1", "sensor bias, tau.joint2", "backlash, joint3"]
     assert [x.get_fontweight() for x in shown] == ["bold", "normal", "bold"]

@@ -15,7 +15,7 @@ from snarelab.identification.diagnosis import (
     Limit,
     Location,
     Misfit,
-    Moved,
+    ParameterShift,
     Rival,
     Step,
 )
@@ -55,7 +55,7 @@ def test_steps_are_drawn_from_the_second_on(asked):
     assert rows(content)[0] == ["as <given>", "50.0\u202f%", "25.0\u202f%"]
     assert rows(content)[2] == ["+ two", "6.25\u202f%", "10.0\u202f%"]
     assert re.findall(r'alt="([^"]*)', content) == [
-        "Relative misfit by step; on the held-out recording from 25.0\u202f% to 10.0\u202f%."
+        "Relative misfit by step; on the held-out recording from 25.0 % to 10.0 %."
     ]
     assert asked == [(two,)]
     assert "<figure>" not in fit.step_by_step(diagnosis(steps=two[:1]))[2]
@@ -113,7 +113,10 @@ def test_where_no_candidate_was_named_or_tried_it_says_so(asked):
 
 def test_a_parameter_is_marked_where_it_moved_by_over_two_deviations():
     """Steps of a quarter, and a deviation of an eighth."""
-    kept = [Moved(f"m{i}", "N*m" if i else "", 1.0, after, 0.125) for i, after in enumerate((1.25, 0.75, 1.26, 0.74))]
+    kept = [
+        ParameterShift(f"m{i}", "N*m" if i else "", 1.0, after, 0.125)
+        for i, after in enumerate((1.25, 0.75, 1.26, 0.74))
+    ]
     content = fit.parameters(diagnosis(moved=tuple(kept)))[2]
     assert rows(content) == [
         ["m0", "1.00", "1.25", "± 0.12", "–", ""],

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from bench.arm import random_arm
-from snarelab.identification.fitting.assembly import Assembly
+from snarelab.identification.fitting.assembly import TorqueModel
 from snarelab.identification.fitting.experiment import Experiment, scales
 from snarelab.identification.search.locate import MOST_WINDOWS, locate
 from snarelab.models.effects import get_effect
-from snarelab.models.model import Placed
+from snarelab.models.model import PlacedEffect
 from snarelab.models.rigid_body import RigidBody
 from snarelab.models.urdf import load_urdf
 from snarelab.recordings.condition import Motion
@@ -64,8 +64,8 @@ def found(experiments, effects):
     """`locate` for what effects add to the rigid body's torque; ``{(name, joint): parameters}``."""
 
     def made(entries):
-        placed = [Placed(get_effect(name), at) for name, at in entries]
-        assembly = Assembly(experiments[0].body.tree, placed, None, scales(experiments), {})
+        placed = [PlacedEffect(get_effect(name), at) for name, at in entries]
+        assembly = TorqueModel(experiments[0].body.tree, placed, None, scales(experiments), {})
         theta = np.array([x for values in entries.values() for x in values], float)
         assert len(theta) == len(assembly.slots)
         return [assembly.torque(e, theta) for e in experiments]

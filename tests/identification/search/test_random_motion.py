@@ -11,7 +11,7 @@ from snarelab.errors import InputError
 from snarelab.identification.search import next_experiment as module
 from snarelab.identification.search.next_experiment import NextExperiment, next_experiment, random_motion, rivals
 from snarelab.models.effects import get_effect
-from snarelab.models.model import Placed
+from snarelab.models.model import PlacedEffect
 from snarelab.models.tree import Joint
 
 NAN = np.zeros(3)
@@ -132,9 +132,9 @@ MODEL: Any = Made(
     path="arm.toml",
     system="arm",
     effects=(
-        Placed(get_effect("viscous_friction"), "joint1"),
-        Placed(get_effect("viscous_friction"), "joint2"),
-        Placed(get_effect("sensor_gain"), "tau.joint1"),
+        PlacedEffect(get_effect("viscous_friction"), "joint1"),
+        PlacedEffect(get_effect("viscous_friction"), "joint2"),
+        PlacedEffect(get_effect("sensor_gain"), "tau.joint1"),
     ),
 )
 

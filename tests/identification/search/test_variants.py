@@ -8,7 +8,7 @@ import pytest
 
 from snarelab.identification.search import candidates as module
 from snarelab.identification.search.candidates import (
-    Variant,
+    EffectVariant,
     candidate_columns,
     free_parameters,
     library,
@@ -16,7 +16,7 @@ from snarelab.identification.search.candidates import (
 )
 from snarelab.models.effect import Parameter
 from snarelab.models.effects import effects, get_effect
-from snarelab.models.model import Placed
+from snarelab.models.model import PlacedEffect
 from snarelab.models.tree import Joint, Link, Tree
 
 AXIS, TURNS = np.array([0.0, 0.0, 1.0]), np.eye(3)
@@ -26,7 +26,7 @@ def variant(name, amplitudes, parameters=None, at="joint1"):
     effect = get_effect(name)
     values = np.zeros(len(effect.parameters)) if parameters is None else np.array(parameters, float)
     size = np.zeros(len(amplitudes))
-    return Variant(Placed(effect, at), values, np.array(amplitudes, int), size, size)
+    return EffectVariant(PlacedEffect(effect, at), values, np.array(amplitudes, int), size, size)
 
 
 @pytest.mark.parametrize(
@@ -81,11 +81,11 @@ def assembly(**scales) -> Any:
 
 
 def test_a_grid_is_every_combination_of_shapes_in_the_joints_scale():
-    found = variants(assembly(rate=2.0), Placed(get_effect("joint_elasticity"), "joint1"))
+    found = variants(assembly(rate=2.0), PlacedEffect(get_effect("joint_elasticity"), "joint1"))
     stiffness, damping = (10, 30, 100, 300, 1000, 3000), (0.01, 0.1, 1.0)
     np.testing.assert_allclose([v.parameters for v in found], [(2.0 * k, 2.0 * d) for k in stiffness for d in damping])
     assert {(v.low.tolist()[0], v.high.tolist()[0], len(v.amplitudes)) for v in found} == {(0.0, 1.6, 0)}
-    found = variants(assembly(speed=4.0), Placed(get_effect("stribeck_friction"), "joint1"))
+    found = variants(assembly(speed=4.0), PlacedEffect(get_effect("stribeck_friction"), "joint1"))
     np.testing.assert_allclose([v.parameters for v in found], [(0.0, 4.0 * x) for x in (0.01, 0.03, 0.1, 0.3)])
     assert [v.amplitudes.tolist() for v in found] == 4 * [[0]]
     assert (found[0].low[0], found[0].high[0]) == (0.0, np.inf)
@@ -98,13 +98,13 @@ def shape(name, n):
 @pytest.mark.parametrize(("sizes", "step"), [((6, 6), 1), ((37,), 2), ((72,), 2), ((73,), 3), ((10, 10), 3)])
 def test_a_grid_finer_than_thirty_six_points_is_thinned_evenly(sizes, step):
     effect: Any = Made(parameters=tuple(shape(f"s{k}", n) for k, n in enumerate(sizes)))
-    found = variants(assembly(), Placed(effect, "joint1"))
+    found = variants(assembly(), PlacedEffect(effect, "joint1"))
     whole = list(np.ndindex(*sizes))
     np.testing.assert_allclose([v.parameters - 1 for v in found], whole[::step])
 
 
 def test_the_place_of_a_mass_has_its_slope_at_one_kilogram():
-    (only,) = variants(assembly(), Placed(get_effect("payload_mass"), "link1"))
+    (only,) = variants(assembly(), PlacedEffect(get_effect("payload_mass"), "link1"))
     np.testing.assert_array_equal(only.parameters, [1.0, 0.0, 0.0, 0.0])
     assert only.amplitudes.tolist() == [0, 1, 2, 3]
     np.testing.assert_array_equal(only.low, [0.0, -10.0, -10.0, -10.0])
@@ -115,7 +115,7 @@ def test_several_masses_have_slopes_of_all_of_them_and_of_each_alone():
     masses = [Parameter(f"mass_{a}", "kg", "") for a in "xy"]
     places = [Parameter(f"place_{a}", "m", "", grid=(0.0,)) for a in "xy"]
     effect: Any = Made(parameters=(*masses, *places, shape("frequency", 2)))
-    found = [v.parameters.tolist() for v in variants(assembly(), Placed(effect, "base"))]
+    found = [v.parameters.tolist() for v in variants(assembly(), PlacedEffect(effect, "base"))]
     wanted = [[1, 1, 0, 0], [1, 0, 0, 0], [0, 1, 0, 0]]
     assert found == [[*row, f] for f in (1.0, 2.0) for row in wanted]
 
@@ -125,7 +125,7 @@ def arm(*given, inertia="fixed") -> Any:
     joints = tuple(Joint(f"joint{k + 1}", "revolute", AXIS, k - 1, TURNS, AXIS) for k in range(2))
     links = tuple(Link(f"link{k + 1}", np.arange(1.0, 11.0)) for k in range(2))
     tree = Tree("arm", joints, links, np.zeros(3))
-    placed = tuple(Placed(get_effect(name), at, tuple(hold)) for name, at, *hold in given)
+    placed = tuple(PlacedEffect(get_effect(name), at, tuple(hold)) for name, at, *hold in given)
     return Made(effects=placed, joints=("joint1", "joint2"), tree=tree, inertia=inertia)
 
 

@@ -22,9 +22,9 @@ from snarelab.identification.snare.answer import (
     estimates,
     report_on,
 )
-from snarelab.identification.snare.search import Named, Searched
-from snarelab.identification.snare.trials import Trial
-from snarelab.models.model import Placed
+from snarelab.identification.snare.search import CaptureNaming, CaptureSelection
+from snarelab.identification.snare.trials import CaptureTrial
+from snarelab.models.model import PlacedEffect
 
 MODEL: Any = SimpleNamespace(name="capture")
 
@@ -53,11 +53,11 @@ def simulated(x, placed=(), handles=(), columns=(), likelihood=0.0):
 
 def searched(first, last, named=(), **more):
     given = {"held_first": first, "held_last": last, "opening": (), "rejected": (), "bar": 5.0, **more}
-    return Searched(tuple(named), first, last, **given)
+    return CaptureSelection(tuple(named), first, last, **given)
 
 
 def named(placed, fit, before, after, *, explained=0.6, margin=0.99, rivals=()):
-    return Named(Trial(placed, fit, 30.0, explained), margin, tuple(rivals), before, after)
+    return CaptureNaming(CaptureTrial(placed, fit, 30.0, explained), margin, tuple(rivals), before, after)
 
 
 @pytest.mark.parametrize(
@@ -147,7 +147,7 @@ def test_traces_hold_measured_and_modelled_values_of_each_capture():
 def gap(placed, x, moved, residuals=True):
     """A trial whose simulation differs from what was there in one number."""
     changed = {"position": LEFT["position"] + np.array([[0.0, 0.0, 0.0], [moved, 0.0, 0.0]])}
-    return Trial(placed, fit_of([placed], [x], 0.0, [changed] if residuals else []), 1.0, 0.1)
+    return CaptureTrial(placed, fit_of([placed], [x], 0.0, [changed] if residuals else []), 1.0, 0.1)
 
 
 V = 4 * (0.01 / 6 + 1.5e-4**2)
@@ -213,7 +213,7 @@ def test_a_finding_tells_the_channel_that_it_made_best_and_rivals_that_count(mon
         RivalOdds(PRETENSION, 0.1, True),
         RivalOdds(CLEARANCE, 0.005, True),
         RivalOdds(UMBILICAL, 0.0049, True),
-        RivalOdds(Placed(UMBILICAL.effect, "other"), 0.001, False),
+        RivalOdds(PlacedEffect(UMBILICAL.effect, "other"), 0.001, False),
     ]
     one = named(FRICTION, last, simulated(0.2), simulated(0.3), explained=0.6, margin=0.8, rivals=rivals)
     found = _finding(one, searched(simulated(0.2), last, [one]), [OWN], [OWN])
@@ -226,8 +226,8 @@ def test_a_finding_tells_the_channel_that_it_made_best_and_rivals_that_count(mon
     ]
     assert [r.probability for r in found.rivals] == pytest.approx([0.09, 0.0045, 0.0009])
     assert found.evidence == (
-        "The cables rub on the pin and drag it along where they slide: it explains 60 % of what the model so far left "
-        "over; taking it out again raises the error of pos.target.x on the held-out capture from 70.7 mm to 141 mm."
+        "The cables rub on the pin and drag it along where they slide: it explains 60 % of the remaining "
+        "residual. Without it, the error of pos.target.x on the held-out capture rises from 70.7 mm to 141 mm."
     )
     assert found.parameters["coefficient"].value == pytest.approx(0.2)
     assert found.parameters["coefficient"].std == pytest.approx(np.sqrt(V) / 2)
@@ -265,7 +265,7 @@ def test_a_whole_answer_without_a_name(moved, verdict):
     """What is met is adequate; of 0.4 m of motion 0.3 m missed is something without a name."""
     there = simulated(moved)
     trials = tuple(
-        Trial(p, fit_of([p], [0.1], 0.0), score, explained)
+        CaptureTrial(p, fit_of([p], [0.1], 0.0), score, explained)
         for p, score, explained in ((FRICTION, 1.0, 0.1), (PRETENSION, 2.0, 0.3), (CLEARANCE, -np.inf, 0.0))
     )
     found = searched(there, there, opening=trials, rejected=(UMBILICAL,))

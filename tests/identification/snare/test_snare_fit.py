@@ -208,7 +208,7 @@ def test_broydens_update_agrees_with_the_step_and_shares_what_was_missed_by_squa
     before = {"position": np.array([[1.0, 2.0]])}
     slopes = tuple(({"position": np.array([[a, 0.0]])},) for a in (10.0, 0.1))
     here = fit_of([FRICTION, PRETENSION], [0.1, 200.0], 0.0, [before], slopes=slopes)
-    # Foretold are 10 · 0.06 + 0.1 · 60 = 6.6; 11.6 came.
+    # Predicted are 10 · 0.06 + 0.1 · 60 = 6.6; 11.6 came.
     there = fit_of([FRICTION, PRETENSION], [0.16, 260.0], 1.0, [{"position": np.array([[12.6, 2.0]])}])
     first, second = _broyden(here, there, np.array([0.03, 60.0]))
     np.testing.assert_allclose(first[0]["position"], [[10.0 + 2.0 / 0.03, 0.0]], rtol=1e-12)

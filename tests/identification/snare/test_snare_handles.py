@@ -9,7 +9,7 @@ import pytest
 from snarelab.identification.snare.answer import _size
 from snarelab.identification.snare.handles import HANDLES, Handle, bounds, free, steps, values_of
 from snarelab.models.effects import get_effect
-from snarelab.models.model import Placed
+from snarelab.models.model import PlacedEffect
 
 
 def handle(scale):
@@ -72,8 +72,8 @@ def test_tries_stand_inside_the_bounds_and_differences_apart(name):
 
 
 def test_bounds_steps_and_freedom_come_in_the_order_of_the_effects():
-    friction = Placed(get_effect("contact_friction"), "pin")
-    umbilical = Placed(get_effect("umbilical_stiffness"), "target")
+    friction = PlacedEffect(get_effect("contact_friction"), "pin")
+    umbilical = PlacedEffect(get_effect("umbilical_stiffness"), "target")
     held = replace(friction, hold=("coefficient",))
     low, high = bounds([umbilical, held])
     assert (low.tolist(), high.tolist()) == ([0.0, 0.0], [100.0, 1.5])

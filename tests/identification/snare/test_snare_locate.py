@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from snarelab.identification.snare.fit import Fit
+from snarelab.identification.snare.fit import CaptureFit
 from snarelab.identification.snare.locate import _touch, _windows, locate_capture
-from snarelab.identification.snare.recording import EVERY, Capture, Track, sensed_by
-from snarelab.identification.snare.search import Searched
+from snarelab.identification.snare.recording import EVERY, CaptureRecording, Track, sensed_by
+from snarelab.identification.snare.search import CaptureSelection
 from snarelab.models.snare.parameters import SnareParameters
-from snarelab.models.snare.setup import Setup
+from snarelab.models.snare.setup import CaptureSetup
 from snarelab.models.snare.target import Target
 
 TIMES = np.asarray(EVERY * np.arange(80), float)
@@ -39,14 +39,14 @@ def track(x: ArrayLike = 0.0, y: ArrayLike = 0.0, **force):
 def capture(measured, noise=0.1):
     sensors = dict.fromkeys(measured.force, "wrist")
     scatter = {"position": 1e-4, **dict.fromkeys(measured.force, noise)}
-    setup = Setup(SnareParameters(), Target("free"))
+    setup = CaptureSetup(SnareParameters(), Target("free"))
     carried = dict.fromkeys(measured.force, 1.0)
-    return Capture("a.csv", "target", TIMES, measured, sensors, setup, None, ZERO, scatter, carried, ())
+    return CaptureRecording("a.csv", "target", TIMES, measured, sensors, setup, None, ZERO, scatter, carried, ())
 
 
 def searched(before, after, named: Any = ()):
-    first, last = (Fit((), np.zeros(0), 0.0, (x,), ()) for x in (before, after))
-    return Searched(named, first, last, first, last, (), (), 5.0)
+    first, last = (CaptureFit((), np.zeros(0), 0.0, (x,), ()) for x in (before, after))
+    return CaptureSelection(named, first, last, first, last, (), (), 5.0)
 
 
 def push(size=5.0):

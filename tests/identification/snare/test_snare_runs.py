@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from snarelab.identification.snare.runs import MOST_LOST, Runs
+from snarelab.identification.snare.runs import MOST_LOST, CaptureRuns
 from snarelab.models.snare.parameters import SnareParameters
-from snarelab.models.snare.setup import Setup
+from snarelab.models.snare.setup import CaptureSetup
 from snarelab.models.snare.target import Target
 
 ASKED = [
@@ -24,7 +24,7 @@ class Held:
     """As much of a capture as is simulated: a quarter of a second of it."""
 
     def __init__(self, mass):
-        self.setup = Setup(SnareParameters(), Target("pendulum", mass=mass))
+        self.setup = CaptureSetup(SnareParameters(), Target("pendulum", mass=mass))
         self.drive = None
         self.times = np.arange(6)
 
@@ -38,12 +38,12 @@ def positions(tracks):
 
 
 def test_processes_give_what_one_gives_and_replace_one_that_died():
-    with Runs(CAPTURES, workers=1) as alone:
+    with CaptureRuns(CAPTURES, workers=1) as alone:
         expected = positions(alone(ASKED))
         assert alone.count == 2  # the first and the last are one
         alone(ASKED)
         assert alone.count == 2
-    with Runs(CAPTURES, workers=2) as runs:
+    with CaptureRuns(CAPTURES, workers=2) as runs:
         np.testing.assert_array_equal(positions(runs(ASKED)), expected)
         assert runs.count == 2
         pool = runs._pool
@@ -63,15 +63,15 @@ def test_processes_that_keep_dying_are_not_replaced_for_ever(monkeypatch):
         tried.append(len(keys))
         raise BrokenProcessPool
 
-    monkeypatch.setattr(Runs, "_share_out", dies)
-    with Runs(CAPTURES, workers=2) as runs, pytest.raises(BrokenProcessPool):
+    monkeypatch.setattr(CaptureRuns, "_share_out", dies)
+    with CaptureRuns(CAPTURES, workers=2) as runs, pytest.raises(BrokenProcessPool):
         runs(ASKED)
     assert tried == [2] * (MOST_LOST + 1)
 
 
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="processes are looked up in /proc")
 def test_an_interrupt_ends_the_processes_at_once():
-    runs = Runs(CAPTURES, workers=2)
+    runs = CaptureRuns(CAPTURES, workers=2)
     runs(ASKED)
     assert runs._pool is not None
     numbers = list(runs._pool._processes)

@@ -10,9 +10,9 @@ from captures_by_hand import CLEARANCE, FRICTION, PRETENSION, UMBILICAL, fit_of
 from snarelab.errors import InputError
 from snarelab.identification.snare import search as module
 from snarelab.identification.snare.search import demand_simulated, search, start_at
-from snarelab.identification.snare.trials import Trial
+from snarelab.identification.snare.trials import CaptureTrial
 from snarelab.models.effects import get_effect
-from snarelab.models.model import Placed
+from snarelab.models.model import PlacedEffect
 
 POOL = [FRICTION, PRETENSION, CLEARANCE, UMBILICAL]
 BAR = np.log(4 / 0.005)
@@ -41,7 +41,7 @@ class Rounds:
         self.asked.append((tuple(candidates), tuple(rejected)))
         scores = self.rounds[len(self.asked) - 1]
         return tuple(
-            Trial(p, fit_of((*found.placed, p), np.zeros(len(found.placed) + 1), 0.0), *scores[p])
+            CaptureTrial(p, fit_of((*found.placed, p), np.zeros(len(found.placed) + 1), 0.0), *scores[p])
             for p in candidates
             if p in scores
         )
@@ -125,7 +125,7 @@ def test_rivals_are_candidates_with_more_than_a_fifth_of_the_best_score(monkeypa
 
 def test_a_search_ends_after_four_names_or_with_the_last_candidate(monkeypatch):
     """Five candidates, each of which would be named."""
-    fifth = Placed(get_effect("contact_damping"), "pin")
+    fifth = PlacedEffect(get_effect("contact_damping"), "pin")
     for pool in ([*POOL, fifth], POOL[:2]):
         held = {tuple(pool[:k]): 10.0 * k for k in range(len(pool) + 1)}
         rounds = Rounds(monkeypatch, [{p: (30.0, 0.5)} for p in pool], held, pool)

@@ -1,4 +1,4 @@
-"""One round of a capture's search: which values are tried, what is foreseen of them, and which are fitted."""
+"""One round of a capture's search: which values are tried, what is expected of them, and which are fitted."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from captures_by_hand import CLEARANCE, FRICTION, PRETENSION, UMBILICAL, Straigh
 from snarelab.identification.snare import trials as module
 from snarelab.identification.snare.fit import evaluate, with_slopes
 from snarelab.identification.snare.handles import handle_of
-from snarelab.identification.snare.trials import _energy, _explained, _foreseen, _joint, _most_hopeful, try_all
+from snarelab.identification.snare.trials import _energy, _expected, _explained, _joint, _most_hopeful, try_all
 
 BACK_AND_FORTH = along(*(np.where(np.arange(16) % 2, 1.0, -1.0)))
 RISING = along(*((0.0, 0.01 * k, 0.0) for k in range(16)))
@@ -54,7 +54,7 @@ def test_energy_and_share_explained_count_each_block_by_its_own_scale():
 
 def test_without_parameters_a_try_reaches_what_it_has():
     there = fit_of([FRICTION], [0.1], -3.0, [{"position": np.zeros((1, 3))}])
-    assert _foreseen([], fit_of([], [], -5.0), there)[0] == -3.0
+    assert _expected([], fit_of([], [], -5.0), there)[0] == -3.0
 
 
 def test_a_try_is_foreseen_to_gain_what_the_parameters_that_were_there_make_good():
@@ -63,13 +63,13 @@ def test_a_try_is_foreseen_to_gain_what_the_parameters_that_were_there_make_good
     captures = captures_of(runs, 140.0 * RISING + 0.3 * BACK_AND_FORTH)
     found = with_slopes(captures, evaluate(captures, [PRETENSION], [np.array([100.0])])[0])
     (there,) = evaluate(captures, [PRETENSION, FRICTION], [np.array([100.0, 0.25])])
-    foreseen, moved = _foreseen(captures.captures, found, there)
+    expected, moved = _expected(captures.captures, found, there)
     assert moved == pytest.approx([100.0 + 40.0 / 1.01])
     misses = 40.0**2 * 1e-4 * sum(k * k for k in range(16)), 0.05**2 * 16
     variance = 4 * (sum(misses) / 48 + FLOOR_SQUARED)
     gain = 0.5 * misses[0] / variance * (1 - (0.01 / 1.01) ** 2)
-    assert foreseen == pytest.approx(height(sum(misses)) + gain, rel=1e-9)
-    assert _most_hopeful(captures.captures, found, [there]) == (foreseen, there)
+    assert expected == pytest.approx(height(sum(misses)) + gain, rel=1e-9)
+    assert _most_hopeful(captures.captures, found, [there]) == (expected, there)
 
 
 def test_derivatives_are_believed_as_far_as_four_differences():
@@ -77,13 +77,13 @@ def test_derivatives_are_believed_as_far_as_four_differences():
     captures = captures_of(Straight({PRETENSION: RISING, FRICTION: BACK_AND_FORTH}), 500.0 * RISING)
     found = with_slopes(captures, evaluate(captures, [PRETENSION], [np.array([100.0])])[0])
     (there,) = evaluate(captures, [PRETENSION, FRICTION], [np.array([100.0, 0.0])])
-    assert _foreseen(captures.captures, found, there)[1] == pytest.approx([340.0])
+    assert _expected(captures.captures, found, there)[1] == pytest.approx([340.0])
 
 
 def test_the_most_hopeful_try_is_the_one_foreseen_highest():
     tries = [fit_of([FRICTION], [x], likelihood) for x, likelihood in ((0.1, -4.0), (0.2, -2.0), (0.3, -np.inf))]
-    foreseen, best = _most_hopeful([], fit_of([], [], -5.0), tries)
-    assert foreseen == -2.0
+    expected, best = _most_hopeful([], fit_of([], [], -5.0), tries)
+    assert expected == -2.0
     assert best is tries[1]
 
 
@@ -138,7 +138,7 @@ def test_a_candidates_first_derivative_is_the_secant_to_its_nearest_try(monkeypa
 
 
 def test_a_round_scores_every_candidate_and_fits_those_that_are_hopeful():
-    """Truth is a friction of 0.2. Pretension at right angles only loses; what is foreseen 2 below is not fitted."""
+    """Truth is a friction of 0.2. Pretension at right angles only loses; what is expected 2 below is not fitted."""
     told = []
     _, captures, found = captures_with({FRICTION: BACK_AND_FORTH, PRETENSION: RISING}, 0.2 * BACK_AND_FORTH)
     tried = try_all(Model, captures, found, [PRETENSION, FRICTION], (), told.append)  # pyright: ignore[reportArgumentType]
@@ -167,11 +167,11 @@ def test_a_rejected_candidate_is_tried_but_not_fitted():
     assert {x for (x,) in runs.asked} == {0.08, 0.25}
 
 
-@pytest.mark.parametrize(("foreseen", "fitted"), [(-7.01, False), (-6.99, True), (-np.inf, False)])
-def test_the_best_three_are_fitted_if_they_are_foreseen_to_lose_less_than_two(foreseen, fitted, monkeypatch):
+@pytest.mark.parametrize(("expected", "fitted"), [(-7.01, False), (-6.99, True), (-np.inf, False)])
+def test_the_best_three_are_fitted_if_they_are_foreseen_to_lose_less_than_two(expected, fitted, monkeypatch):
     """L is -5 before; the last of four is never fitted, nor what cannot be simulated."""
     candidates = [CLEARANCE, UMBILICAL, FRICTION, PRETENSION]
-    reached = dict(zip(candidates, (-1.0, -2.0, foreseen, foreseen - 0.001), strict=True))
+    reached = dict(zip(candidates, (-1.0, -2.0, expected, expected - 0.001), strict=True))
     left = ({"position": np.ones((1, 3))},)
 
     def evaluated(_captures, placed, many):

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 from snarelab.errors import InputError
-from snarelab.identification.nuisance.noise import Run
+from snarelab.identification.nuisance.noise import NoiseChannel
 from snarelab.identification.sources.answer import rms
 from snarelab.identification.sources.decide import decide
-from snarelab.identification.sources.source import At, Variant
+from snarelab.identification.sources.source import GridPoint, ModelPoint
 from snarelab.models.effects import get_effect
-from snarelab.models.model import Placed
+from snarelab.models.model import PlacedEffect
 
 N, STEP = 400, 0.02
 TIME = STEP * np.arange(N)
-VISCOUS, COULOMB = (Placed(get_effect(name), "joint1") for name in ("viscous_friction", "coulomb_friction"))
-NONE = At.of((), {}, 1)
+VISCOUS, COULOMB = (PlacedEffect(get_effect(name), "joint1") for name in ("viscous_friction", "coulomb_friction"))
+NONE = ModelPoint.of((), {}, 1)
 
 
 @dataclass
@@ -72,7 +72,7 @@ class Slide:
         return [p for p in (VISCOUS, COULOMB) if p.key not in {x.key for x in placed}]
 
     def variants(self, p):
-        return [Variant(p, {}, (f"{p.key}.{p.effect.parameters[0].name}",))]
+        return [GridPoint(p, {}, (f"{p.key}.{p.effect.parameters[0].name}",))]
 
     def columns(self, i, at, v):
         return self.columns_of(i)[v.placed.key][:, None, None]
@@ -82,7 +82,7 @@ class Slide:
 
     def hangs(self, numbers, linear, could):
         none = np.zeros(N)
-        return [[Run(STEP, (slice(0, N),), none, (none,), none, 0.0)] for _ in numbers]
+        return [[NoiseChannel(STEP, (slice(0, N),), none, (none,), none, 0.0)] for _ in numbers]
 
     def blocks(self, i, x):
         return np.array([b.sum() for b in np.array_split(x, 5)])

@@ -18,7 +18,7 @@ import snarelab.models.effects
 from snarelab.errors import InputError
 from snarelab.models.effect import written_unit
 from snarelab.models.effects import FAMILIES, effects, get_effect
-from snarelab.models.hidden_state import THROUGH, Evaluation, evaluate_law
+from snarelab.models.hidden_state import THROUGH, LawEvaluation, evaluate_law
 
 VOCABULARY = """
 viscous_friction coulomb_friction asymmetric_friction stribeck_friction makkar_friction quadratic_friction
@@ -57,7 +57,7 @@ def draw(parameter, s, rng):
     return drawn if drawn > parameter.low else abs(drawn)
 
 
-def evaluate(effect, s, parameters) -> Evaluation:
+def evaluate(effect, s, parameters) -> LawEvaluation:
     return evaluate_law(effect, s, np.asarray(parameters), dt=DT)
 
 

@@ -8,7 +8,7 @@ from snarelab.errors import InputError
 from snarelab.identification.diagnose import diagnose
 from snarelab.identification.identify import identify
 from snarelab.models.effects import get_effect
-from snarelab.models.model import Placed
+from snarelab.models.model import PlacedEffect
 from snarelab.recordings import read_recording, write_recording
 
 PLACE = (-0.4, 0.3, 0.5)
@@ -23,7 +23,7 @@ def named(folder, name, **inside):
 
 
 def identified(folder, name, **inside):
-    believed = model(folder).with_effects([Placed(get_effect(name), "base")], {})
+    believed = model(folder).with_effects([PlacedEffect(get_effect(name), "base")], {})
     found = identify(believed, [record(folder / "1.csv", 1, **inside)]).to_json()
     return {p["name"]: p for p in found["parameters"]}
 

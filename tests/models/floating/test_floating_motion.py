@@ -15,7 +15,7 @@ from snarelab.models.floating.joint_drive import Drive
 from snarelab.models.floating.motion import FloatingMotion
 from snarelab.models.floating.plant import FloatingPlant
 from snarelab.models.inertia import from_central
-from snarelab.models.model import Placed
+from snarelab.models.model import PlacedEffect
 from snarelab.models.tree import Joint, Link, Tree
 
 TARGET = np.arange(1, 7) / 10
@@ -39,7 +39,9 @@ def flywheel(speed=2.0) -> FloatingArm:
 def wheel(effect: str, values: dict[str, float], stiffness: float = 0.0, speed: float = 2.0) -> FloatingMotion:
     """The flywheel with one effect and a servo."""
     given = {f"{effect}.wheel.{name}": value for name, value in values.items()}
-    return FloatingMotion(flywheel(speed), Drive([stiffness], [0.0], [Placed(get_effect(effect), "wheel")], given))
+    return FloatingMotion(
+        flywheel(speed), Drive([stiffness], [0.0], [PlacedEffect(get_effect(effect), "wheel")], given)
+    )
 
 
 def test_published_run_is_drakes(gains):
@@ -160,7 +162,7 @@ def test_rotor_inertia_slows_the_joint():
 
 def test_hidden_states_move_with_the_joint():
     """A Dahl bristle and Coulomb friction of one level: a spring of stiffness level / travel for small strokes."""
-    placed = [Placed(get_effect(name), "wheel") for name in ("coulomb_friction", "presliding_hysteresis")]
+    placed = [PlacedEffect(get_effect(name), "wheel") for name in ("coulomb_friction", "presliding_hysteresis")]
     values = {
         "coulomb_friction.wheel.level": 2.0,
         "presliding_hysteresis.wheel.level": 2.0,
@@ -199,9 +201,9 @@ def test_bad_drives_are_named(gains):
     with pytest.raises(InputError, match=r"stiffness is \[1.0, 2.0\]; give 1 finite numbers >= 0"):
         FloatingMotion(arm, Drive([1.0, 2.0], [1.0]))
     with pytest.raises(InputError, match="coulomb_friction at 'elbow'; this arm has wheel"):
-        FloatingMotion(arm, Drive(effects=[Placed(get_effect("coulomb_friction"), "elbow")]))
+        FloatingMotion(arm, Drive(effects=[PlacedEffect(get_effect("coulomb_friction"), "elbow")]))
     with pytest.raises(InputError, match="joint_elasticity is no torque at a joint"):
-        FloatingMotion(arm, Drive(effects=[Placed(get_effect("joint_elasticity"), "wheel")]))
+        FloatingMotion(arm, Drive(effects=[PlacedEffect(get_effect("joint_elasticity"), "wheel")]))
     with pytest.raises(InputError, match="needs the speed limit of 'wheel', which is inf"):
         wheel("coulomb_friction", {"level": 1.0}, speed=np.inf)
     with pytest.raises(InputError, match=r"coulomb_friction.wheel.level is -1; allowed is 0 to inf"):

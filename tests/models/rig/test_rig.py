@@ -10,12 +10,12 @@ from scipy.spatial.transform import Rotation
 
 from bench.arm import random_arm
 from bench.drake_rig import rig_torque
-from snarelab.identification.fitting.assembly import Assembly
+from snarelab.identification.fitting.assembly import TorqueModel
 from snarelab.identification.fitting.base_parameters import base_parameters
 from snarelab.identification.fitting.experiment import Experiment, scales
 from snarelab.models.effects import get_effect
 from snarelab.models.inertia import to_central
-from snarelab.models.model import Placed, places
+from snarelab.models.model import PlacedEffect, places
 from snarelab.models.rig.kinematics import slides, sling_map
 from snarelab.models.rig.points import point_motion
 from snarelab.models.rig.rig import Rig, Sling, built_in_rig, hang_unit_loads
@@ -71,7 +71,7 @@ def loaded(rig, seed):
     """Slide friction at every slide and a tension error on every sling that can turn a joint, drawn at random."""
     rng = np.random.default_rng(seed)
     names = ("slide_friction", "sling_tension_error")
-    effects = [Placed(get_effect(name), at) for name in names for at in places(get_effect(name), rig)]
+    effects = [PlacedEffect(get_effect(name), at) for name in names for at in places(get_effect(name), rig)]
     values = {}
     for p in effects:
         low, high = SLIDE if p.effect.at == "slide" else PULL
@@ -95,7 +95,7 @@ def drake_torque(rig, m, values, under_gravity):
 
 def modelled(rig, m, effects, values):
     experiment = Experiment(m, RigidBody(rig))
-    assembly = Assembly(rig, effects, None, scales([experiment]), values)
+    assembly = TorqueModel(rig, effects, None, scales([experiment]), values)
     return assembly.torque(experiment, np.array([values[s.key] for s in assembly.slots]))
 
 
@@ -136,9 +136,9 @@ def test_joint_1_does_not_feel_any_vertical_force():
         effect = get_effect(name)
         for at in places(effect, rig):
             experiment = Experiment(m, RigidBody(rig))
-            plain = Assembly(rig, [], None, scales([experiment]), {})
+            plain = TorqueModel(rig, [], None, scales([experiment]), {})
             numbers = {f"{name}.{at}.{p.name}": 3.0 for p in effect.parameters}
-            with_it = Assembly(rig, [Placed(effect, at)], None, scales([experiment]), numbers)
+            with_it = TorqueModel(rig, [PlacedEffect(effect, at)], None, scales([experiment]), numbers)
             change = with_it.torque(experiment, with_it.start) - plain.torque(experiment, plain.start)
             assert np.all(change[:, 0] == 0), at
             assert not any(b.channel == 0 for b in with_it.evaluate(experiment, with_it.start).blocks)
@@ -150,14 +150,14 @@ def test_in_balance_the_arm_moves_as_without_gravity():
     wanted = RigidBody(rig).torque(m.q, m.qd, m.qdd, gravity=np.zeros(3))
     np.testing.assert_allclose(modelled(rig, m, [], {}), wanted, rtol=0, atol=1e-9)
     experiment = Experiment(m, RigidBody(rig))
-    free = Assembly(rig, [], base_parameters(experiment.body), scales([experiment]), {})
+    free = TorqueModel(rig, [], base_parameters(experiment.body), scales([experiment]), {})
     np.testing.assert_allclose(free.torque(experiment, free.start), wanted, rtol=0, atol=1e-6)
 
 
 def test_what_the_slings_do_not_know_of_shows_under_gravity():
     """A payload is lifted by no sling: the torque is that of the payload's own weight and inertia."""
     rig, m = built_in_rig(), motion(built_in_rig())
-    payload = Placed(get_effect("payload_mass"), "link7")
+    payload = PlacedEffect(get_effect("payload_mass"), "link7")
     values = {"payload_mass.link7.mass": 5.0} | {f"payload_mass.link7.{a}": 0.1 for a in "xyz"}
     change = modelled(rig, m, [payload], values) - modelled(rig, m, [], {})
     held = np.array(to_central(rig.links[6].phi)[1]) + 0.1
@@ -176,7 +176,7 @@ def test_a_boom_and_its_slings_share_a_misfit(name, link):
     stiffness, suspension, misfit = 4e4, 900.0, 1e-3
     place = rig.links[link].name
     p = {f"{name}.{place}.torque": stiffness * misfit, f"{name}.{place}.radius": np.sqrt(stiffness / suspension)}
-    change = modelled(rig, m, [Placed(get_effect(name), place)], p) - modelled(rig, m, [], {})
+    change = modelled(rig, m, [PlacedEffect(get_effect(name), place)], p) - modelled(rig, m, [], {})
     end, beyond = rig.joints[link + 1].translation, rig.outboard(link)
 
     def heights(q, angle):

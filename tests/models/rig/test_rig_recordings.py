@@ -9,7 +9,7 @@ import xarray as xr
 
 from bench.drake_rig import rig_torque
 from snarelab.identification.diagnose import diagnose
-from snarelab.identification.fitting.assembly import Assembly
+from snarelab.identification.fitting.assembly import TorqueModel
 from snarelab.identification.fitting.experiment import load_experiments, scales
 from snarelab.identification.fitting.fit import channel_rms
 from snarelab.identification.identify import identify
@@ -73,7 +73,7 @@ def model(folder, text):
 def residual(given, path):
     """RMS of what the model leaves of each channel [N·m]."""
     experiments = load_experiments(given, [path], RigidBody(given.tree))
-    assembly = Assembly(given.tree, given.effects, None, scales(experiments), given.values)
+    assembly = TorqueModel(given.tree, given.effects, None, scales(experiments), given.values)
     return channel_rms(assembly, experiments, assembly.start)[0]
 
 

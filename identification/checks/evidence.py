@@ -1,0 +1,204 @@
+"""How well a reading of the data goes with the model: evidence of a joint weighted least-squares fit.
+
+Torque of channel c is the rigid body's, tau0, plus columns for all that a sound machine may have besides, each with a
+prior that says how much of it there can be: ``y = tau0 + X b + e``, b between bounds and N(0, width²). Masses, centres
+and inertias are felt on every channel, so that all channels are fitted at once. The noise of each channel is not known;
+with n_c independent samples its evidence is, but for constants of the data,
+
+    log p(y) = - sum_c n_c / 2 * log(e_c' e_c / y_c' y_c + FLOOR²) - 1/2 sum_k (b_k / width_k)²,
+
+at its maximum over b, which reweighting finds. Residuals count relative to the channel, so that readings that scale it
+are compared on the same data.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+
+from ...models.inertia import to_central
+from ...models.rigid_body import RigidBody
+from ...models.tree import Tree
+from .reading import Reading, Samples
+
+Array = NDArray[np.float64]
+
+FLOOR = 0.015
+"""Relative residual below which nothing is told: models of sound arms leave that much."""
+
+ROUNDS = 4
+"""Reweightings; the channels' noise settles within them."""
+
+WAYS = 7
+"""Ways in which a link, and a joint with its sensors, may differ from the robot's file."""
+
+GAIN = 0.2
+"""One standard deviation of a torque channel's gain; it is the last of a joint's ways."""
+
+STILL = 0.02
+"""Share of a joint's largest speed below which its direction is not known, and friction bends."""
+
+
+@dataclass(frozen=True, eq=False)
+class ReadingFit:
+    """A reading's fit.
+
+    ``value`` is its log evidence, ``relative`` (C,) each channel's residual over its torque, ``prior`` the price of the
+    parameters in nats, ``residual`` (n, C) relative to the channel's RMS.
+    """
+
+    value: float
+    relative: Array
+    prior: float
+    residual: Array
+    parameters: Array
+
+
+class CheckBasis:
+    """Samples, rigid body and priors that all readings are compared on.
+
+    Parameters
+    ----------
+    body : RigidBody
+    samples : Samples
+    free : bool
+        Whether inertial parameters are identified, so that the URDF's are little more than a guess.
+    counted : array (J,)
+        Independent samples of each channel; 0 leaves a channel out.
+    """
+
+    def __init__(self, body: RigidBody, samples: Samples, free: bool, counted: Array) -> None:
+        """Work out once what links may differ by."""
+        self.body, self.samples, self.counted = body, samples, counted
+        self.spread, self.least = _inertial_directions(body.tree, 3.0 if free else 1.0)
+
+    def fit(
+        self,
+        reading: Reading,
+        columns: tuple[Array, Array, Array] | None = None,
+        bounded: bool = True,
+        without: NDArray[np.bool_] | None = None,
+    ) -> ReadingFit:
+        """Evidence of a reading.
+
+        ``columns`` (n, J, k), their widths and lower bounds (k,) come beside the usual; samples ``without`` (n, J) do
+        not count in the fit, but stand in its residual.
+        """
+        samples = self.samples.under(reading)
+        y, design, low = self.design(samples, reading.gravity, columns)
+        # A channel brings its independent samples along where another reading gives it to another joint.
+        counted = self.counted[reading.torque_source]
+        used = counted > 0
+        size = np.sqrt(np.mean(samples.tau**2, axis=0)) + 1e-300
+        y, design = (y / size)[:, used], (design / size[:, None])[:, used]
+        counted, n = counted[used], len(y)
+        scale = np.sum((samples.tau / size)[:, used] ** 2, axis=0)
+        kept = np.ones_like(y) if without is None else 1.0 - without[:, used]
+        told = design * kept[:, :, None]
+        # a matrix product a channel: einsum would be ten times slower
+        grams = np.stack([told[:, c].T @ told[:, c] for c in range(len(counted))])
+        rights = np.stack([told[:, c].T @ y[:, c] for c in range(len(counted))])
+        weights, b, residual = counted / (np.sum(y**2, axis=0) + FLOOR**2 * scale), np.zeros(design.shape[2]), y
+        for _ in range(ROUNDS if bounded else 2):
+            matrix = np.tensordot(weights, grams, 1) + np.eye(len(b))
+            right = weights @ rights
+            b = np.linalg.solve(matrix, right)
+            if bounded and (b < low).any():
+                upper = np.linalg.cholesky(matrix).T
+                b = lsq_linear(upper, np.linalg.solve(upper.T, right), (low, np.inf), method="bvls").x
+            residual = y - design @ b
+            weights = counted / (np.sum((residual * kept) ** 2, axis=0) + FLOOR**2 * scale)
+        share = np.sum((residual * kept) ** 2, axis=0) / scale
+        prior = 0.5 * float(b @ b)
+        value = -0.5 * float(counted @ np.log(share + FLOOR**2)) - prior - 0.5 * reading.free * np.log(max(n, 2))
+        relative = np.full(len(used), np.nan)
+        relative[used] = np.sqrt(share)
+        whole = np.zeros((n, len(used)))
+        whole[:, used] = residual
+        return ReadingFit(float(value), relative, prior, whole, b)
+
+    def design(
+        self, samples: Samples, gravity: Array | None, columns: tuple[Array, Array, Array] | None
+    ) -> tuple[Array, Array, Array]:
+        """Torque less the rigid body's (n, J), columns in units of their widths (n, J, P), lower bounds (P,)."""
+        q, qd, qdd = samples.q, samples.qd, samples.qdd
+        regressor = self.body.regressor(q, qd, qdd, gravity=gravity)
+        own = regressor @ self.body.tree.phi
+        inertial = regressor @ self.spread
+        joints, lows = _joint_columns(samples, own, self.body.mass_matrix(q[:1])[0].diagonal())
+        parts, low = [inertial, joints], [self.least, lows]
+        if columns is not None:
+            extra, widths, bounds = columns
+            parts.append(extra * widths)
+            low.append(bounds / widths)
+        return samples.tau - own, np.concatenate(parts, axis=2), np.concatenate(low)
+
+
+def _inertial_directions(tree: Tree, wide: float) -> tuple[Array, Array]:
+    """How links may differ from the robot's file (10 L, 7 L), one standard deviation each, and lower bounds (7 L,).
+
+    Of each link: mass and all that goes with it by 30 %; loads of 10 % of the whole robot's mass, at its centre and as
+    far out again; its centre along three axes by 6 % of its size, and 1 % of the whole robot's mass as far; its own
+    inertia by half. ``wide`` times that where the model file says that inertia is free.
+    """
+    whole = sum(float(link.phi[0]) for link in tree.links)
+    reach = max((float(np.linalg.norm(joint.translation)) for joint, *_ in tree.bodies), default=0.0)
+    columns, low = [], []
+    for k, link in enumerate(tree.links):
+        mass, com, inertia = to_central(link.phi)
+        extent = np.sqrt(max(float(np.trace(inertia)), 0.0) / (2 * mass)) if mass > 0 else 0.0
+        size = extent + float(np.linalg.norm(com)) + 0.3 * reach
+        steps = [(0.3 * link.phi, -3.0)]
+        load = 0.1 * whole
+        for point in (com, 2.0 * com):
+            about = load * (point @ point * np.eye(3) - np.outer(point, point))
+            steps.append((np.concatenate([[load], load * point, about[np.triu_indices(3)]]), 0.0))
+        for axis in np.eye(3):
+            moved = (0.06 * mass + 0.01 * whole) * size * axis
+            change = com @ moved * 2 * np.eye(3) - np.outer(com, moved) - np.outer(moved, com)
+            steps.append((np.concatenate([[0.0], moved, change[np.triu_indices(3)]]), -np.inf))
+        steps.append((np.concatenate([np.zeros(4), 0.5 * inertia[np.triu_indices(3)]]), -2.0))
+        for step, bound in steps:
+            column = np.zeros(10 * len(tree.links))
+            column[10 * k : 10 * k + 10] = wide * step
+            columns.append(column)
+            low.append(bound / wide)
+    return np.stack(columns, 1), np.array(low)
+
+
+def _joint_columns(samples: Samples, own: Array, inertia: Array) -> tuple[Array, Array]:
+    """What joints and sensors of a sound machine may add (n, J, 7 J), one standard deviation each; lower bounds.
+
+    Viscous, Coulomb and load-dependent friction (not negative), a rotor's inertia (neither), a spring, a bias, a gain.
+    Behind a gear a rotor is often all the inertia that a light joint feels, so that it may be all of the torque.
+    """
+    n, n_joints = own.shape
+    rms = np.sqrt(np.mean(samples.tau**2, axis=0)) + 1e-300
+    every = []
+    for j in range(n_joints):
+        qd, size = samples.qd[:, j], rms[j]
+        fast = np.sqrt(np.mean(qd**2)) + 1e-300
+        sign = np.tanh(qd / (STILL * np.abs(qd).max() + 1e-300))
+        place = samples.q[:, j] - np.mean(samples.q[:, j])
+        load = own[:, j] * min(1.0, size / (np.sqrt(np.mean(own[:, j] ** 2)) + 1e-300))
+        columns = [
+            (qd / fast * size, 0.0),
+            (sign * size, 0.0),
+            (np.abs(load) * sign * 0.3, 0.0),
+            (
+                samples.qdd[:, j] * max(2.0 * inertia[j], size / (np.sqrt(np.mean(samples.qdd[:, j] ** 2)) + 1e-300)),
+                0.0,
+            ),
+            (place / (np.sqrt(np.mean(place**2)) + 1e-300) * 0.3 * size, -np.inf),
+            (np.full(n, 0.3 * size), -np.inf),
+            (own[:, j] * GAIN, -2.5),
+        ]
+        every.append(columns)
+    width = len(every[0])
+    made, low = np.zeros((n, n_joints, width * n_joints)), np.zeros(width * n_joints)
+    for j, columns in enumerate(every):
+        for k, (values, bound) in enumerate(columns):
+            made[:, j, width * j + k] = values
+            low[width * j + k] = bound
+    return made, low

@@ -1,0 +1,155 @@
+"""What always stands beside an explanation: the baseline's parameters, the tolerance of the masses, small curves."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..deciding import BASELINE, BASELINE_OWN, BASELINE_SHAPE, BENDS, DISCREPANCY, LAW_ERROR
+from ..fitting.assembly import TorqueModel
+from ..fitting.experiment import Experiment
+from ..fitting.fit import Fit
+from ..fitting.problem import gather
+from ..nuisance.curve import SMALL
+from ..search.refit import carry
+from .hypotheses import ColumnSource, Curves, coordinate, lagging, remembers
+from .pool import CandidateColumns
+
+Array = NDArray[np.float64]
+Part = tuple[NDArray[np.int_], Array]
+"""Positions (p,) among all that stands beside, and columns (n, p) in units of their prior deviation."""
+
+
+@dataclass(frozen=True)
+class NuisanceColumns:
+    """``parts[i][c]`` of recording i and channel c; ``tolerant``: where the masses' tolerance stands, one part each."""
+
+    parts: list[list[Part]]
+    count: int
+    tolerant: slice
+    baseline: list[list[Part]]
+    """The baseline's own columns, in units of the parameters."""
+    more: tuple[float, ...] = ()
+    """Tolerances beyond `TOLERANCES` that may be chosen."""
+
+    def weight(self, tolerance: float) -> Array:
+        """Factors on the prior deviations (count,) for masses that are known to a share."""
+        weight = np.ones(self.count)
+        weight[self.tolerant] = tolerance
+        return weight
+
+
+def beside(
+    along: ColumnSource,
+    found: Fit,
+    by_words: Curves,
+    columns: CandidateColumns,
+    nameless: Mapping[tuple[int, str], float],
+) -> NuisanceColumns:
+    """All of it for some recordings under a fit; ``nameless`` curves have a size of their own."""
+    assembly, n, n_channels = found.assembly, along.n_train, len(along.scale)
+    blocks = [assembly.residual(e, found.theta)[1] for e in along.instruments]
+    baseline = [
+        [_filled(gather(b, c), len(e.measured)) for c in range(n_channels)]
+        for b, e in zip(blocks, along.instruments, strict=True)
+    ]
+    spread = _spread(found, baseline[:n], along.scale)
+    parts: list[list[list[Part]]] = [[[(index, x * spread[index])] for index, x in row] for row in baseline]
+    count = len(found.theta)
+    tolerant = slice(count, count)
+    if assembly.base is None:
+        one = inertial_part(assembly)
+        tolerant = slice(count, count + len(one))
+        for row, e in zip(parts, along.instruments, strict=True):
+            for c, own in enumerate(row):
+                own.append((np.arange(tolerant.start, tolerant.stop), e.to_band(e.regressor[:, c], c) * one))
+        count = tolerant.stop
+    sizes = _small(found, baseline[:n], along.scale)
+    for (c, words), item in by_words.items():
+        size = float(np.hypot(sizes.get((c, words), 0.0), nameless.get((c, words), 0.0)))
+        if size > 0:
+            for i, row in enumerate(parts):
+                index = count + np.arange(len(item.index))
+                row[c].append((index, columns.some(i, c, item.index) * (size * item.spread)))
+            count += len(item.index)
+    for p in assembly.placed:
+        if not remembers(p):
+            continue
+        rest = assembly.keep([x for x in assembly.placed if x.key != p.key], found.theta)
+        left = carry(found, rest)
+        made = [e.motion.to_band(assembly.torque(e, found.theta) - rest.torque(e, left)) for e in along.instruments]
+        item = lagging(along, {c: [x[:, [c]] for x in made] for c in range(n_channels)}, columns)
+        rms = np.sqrt(np.mean(np.concatenate(made[:n]) ** 2, axis=0))
+        size = BENDS[0] * float(np.max(rms / along.scale)) * item.spread
+        for i, row in enumerate(parts):
+            for c in range(n_channels):
+                row[c].append((count + np.arange(2), columns.some(i, c, item.index) * size))
+        count += 2
+    joined = [[_joined(own) for own in row] for row in parts]
+    return NuisanceColumns(joined, count, tolerant, baseline)
+
+
+def _small(found: Fit, baseline: Sequence[Sequence[Part]], scale: Array) -> dict[tuple[int, str], float]:
+    """Sizes of the small curves beside every explanation, by channel and words [RMS torque of the channel].
+
+    No law of the model is exact: a curve over what it runs over is a share of what the law does there.
+    """
+    sizes = {(c, words): DISCREPANCY**2 for c in range(len(scale)) for words in SMALL}
+    assembly, shapes = found.assembly, _shapes(found.assembly)
+    for p in assembly.placed:
+        words = coordinate(p.effect)
+        own = [int(i) for i in assembly.index_of(p) if not shapes[i]]
+        if words is None or not own:
+            continue
+        c = assembly.joint_of(p)
+        index = baseline[0][c][0]
+        at = [int(np.flatnonzero(index == i)[0]) for i in own if i in index]
+        torque = np.concatenate([row[c][1][:, at] @ found.theta[index[at]] for row in baseline])
+        share = float(np.sqrt(np.mean(torque**2))) / scale[c]
+        sizes[c, words] = sizes.get((c, words), 0.0) + (LAW_ERROR * share) ** 2
+    return {key: float(np.sqrt(v)) for key, v in sizes.items()}
+
+
+def _filled(part: Part, n: int) -> Part:
+    index, x = part
+    return (index, x) if len(index) else (index, np.zeros((n, 0)))
+
+
+def _joined(own: Sequence[Part]) -> Part:
+    return np.concatenate([index for index, _ in own]), np.concatenate([x for _, x in own], axis=1)
+
+
+def _spread(found: Fit, baseline: Sequence[Sequence[Part]], scale: Array) -> Array:
+    """Prior deviation of each of the baseline's parameters about its fit (P,)."""
+    size = np.zeros(len(found.theta))
+    for c in range(len(scale)):
+        index = baseline[0][c][0]
+        if len(index):
+            rms = np.sqrt(np.mean(np.concatenate([row[c][1] for row in baseline]) ** 2, axis=0))
+            np.maximum.at(size, index, rms / scale[c])
+    own = np.abs(found.theta)
+    spread = np.where(size > 0, BASELINE_OWN * own + BASELINE / np.maximum(size, 1e-12), 0.0)
+    return np.where(_shapes(found.assembly), np.minimum(spread, BASELINE_SHAPE * own), spread)
+
+
+def _shapes(assembly: TorqueModel) -> NDArray[np.bool_]:
+    """Parameters that the torque is not linear in (P,)."""
+    shapes = {(p.effect.name, p.at, x.name) for p in assembly.placed for x in p.effect.parameters if x.grid}
+    return np.array([(s.effect, s.at, s.name) in shapes for s in assembly.slots], bool)
+
+
+def inertial_part(assembly: TorqueModel) -> Array:
+    """The unit of every link's inertial parameters (10 L,): its mass, that times its reach, and times its square.
+
+    The reach is the radius of gyration about the link's frame, √(trace(I) / m).
+    """
+    phi = assembly.phi.reshape(-1, 10)
+    mass = np.abs(phi[:, 0])
+    reach = np.sqrt(np.maximum(np.abs(phi[:, 4] + phi[:, 7] + phi[:, 9]) / np.maximum(mass, 1e-9), 1e-6))
+    return np.stack([mass, *[mass * reach] * 3, *[mass * reach**2] * 6], axis=1).ravel()
+
+
+def regressor_columns(e: Experiment, channel: int) -> Array:
+    """Torque by every inertial parameter in the analysis band (n_band, 10 L)."""
+    return e.to_band(e.regressor[:, channel], channel)

@@ -1,0 +1,1 @@
+"""Cases that any tool can answer: written without answers, and scored from a small JSON file."""

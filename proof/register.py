@@ -1,0 +1,174 @@
+"""Registered runs: what is run, on which seeds and by which tool is committed before it is run.
+
+``registered.json`` beside this file holds the digests of the tool's and of the generators' sources, the seeds, the
+number of cases of each generator, and the bars. ``python -m proof register`` writes it, ``verify`` tells whether the
+tree is still the registered one, and ``registered --hours H`` runs on for so long, from where it was.
+"""
+
+import json
+import subprocess
+import time
+from collections.abc import Callable, Mapping, Sequence
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+from .benchmark.case_set import GENERATORS
+from .drives.score import score, sources
+from .drives.table import figures, read, table
+from .seal import ROOT, digest, write_json
+
+REGISTERED = Path(__file__).with_name("registered.json")
+FOLDER = Path("build/proof/registered")
+LONGEST = 300.0  # s, then a diagnosis counts as none
+
+BARS = {
+    "clean: a false name": [0.02, "at most"],
+    "single 0.5x: its name at its place": [0.75, "at least"],
+    "single 1x: its name at its place": [0.90, "at least"],
+    "single 2x and above: its name at its place": [0.95, "at least"],
+    "place right, of names that are told": [0.95, "at least"],
+    "pairs: both told, and nothing wrong besides": [0.75, "at least"],
+    "laws without a name: told as unknown": [0.90, "at least"],
+    "faulty recordings: told as a fault of the data": [0.90, "at least"],
+    "true values of right names within two deviations": [0.90, "at least"],
+}
+"""Of each generator."""
+
+
+def code(generator: str) -> str:
+    """SHA-256 over a generator's sources."""
+    return digest(sorted((ROOT / "proof" / generator).rglob("*.py")))
+
+
+def now() -> dict[str, Any]:
+    """What the tree is."""
+    return {"tool": sources(), "generators": {name: code(name) for name in GENERATORS}, "bars": BARS}
+
+
+def register(seeds: Mapping[str, Sequence[int]], cases: int, *, today: str = "", commit: str = "") -> dict[str, Any]:
+    """What is to be run, as it is committed.
+
+    Parameters
+    ----------
+    seeds : mapping of str to sequence of int
+        Of each generator; none that was looked at before.
+    cases : int
+        Of each seed.
+    today, commit : str
+        By default today, and the commit that is checked out.
+
+    Raises
+    ------
+    ValueError
+        A generator or number that is none, or sources that are not committed.
+    """
+    for name, own in seeds.items():
+        if name not in GENERATORS:
+            raise ValueError(f"{name!r} is no generator; there are {', '.join(GENERATORS)}")
+        if not own or any(seed < 100 for seed in own):
+            raise ValueError(
+                f"seeds {list(own)} of {name}: give some from 100 on; those below are for work on the tool"
+            )
+    if cases < 1:
+        raise ValueError(f"{cases} cases a seed: give 1 or more")
+    if not commit:
+        changed = _git("status", "--porcelain", "identification", "models", "recordings", "checks", "proof")
+        if changed:
+            raise ValueError(f"commit first, then register: {changed.splitlines()[0].strip()} is not committed")
+        commit = _git("rev-parse", "HEAD")
+    about = {"date": today or date.today().isoformat(), "commit": commit, "cases": cases}
+    return about | {"seeds": {name: list(own) for name, own in seeds.items()}} | now()
+
+
+def differences(registered: Mapping[str, Any]) -> list[str]:
+    """What of the tree is not as it was registered, a line each."""
+    tree, found = now(), []
+    if tree["tool"] != registered["tool"]:
+        found.append(f"the tool's sources are not those registered at {registered['commit'][:12]}")
+    for name, own in registered["generators"].items():
+        if tree["generators"].get(name) != own:
+            found.append(f"the sources of the generator {name} are not those registered")
+    if json.loads(json.dumps(tree["bars"])) != registered["bars"]:
+        found.append("the bars are not those registered")
+    return found
+
+
+def load() -> dict[str, Any]:
+    """What was registered last; raises ValueError where nothing was."""
+    if not REGISTERED.exists():
+        raise ValueError(f"{REGISTERED} is not there: nothing was registered; python -m proof register --help")
+    return json.loads(REGISTERED.read_text(encoding="utf-8"))
+
+
+def run(
+    registered: Mapping[str, Any],
+    hours: float,
+    tell: Callable[[str], None] = print,
+    folder: Path = FOLDER,
+    clock: Callable[[], float] = time.monotonic,
+) -> dict[str, Path]:
+    """Draw and diagnose what was registered, generators in turns, until the time is over; the answers' files.
+
+    Raises
+    ------
+    ValueError
+        The tree is not the registered one.
+    """
+    wrong = differences(registered)
+    if wrong:
+        raise ValueError("; ".join(wrong))
+    end = clock() + 3600.0 * hours
+    work = [(name, seed) for name, own in registered["seeds"].items() for seed in own]
+    drawn = {
+        (name, seed): GENERATORS[name](folder / name / str(seed), seed, registered["cases"], tell=tell)
+        for name, seed in work
+    }
+    files = {name: folder / f"{name}.jsonl" for name in registered["seeds"]}
+    order = [(name, seed, k) for k in range(registered["cases"]) for name, seed in work]
+    for name, seed, k in order:
+        if clock() >= end:
+            tell("the time is over; the same command goes on where it was")
+            break
+        score([drawn[name, seed][k]], files[name].with_name(f"{name}-{seed}.jsonl"), LONGEST, tell)
+    for name, own in registered["seeds"].items():
+        parts = [files[name].with_name(f"{name}-{seed}.jsonl") for seed in own]
+        files[name].write_text("".join(p.read_text(encoding="utf-8") for p in parts if p.exists()), encoding="utf-8")
+    return files
+
+
+def result(registered: Mapping[str, Any], files: Mapping[str, Path]) -> dict[str, Any]:
+    """Figures of each generator beside their bars."""
+    found: dict[str, Any] = {"registered": dict(registered), "generators": {}}
+    for name, path in files.items():
+        rows = {f.name: f for f in figures(read(path))}
+        found["generators"][name] = {
+            key: {"value": f.value, "cases": f.count, "interval": f.interval, **_bar(registered, key, f.value)}
+            for key, f in rows.items()
+        }
+    return found
+
+
+def _bar(registered: Mapping[str, Any], key: str, value: float | None) -> dict[str, Any]:
+    if key not in registered["bars"]:
+        return {}
+    bar, way = registered["bars"][key]
+    met = None if value is None else value <= bar if way == "at most" else value >= bar
+    return {"bar": bar, "way": way, "met": met}
+
+
+def printed(files: Mapping[str, Path]) -> str:
+    """Tables of all generators."""
+    return "\n\n".join(f"{name}\n{table(read(path))}" for name, path in files.items())
+
+
+def write(registered: Mapping[str, Any]) -> None:
+    """Into the file that is committed."""
+    write_json(REGISTERED, dict(registered))
+
+
+def _git(*words: str) -> str:
+    done = subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True)
+    if done.returncode != 0:
+        raise ValueError(f"git {words[0]} failed: {done.stderr.strip()}")
+    return done.stdout.strip()

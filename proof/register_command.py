@@ -1,0 +1,59 @@
+"""``python -m proof register``, ``verify`` and ``registered``: a proof that was announced before it was run."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+COMMANDS = ("register", "verify", "registered")
+
+
+def main(words: Sequence[str]) -> int:
+    """Read the arguments and do it."""
+    parser = argparse.ArgumentParser(prog="python -m proof", description=(__doc__ or "").splitlines()[0])
+    commands = parser.add_subparsers(dest="command", required=True)
+    registering = commands.add_parser("register", help="write proof/registered.json, to be committed before the run")
+    registering.add_argument("--drives", type=int, nargs="+", default=[], metavar="SEED")
+    registering.add_argument("--played", type=int, nargs="+", default=[], metavar="SEED")
+    registering.add_argument("--cases", type=int, default=75, help="of each seed (default: 75)")
+    commands.add_parser("verify", help="tell whether the tree is the registered one")
+    running = commands.add_parser("registered", help="run what was registered; resumed")
+    running.add_argument("--hours", type=float, default=1.0)
+    running.add_argument("--folder", type=Path, default=Path("build/proof/registered"))
+    given = parser.parse_args(words)
+    try:
+        return _do(given)
+    except (ValueError, FileNotFoundError) as error:
+        print(error, file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("stopped; the same command goes on where it was", file=sys.stderr)
+        return 130
+
+
+def _do(given: argparse.Namespace) -> int:
+    from . import register
+    from .seal import write_json
+
+    def tell(words: str) -> None:
+        print(words, flush=True)
+
+    if given.command == "register":
+        seeds = {name: own for name in ("drives", "played") if (own := getattr(given, name))}
+        if not seeds:
+            raise ValueError("no seeds: give --drives SEED... or --played SEED..., none that was looked at before")
+        register.write(register.register(seeds, given.cases))
+        tell(f"{register.REGISTERED}: commit it, then python -m proof registered")
+        return 0
+    registered = register.load()
+    if given.command == "verify":
+        found = register.differences(registered)
+        tell(
+            "\n".join(found) or f"the tree is the one registered on {registered['date']} at {registered['commit'][:12]}"
+        )
+        return 1 if found else 0
+    files = register.run(registered, given.hours, tell, given.folder)
+    tell(register.printed(files))
+    write_json(given.folder / "result.json", register.result(registered, files))
+    tell(f"numbers: {given.folder / 'result.json'}")
+    return 0

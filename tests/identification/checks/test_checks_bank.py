@@ -1,0 +1,118 @@
+"""The bank: 190 recordings with a mistake each, named, placed and mended in 9 of 10; 60 sound ones without any."""
+
+import faulty_recordings as bank
+import numpy as np
+import pytest
+from checked import MODEL, checked, mended, written
+
+import snarelab
+from snarelab.identification.fitting.recorded import read_all
+from snarelab.models.model_file import load_model
+
+pytestmark = pytest.mark.slow
+DRAWN = 10
+MISSED = 0.1
+HELD_OUT = 700
+"""What the seed of a held-out recording is higher by."""
+
+
+def cases(tmp_path, seed, mistake):
+    """An arm's recordings with a mistake, in a folder of their own, and what is found in them."""
+    made = bank.machine(seed)
+    runs, name, places = mistake(made, seed)
+    folder = tmp_path / str(seed)
+    folder.mkdir()
+    paths = written(folder, made, runs)
+    return made, name, places, folder, paths, checked(folder, paths)
+
+
+def left(paths, found):
+    """Recordings that a finding does not ask to leave out."""
+    out = [f.mend.partition("leave out ")[2].partition(",")[0] for f in found]
+    return [path for path in paths if path.name not in out]
+
+
+def same(folder, paths, sound):
+    """Whether the mended model file reads the numbers that a sound recording has."""
+    other = folder / "sound"
+    other.mkdir()
+    texts = [(folder / "arm.toml", paths), (other / "arm.toml", sound(other))]
+    one, two = (read_all(load_model(model), files)[0] for model, files in texts)
+    return set(one.data_vars) == set(two.data_vars) and all(
+        np.allclose(one[x], two[x], rtol=1e-9, atol=1e-12) for x in ("time", *one.data_vars)
+    )
+
+
+@pytest.mark.parametrize("mistake", bank.MISTAKES, ids=lambda mistake: mistake.__name__)
+def test_mistakes_are_found_in_nine_of_ten_arms(tmp_path, mistake):
+    """By name, at the right place and at no other; the mend leaves nothing to find, and the sound recording's numbers
+    where they were only written otherwise."""
+    missed = []
+    for seed in range(20, 20 + DRAWN):
+        made, name, places, folder, paths, found = cases(tmp_path, seed, mistake)
+        told = [f for f in found if f.fault or f.name == name]
+        good = bool(told) and all(f.name == name and f.at in places for f in told)
+        (folder / "arm.toml").write_text(mended(MODEL, found))
+        after = [f for f in checked(folder, left(paths, found)) if f.fault]
+        if mistake is bank.load_turned:  # the load that is left is another matter: see the last test
+            after = [f for f in after if f.name == name]
+        good = good and not after
+        if good and mistake in bank.SAME:
+            good = same(folder, paths, lambda other, m=made, s=seed: written(other, m, bank.sound(mistake, m, s)[0]))
+        if not good:
+            missed.append((seed, [(f.name, f.at, f.message) for f in found]))
+    assert len(missed) <= MISSED * DRAWN, missed
+
+
+def diagnosed(folder, made, text, runs, held):
+    (folder / "arm.toml").write_text(text)
+    written(folder, made, [*runs, *held], text)
+    paths = [folder / f"run{k}.csv" for k in range(len(runs) + len(held))]
+    answer = snarelab.diagnose(folder / "arm.toml", paths[: len(runs)], holdout=paths[len(runs) :])
+    return answer.verdict, {(e.name, e.at) for e in answer.effects}
+
+
+HEAVY = pytest.mark.xfail(
+    reason="a load far beside a link may be read as an encoder's zero or another unit: none is expected"
+)
+
+
+@pytest.mark.parametrize(
+    "mistake",
+    [pytest.param(m, marks=HEAVY if m is bank.load_turned else ()) for m in bank.MISTAKES if m not in bank.SAME],
+    ids=lambda mistake: mistake.__name__,
+)
+def test_a_mend_gives_the_verdict_of_the_sound_recording(tmp_path, mistake):
+    """Where the mend is an estimate, or leaves samples or recordings out. Two joints: such a diagnosis is short."""
+    seed = 23
+    made = bank.machine(seed, n_joints=2)
+    runs, _, _ = mistake(made, seed)
+    paths = written(tmp_path, made, runs)
+    found = checked(tmp_path, paths)
+    kept = [run for path, run in zip(paths, runs, strict=True) if path in left(paths, found)]
+    held = mistake(made, seed + HELD_OUT)[0][:1]
+    as_it_should_be, lines = bank.sound(mistake, made, seed)
+    sound_held, _ = bank.sound(mistake, made, seed + HELD_OUT)
+    verdict, names = diagnosed(tmp_path, made, mended(MODEL, found), kept, held)
+    sound_verdict, sound_names = diagnosed(tmp_path, made, lines + MODEL, as_it_should_be, sound_held[:1])
+    assert verdict == sound_verdict, (names, sound_names)
+    assert verdict != "data_fault"
+
+
+@pytest.mark.parametrize("seed", range(100, 160))
+def test_sound_recordings_raise_nothing(tmp_path, seed):
+    """As loggers leave them: clocks that jitter, lost rows, coarse encoders, and physics that the model lacks."""
+    made = bank.machine(seed, n_joints=2 + seed % 4)
+    paths = written(tmp_path, made, [bank.disturbed(made, seed), bank.record(made, seed + 500)])
+    assert [(f.name, f.at, f.message) for f in checked(tmp_path, paths)] == []
+
+
+@HEAVY
+def test_a_heavy_load_far_beside_a_link_raises_nothing(tmp_path):
+    """0.6 of the last link's mass and half a kilogram more, a third of a metre off."""
+    wrong = []
+    for seed in range(20, 20 + DRAWN):
+        made = bank.machine(seed)
+        paths = written(tmp_path, made, bank.load_turned(made, seed)[0])
+        wrong += [(seed, f.name, f.at) for path in paths for f in checked(tmp_path, [path])[:1]]
+    assert len(wrong) <= 1, wrong

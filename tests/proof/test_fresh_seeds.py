@@ -1,0 +1,37 @@
+"""Cases that nobody has seen: each run draws others, and the tool has an answer to each."""
+
+import hashlib
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from proof.benchmark.case_set import GENERATORS
+from proof.drives.cases import FAULTY
+from proof.drives.judge import judge
+from proof.drives.score import score
+from proof.played.residuals import RECORDINGS
+from proof.played.robots import published
+
+ROOT = Path(__file__).parents[2]
+
+
+def seed() -> int:
+    """Another one for each commit; 1000 and more."""
+    asked = subprocess.run(["git", "rev-parse", "HEAD"], cwd=ROOT, capture_output=True, text=True)
+    return 1000 + int(hashlib.sha256(asked.stdout.encode()).hexdigest()[:6], 16)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("generator", list(GENERATORS))
+def test_unseen_cases_are_answered(generator, tmp_path):
+    """A failure says which seed; what a case was told is in the captured output."""
+    if generator == "played" and not (RECORDINGS.exists() and published()):
+        pytest.skip("recordings or example-robot-data are not there")
+    fresh = seed()
+    folders = GENERATORS[generator](tmp_path / "cases", fresh, 3)
+    lines = score(folders, tmp_path / "answers.jsonl", 240.0)
+    for line in lines:
+        assert line["verdict"] in ("adequate", "missing_physics", "unknown_effect", "data_fault"), (fresh, line)
+        if line["truth"]["group"] != FAULTY:
+            assert all(0.0 < t.probability <= 1.0 for t in judge(line).told), fresh
