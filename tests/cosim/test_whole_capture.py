@@ -17,7 +17,7 @@ from snarelab.cosim.docked import (
     preload,
     residual,
 )
-from snarelab.cosim.orbit_capture import SNARE, Passive
+from snarelab.cosim.orbit_capture import SNARE, JointResistance
 from snarelab.cosim.state_table import read_table
 from snarelab.cosim.whole_capture import co_simulate_whole
 from snarelab.models.docking.parameters import PRELOAD_WINDOW, DockingParameters
@@ -64,7 +64,7 @@ def test_at_its_usual_steps_the_ring_closes_as_in_one_system(case):
     """To the paper's 10 s, when the ring has stopped in neither: 2 um and 0.2 % of the means over 10 ms."""
     start = setting(case)
     capture = docked_of(co_simulate_whole(start, until=("SETTLE",))).capture
-    single, _ = reference(start, Passive(), SNARE, 10.0)
+    single, _ = reference(start, JointResistance(), SNARE, 10.0)
     assert single.first_contact < 9.0
     assert np.ptp(single.relative[:, 1]) > 5e-3  # the pin has come nearer
     assert position_error(capture, single) < 2e-6
