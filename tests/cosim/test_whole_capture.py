@@ -65,6 +65,7 @@ def test_at_its_usual_steps_the_ring_closes_as_in_one_system(case):
     start = setting(case)
     capture = docked_of(co_simulate_whole(start, until=("SETTLE",))).capture
     single, _ = reference(start, JointResistance(), SNARE, 10.0)
+    assert single.first_contact is not None
     assert single.first_contact < 9.0
     assert np.ptp(single.relative[:, 1]) > 5e-3  # the pin has come nearer
     assert position_error(capture, single) < 2e-6

@@ -4,6 +4,7 @@ import io
 import json
 import re
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -129,7 +130,7 @@ def test_page_unpacks_its_playback_in_a_browser(
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_scene_is_as_the_page_and_paper_has_a_light_still(
-    browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scheme
+    browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scheme: Literal["light", "dark"]
 ) -> None:
     """Of the time and the view that were shown last."""
     monkeypatch.chdir(tmp_path)
@@ -137,7 +138,8 @@ def test_scene_is_as_the_page_and_paper_has_a_light_still(
     with opened(browser, path, scheme, (680, 1000)) as page:
         playing(page)
         page.wait_for_function("document.getElementById('playback-still')?.naturalWidth > 100")
-        for now in (scheme, {"light": "dark", "dark": "light"}[scheme]):
+        other = "light" if scheme == "dark" else "dark"
+        for now in (scheme, other):
             page.emulate_media(color_scheme=now)
             drawn(page.locator("#playback-frame").element_handle().content_frame())
             sky = imread(io.BytesIO(page.locator("#playback-frame").screenshot()))[20:-60, 5:25, :3]
