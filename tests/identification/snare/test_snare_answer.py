@@ -3,7 +3,7 @@
 import pytest
 
 from snarelab.identification.diagnosis import ChannelFit, Misfit
-from snarelab.identification.snare.answer import _corrected, _sentence, _unexplained
+from snarelab.identification.snare.answer import _corrected, _sentence, _unexplained, _unexplained_words
 
 
 def channel(name, unit, left, motion=0.1, held=None):
@@ -17,15 +17,15 @@ Y, FORCE = channel("pos.target.y", "m", 0.004), channel("force.wrist.x", "N", 3.
 
 def test_what_is_left_small_or_is_a_force_alone_is_no_unknown_effect():
     """A quarter of the largest motion, and a millimetre on both sets: a force's shape is sensed worse than motion."""
-    assert _unexplained([Y, FORCE]) == ""
-    assert _unexplained([Y, channel("pos.target.z", "m", 0.0009, motion=0.0010)]) == ""
-    assert _unexplained([Y, channel("pos.target.z", "m", 0.026, held=0.0009)]) == ""
+    assert _unexplained([Y, FORCE]) == ()
+    assert _unexplained([Y, channel("pos.target.z", "m", 0.0009, motion=0.0010)]) == ()
+    assert _unexplained([Y, channel("pos.target.z", "m", 0.026, held=0.0009)]) == ()
 
 
 @pytest.mark.parametrize("direction", ["y", "z"])
 def test_motion_that_is_left_without_a_name_is_told_with_its_size(direction):
     left = channel(f"pos.target.{direction}", "m", 0.026)
-    text = _unexplained([left, channel("pos.target.x", "m", 0.024), FORCE])
+    text = _unexplained_words(_unexplained([left, channel("pos.target.x", "m", 0.024), FORCE]))
     assert text.startswith(f"26 mm of pos.target.{direction} are left")
     assert "check the set-up's sizes and masses" in text
     assert _sentence((), [left, FORCE], text).startswith(
