@@ -176,7 +176,7 @@ def table(
             for i, cell in enumerate(row)
         )
 
-    said = [f' data-head="{escape(head)}"' if stacks and head else "" for head in heads]
+    said = [f' data-head="{_kept(head)}"' if stacks and head else "" for head in heads]
     top = cells([escape(head) for head in heads], "th", "col")
     body = "\n".join(f"<tr>{cells(row, 'td', 'row')}</tr>" for row in rows)
     kind = "scroll" + (" wide" if wide else "") + (" stacks" if stacks else "")

@@ -29,7 +29,7 @@ def test_unseen_cases_are_answered(generator, tmp_path):
     if generator == "played" and not (RECORDINGS.exists() and published()):
         pytest.skip("recordings or example-robot-data are not there")
     fresh = seed()
-    folders = GENERATORS[generator](tmp_path / "cases", fresh, 3)
+    folders = GENERATORS[generator](tmp_path / "cases", fresh, 2)
     lines = score(folders, tmp_path / "answers.jsonl", 240.0)
     for line in lines:
         assert line["verdict"] in ("adequate", "missing_physics", "unknown_effect", "data_fault"), (fresh, line)

@@ -39,7 +39,7 @@ def test_the_misfits_stand_in_one_row_a_channel():
     cells = ["4.00", "3.00", "8.00", "2.00", "0.125", "80.0\u202f%", "20.0\u202f%"]
     assert rows(content) == [["a\u00a0[N·m]", *cells], ["<b>\u00a0[N]", *cells]]
     assert re.findall(r'<th scope="row"( class="n")?', content) == ["", ""]
-    assert len(re.findall(r'<td class="n">', content)) == 14
+    assert len(re.findall(r'<td class="n"', content)) == 14
 
 
 def test_without_an_addition_the_misfits_are_those_of_the_one_model():

@@ -213,7 +213,7 @@ def designed(monkeypatch):
         "load_experiments": lambda *_: [recorded, other],
         "RigidBody": lambda tree: tree,
         "scales": lambda _: {},
-        "Assembly": Model,
+        "TorqueModel": Model,
         "channel_rms": rms,
         "fit": lambda *_, **__: Made(theta=None),
         "replace": lambda x, **_: x,
