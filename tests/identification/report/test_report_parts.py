@@ -123,7 +123,8 @@ def test_of_rivals_the_probabilities_stand_to_the_right_and_the_words_to_the_lef
     content = missing(missing_physics())[2]
     (rivals,) = re.findall(r"<caption>What else it could be.*?</table>", content.split("Joint elasticity at")[0], re.S)
     assert re.findall(r'class="n"[^>]*>([^<]*)<', rivals) == ["Probability", "8\u202f%", "3\u202f%"]
-    assert [cell for cell in re.findall(r"<td(?! class)[^>]*>([^<]*)<", rivals) if re.match(r"\d|over|under", cell)] == []
+    words = re.findall(r"<td(?! class)[^>]*>([^<]*)<", rivals)
+    assert [cell for cell in words if re.match(r"\d|over|under", cell)] == []
 
 
 @pytest.mark.parametrize(("share", "twice"), [(0.0, False), (0.009, False), (0.011, True), (1.0, True)])
