@@ -2,8 +2,9 @@
 
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from .cases import draw, planned
 
@@ -12,12 +13,25 @@ def make(folder: Path, seed: int, count: int, group: str = "", tell: Callable[[s
     """Folders of the first ``count`` cases of a seed, or of those among them of one group; raises ValueError where
     ``folder`` holds cases of another seed.
     """
+    plans = planned(seed, count)
+    return made(folder, seed, plans, group, tell, lambda plan, seed, k, path: draw(plan, seed, k).write(path))
+
+
+def made(
+    folder: Path,
+    seed: int,
+    plans: Sequence[Any],
+    group: str,
+    tell: Callable[[str], None],
+    write: Callable[[Any, int, int, Path], None],
+) -> list[Path]:
+    """Folders of the plans of one group, or of all; ``write`` makes those that are not there, from plan, seed, number
+    and folder. Raises ValueError where ``folder`` holds cases of another seed."""
     folder.mkdir(parents=True, exist_ok=True)
     mark = folder / "seed.json"
     if mark.exists() and json.loads(mark.read_text())["seed"] != seed:
         raise ValueError(f"{folder} holds cases of seed {json.loads(mark.read_text())['seed']}; give another folder")
     mark.write_text(json.dumps({"seed": seed}) + "\n")
-    plans = planned(seed, count)
     wanted = [k for k, plan in enumerate(plans) if group in ("", plan.group)]
     folders = []
     for done, k in enumerate(wanted, 1):
@@ -26,10 +40,9 @@ def make(folder: Path, seed: int, count: int, group: str = "", tell: Callable[[s
         if (path / "truth.json").exists():
             continue
         start = time.perf_counter()
-        draw(plans[k], seed, k).write(path)
+        write(plans[k], seed, k, path)
         what = ", ".join(f"{name} {size:g}x" for name, size in plans[k].concealed) or "nothing"
-        took = time.perf_counter() - start
-        tell(f"{done}/{len(wanted)} {path}: {plans[k].group}, {plans[k].disturbance}, {what}; {took:.1f} s")
+        tell(f"{done}/{len(wanted)} {path}: {plans[k].group}, {what}; {time.perf_counter() - start:.1f} s")
     return folders
 
 

@@ -1,12 +1,11 @@
 """Write cases; one that is there is not made again."""
 
 import argparse
-import json
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 
+from ..drives.make import made
 from .cases import GROUPS, planned, write
 from .residuals import RECORDINGS, residuals
 from .robots import published
@@ -24,24 +23,7 @@ def make(folder: Path, seed: int, count: int, group: str = "", tell: Callable[[s
         raise ValueError(f"no recordings in {RECORDINGS}: there is nothing to play")
     if not published():
         raise ValueError("the package example-robot-data is not installed: make .venv/installed does it")
-    folder.mkdir(parents=True, exist_ok=True)
-    mark = folder / "seed.json"
-    if mark.exists() and json.loads(mark.read_text())["seed"] != seed:
-        raise ValueError(f"{folder} holds cases of seed {json.loads(mark.read_text())['seed']}; give another folder")
-    mark.write_text(json.dumps({"seed": seed}) + "\n")
-    plans = planned(seed, count)
-    wanted = [k for k, plan in enumerate(plans) if group in ("", plan.group)]
-    folders = []
-    for done, k in enumerate(wanted, 1):
-        path = folder / f"{k:04}"
-        folders.append(path)
-        if (path / "truth.json").exists():
-            continue
-        start = time.perf_counter()
-        write(plans[k], seed, k, path)
-        what = ", ".join(f"{name} {size:g}x" for name, size in plans[k].concealed) or "nothing"
-        tell(f"{done}/{len(wanted)} {path}: {plans[k].group}, {what}; {time.perf_counter() - start:.1f} s")
-    return folders
+    return made(folder, seed, planned(seed, count), group, tell, write)
 
 
 def main() -> int:
