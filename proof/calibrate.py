@@ -24,6 +24,7 @@ os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM
 
 from .cases import ROUND
 from .counting import RIDGE, Row, counted, of_effects, of_lines
+from .ending import status_of, tell
 from .judge import names_in, rightly_placed
 from .run import diagnose, fill, prepare
 from .score import score
@@ -45,12 +46,9 @@ def main() -> int:
     parser.add_argument("--drives", type=Path, nargs="*", default=[], help="files of python -m proof.drives score")
     given = parser.parse_args()
 
-    def tell(words: str) -> None:
-        print(words, flush=True)
-
-    cases: dict[str, int] = {}
-    rows: list[Row] = []
-    try:
+    def count() -> None:
+        cases: dict[str, int] = {}
+        rows: list[Row] = []
         for file in given.drives:
             lines = [json.loads(x) for x in file.read_text(encoding="utf-8").splitlines()]
             rows += of_lines(lines)
@@ -59,15 +57,10 @@ def main() -> int:
             rows += own(given.cases, given.seed, given.workers, tell)
             cases[OWN] = given.cases
         stored = mapped(rows, cases, json.loads(JSON.read_text(encoding="utf-8")), sys.argv[1:])
-    except (ValueError, OSError) as error:
-        print(error, file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("stopped; the same command goes on where it was", file=sys.stderr)
-        return 130
-    write_json(JSON, stored)
-    tell(json.dumps(stored["counted"], indent=1))
-    return 0
+        write_json(JSON, stored)
+        tell(json.dumps(stored["counted"], indent=1))
+
+    return status_of(count, (ValueError, OSError))
 
 
 def own(cases: int, seed: int, workers: int, tell: Callable[[str], None]) -> list[Row]:
