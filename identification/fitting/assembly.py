@@ -23,7 +23,8 @@ from ...models.effect import Parameter, written_unit
 from ...models.model import PlacedEffect
 from ...models.tree import Tree
 from .base_parameters import INERTIAL, BaseParameters
-from .effect_terms import contributions
+from .effect_kinds import effect_place
+from .effect_places import EffectPlace, TorqueState
 from .experiment import Experiment, Scales
 
 Array = NDArray[np.float64]
@@ -144,13 +145,14 @@ class TorqueModel:
         self.low = np.array([s.low for s in slots], float)
         self.high = np.array([s.high for s in slots], float)
 
-    @property
-    def early_alone(self) -> bool:
-        """Whether a late encoder is taken to make its own torque channel early, and that alone.
+    def at(self, p: PlacedEffect) -> EffectPlace:
+        """The place where an effect acts, which says what it adds to the torque.
 
-        True of a single joint, whatever its inertia; other joints' torques move with the tree's inertia.
+        A late encoder of a single joint makes its channel early, whatever the joint's inertia; among others it moves
+        their torques, too, with the tree's inertia.
         """
-        return len(self._joints) == 1 and self.base is not None
+        early_alone = len(self._joints) == 1 and self.base is not None
+        return effect_place(self.tree, p, self.joint_of(p), self.speed_scale(p), early_alone)
 
     def joint_of(self, p: PlacedEffect) -> int:
         """Index of the joint that an effect's place belongs to; of an axis, the first of its joints."""
@@ -250,15 +252,13 @@ class TorqueModel:
         for k, p in sorted(enumerate(self.placed), key=lambda item: item[1].effect.at == "sensor"):
             if p.effect.at == "link":
                 continue
-            j = self.joint_of(p)
-            terms, by_load, sense = contributions(
-                experiment, self.tree, p, j, load, tau, self.speed_scale(p), self.parameters(k, theta), self.early_alone
-            )
+            here = self.at(p)
+            terms, by_load, sense = here.terms(TorqueState(experiment, load, tau), self.parameters(k, theta))
             if sense is not None:
+                j = here.joint
                 passed.setdefault(j, []).append(sense)
-                # A late encoder's share of the rigid body's torque is worked out from the motion, apart from the load.
-                apart = len(rigid) if p.at.startswith("q.") and not self.early_alone else 0
-                blocks[apart:] = [Block(j, b.index, sense(b.values)) if b.channel == j else b for b in blocks[apart:]]
+                apart = len(rigid) if here.apart else 0
+                blocks[apart:] = _sensed(blocks[apart:], j, sense)
             if by_load is not None:
                 blocks += self._through_load(p, by_load, rigid)
             for channel, values, columns in terms:
@@ -296,19 +296,18 @@ class TorqueModel:
         for k, p in enumerate(self.placed):
             if p.effect.at != "link":
                 continue
-            j = self.joint_of(p)
-            terms, _, _ = contributions(
-                experiment,
-                self.tree,
-                p,
-                j,
-                load,
-                load,
-                self.speed_scale(p),
-                self.parameters(k, theta),
-                self.early_alone,
-            )
+            terms = self.at(p).terms(TorqueState(experiment, load, load), self.parameters(k, theta)).terms
             for channel, values, columns in terms:
                 load[:, channel] += values
                 blocks.append(Block(channel, self._index[k], columns[:, self._free[k]]))
         return load, blocks
+
+
+def _sensed(blocks: Sequence[Block], channel: int, sense: Callable[[Array], Array]) -> list[Block]:
+    """Blocks with a channel's as its sensor reads them, all columns in one pass."""
+    own = [b for b in blocks if b.channel == channel]
+    if not own:
+        return list(blocks)
+    stops = np.cumsum([b.values.shape[1] for b in own])[:-1]
+    read = iter(np.split(sense(np.concatenate([b.values for b in own], axis=1)), stops, axis=1))
+    return [Block(channel, b.index, next(read)) if b.channel == channel else b for b in blocks]

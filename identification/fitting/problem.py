@@ -20,7 +20,7 @@ from .assembly import Block, TorqueModel
 from .experiment import Experiment
 from .least_squares import NormalEquations, Objective, Solution
 from .projection import minimise_projected
-from .rig_terms import PLACES
+from .rig_places import PLACES
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int_]

@@ -10,7 +10,7 @@ from ...models.effect import Parameter
 from ...models.effects import effects
 from ...models.model import Model, PlacedEffect, all_places
 from ..fitting.assembly import TorqueEvaluation, TorqueModel
-from ..fitting.effect_terms import contributions
+from ..fitting.effect_places import EffectTerms, TorqueState
 from ..fitting.experiment import Experiment
 from ..fitting.problem import reached
 
@@ -139,7 +139,7 @@ def candidate_columns(
         key = ("candidate", placed.key, variant.parameters.tobytes(), variant.amplitudes.tobytes())
         if key in experiment.store:
             return experiment.store[key]
-    terms, by_load = _terms(assembly, experiment, state, placed, variant.parameters, not len(variant.amplitudes))
+    terms, by_load, _ = _terms(assembly, experiment, state, placed, variant.parameters, not len(variant.amplitudes))
     found = []
     for channel, values, columns in terms:
         own = columns[:, variant.amplitudes] if len(variant.amplitudes) else values[:, None]
@@ -159,14 +159,9 @@ def _terms(
     placed: PlacedEffect,
     parameters: Array,
     bare: bool = False,
-) -> tuple[list[tuple[int, Array, Array]], Array | None]:
-    """What an effect adds beside the model as evaluated, and its derivative by the joint's load."""
-    joint = assembly.joint_of(placed)
-    speed = assembly.speed_scale(placed)
-    terms, by_load, _ = contributions(
-        experiment, assembly.tree, placed, joint, state.load, state.tau, speed, parameters, assembly.early_alone, bare
-    )
-    return terms, by_load
+) -> EffectTerms:
+    """What an effect adds beside the model as evaluated."""
+    return assembly.at(placed).terms(TorqueState(experiment, state.load, state.tau), parameters, bare)
 
 
 def free_parameters(
@@ -179,7 +174,7 @@ def free_parameters(
     placed = variant.placed
     parameters = variant.parameters.copy()
     parameters[variant.amplitudes] = 1.0
-    terms, _ = _terms(assembly, experiment, state, placed, parameters)
+    terms = _terms(assembly, experiment, state, placed, parameters).terms
     moves = np.any([np.any(columns, axis=0) for _, _, columns in terms], axis=0)
     amplitudes = {p.name for p in placed.effect.parameters if _is_linear(p) and len(variant.amplitudes)}
     on = {placed.effect.parameters[i].name for i in variant.amplitudes}

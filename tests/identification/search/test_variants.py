@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from snarelab.identification.search import candidates as module
+from snarelab.identification.fitting.effect_places import EffectTerms
 from snarelab.identification.search.candidates import (
     EffectVariant,
     candidate_columns,
@@ -72,11 +72,9 @@ def assembly(**scales) -> Any:
     return Made(
         scale=lambda _placed, x: scales.get(x.relative_to, 1.0),
         bounds=lambda _placed, x: (10 * x.low, 10 * x.high),
-        joint_of=lambda _: 1,
-        speed_scale=lambda _: 7.0,
         place_of=lambda _: Made(channels=(1,)),
+        joint_of=lambda _: 1,
         tree=None,
-        early_alone=False,
     )
 
 
@@ -164,17 +162,25 @@ def test_slides_of_the_first_joint_are_its_friction():
 VALUES, COLUMNS = np.array([1.0, 2.0]), np.array([[3.0, 4.0], [5.0, 6.0]])
 
 
+class Asked:
+    """An assembly whose places answer with one channel's term; ``calls`` is what they were asked."""
+
+    def __init__(self) -> None:
+        self.calls, self.by_load, self.columns = [], None, COLUMNS
+
+    def assembly(self) -> Any:
+        def terms(along: Any, parameters: Any, bare: bool) -> EffectTerms:
+            self.calls.append((along, parameters, bare))
+            return EffectTerms([(3, VALUES, self.columns)], self.by_load)
+
+        own = assembly()
+        own.at = lambda _placed: Made(terms=terms)
+        return own
+
+
 @pytest.fixture
-def asked(monkeypatch):
-    """`contributions` answered with one channel's term, and what it was asked with; a derivative by load if told."""
-    calls, answer = [], {"by_load": None, "columns": COLUMNS}
-
-    def given(_e: Any, _tree: Any, placed: Any, joint: Any, *more: Any) -> Any:
-        calls.append((placed.key, joint, *more))
-        return [(3, VALUES, answer["columns"])], answer["by_load"], None
-
-    monkeypatch.setattr(module, "contributions", given)
-    return calls, answer
+def asked():
+    return Asked()
 
 
 def experiment() -> Any:
@@ -186,25 +192,23 @@ def state(**passed) -> Any:
 
 
 def test_columns_of_the_amplitudes_or_the_whole_law_in_the_band(asked):
-    calls, _ = asked
-    ((channel, found),) = candidate_columns(assembly(), experiment(), state(), variant("harness_stiffness", [1]))
+    ((channel, found),) = candidate_columns(asked.assembly(), experiment(), state(), variant("harness_stiffness", [1]))
     assert channel == 3
     np.testing.assert_array_equal(found, [[43.0], [63.0]])
-    ((_, found),) = candidate_columns(assembly(), experiment(), state(), variant("joint_elasticity", []))
+    ((_, found),) = candidate_columns(asked.assembly(), experiment(), state(), variant("joint_elasticity", []))
     np.testing.assert_array_equal(found, [[13.0], [23.0]])
-    assert [call[-1] for call in calls] == [False, True]  # amplitudes are columns of the law's derivative
-    _, joint, load, reading, speed, parameters, early_alone, _ = calls[0]
-    assert (joint, load[:, 1].tolist(), reading[:, 1].tolist(), speed, early_alone) == (1, [1, 2], [8, 9], 7.0, False)
+    assert [call[-1] for call in asked.calls] == [False, True]  # amplitudes are columns of the law's derivative
+    (_, load, reading), parameters, _ = asked.calls[0]
+    assert (load[:, 1].tolist(), reading[:, 1].tolist()) == ([1, 2], [8, 9])
     assert parameters.tolist() == [0.0, 0.0]
 
 
 def test_sensors_that_the_model_has_see_a_joints_torque_but_not_one_anothers_change(asked):
-    del asked
     halved = state(on={3: [lambda x: x / 2, lambda x: x + 1]})
-    ((_, found),) = candidate_columns(assembly(), experiment(), halved, variant("harness_stiffness", [0]))
+    ((_, found),) = candidate_columns(asked.assembly(), experiment(), halved, variant("harness_stiffness", [0]))
     np.testing.assert_array_equal(found, [[10 * 2.5 + 3], [10 * 3.5 + 3]])
     sensor = variant("sensor_gain", [0], at="tau.joint1")
-    ((_, found),) = candidate_columns(assembly(), experiment(), halved, sensor)
+    ((_, found),) = candidate_columns(asked.assembly(), experiment(), halved, sensor)
     np.testing.assert_array_equal(found, [[33.0], [53.0]])
 
 
@@ -219,30 +223,26 @@ def test_sensors_that_the_model_has_see_a_joints_torque_but_not_one_anothers_cha
     ],
 )
 def test_columns_that_nothing_changes_are_kept(asked, name, amplitudes, by_load, sensed, asked_twice):
-    calls, answer = asked
-    answer["by_load"] = by_load
-    e, own = experiment(), assembly()
+    asked.by_load = by_load
+    e, own = experiment(), asked.assembly()
     now = state(on={1: [lambda x: x]}) if sensed else state()
     one, two = (candidate_columns(own, e, now, variant(name, amplitudes)) for _ in range(2))
-    assert len(calls) == (2 if asked_twice else 1)
+    assert len(asked.calls) == (2 if asked_twice else 1)
     np.testing.assert_array_equal(one[0][1], two[0][1])
     if not asked_twice:
         assert two[0][0] == one[0][0]
         for other in (variant(name, [1]), variant(name, [0], [1.0, 0.0])):
             candidate_columns(own, e, now, other)
-        assert len(calls) == 3
+        assert len(asked.calls) == 3
 
 
 def test_parameters_count_if_they_move_the_torque_once_the_amplitudes_are_on(asked):
-    calls, answer = asked
+    model = asked.assembly(), experiment(), state()
     # The spring's rest torque is an amplitude that is not switched on; without a derivative none counts.
-    found = free_parameters(assembly(), experiment(), state(), variant("harness_stiffness", [0]))
+    found = free_parameters(*model, variant("harness_stiffness", [0]))
     assert found == ("stiffness",)
-    assert calls[0][5].tolist() == [1.0, 0.0]
-    assert free_parameters(assembly(), experiment(), state(), variant("stribeck_friction", [0])) == ("level", "speed")
-    assert free_parameters(assembly(), experiment(), state(), variant("joint_elasticity", [])) == (
-        "stiffness",
-        "damping",
-    )
-    answer["columns"] = COLUMNS * [1.0, 0.0]
-    assert free_parameters(assembly(), experiment(), state(), variant("stribeck_friction", [0])) == ("level",)
+    assert asked.calls[0][1].tolist() == [1.0, 0.0]
+    assert free_parameters(*model, variant("stribeck_friction", [0])) == ("level", "speed")
+    assert free_parameters(*model, variant("joint_elasticity", [])) == ("stiffness", "damping")
+    asked.columns = COLUMNS * [1.0, 0.0]
+    assert free_parameters(*model, variant("stribeck_friction", [0])) == ("level",)

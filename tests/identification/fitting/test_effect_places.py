@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from snarelab.identification.fitting import effect_terms
-from snarelab.identification.fitting.effect_terms import _RESPONSE as LONGEST
-from snarelab.identification.fitting.effect_terms import _causal, _impulse_response, _link_change, contributions
+from snarelab.identification.fitting import effect_places
+from snarelab.identification.fitting.effect_kinds import effect_place
+from snarelab.identification.fitting.effect_law import RESPONSE, causal, impulse_response
+from snarelab.identification.fitting.effect_places import LinkPlace, TorqueState
 from snarelab.models.effects import get_effect
 from snarelab.models.model import PlacedEffect
 
@@ -40,8 +41,8 @@ def run(segments=(slice(0, N),), links=1) -> Any:
 def added(e, name, at, parameters, joint=1, load=None, reading=None, scale=1.0, early_alone=False, tree=None) -> Any:
     own: Any = tree or Made(joints=[Made(name=f"joint{k}", kind="revolute") for k in (1, 2)], axes=())
     load, reading = (np.zeros((N, 2)) if x is None else np.stack([np.zeros(N), x], 1) for x in (load, reading))
-    numbers = np.array(parameters, float)
-    return contributions(e, own, PlacedEffect(get_effect(name), at), joint, load, reading, scale, numbers, early_alone)
+    here = effect_place(own, PlacedEffect(get_effect(name), at), joint, scale, early_alone)
+    return here.terms(TorqueState(e, load, reading), np.array(parameters, float))
 
 
 def test_friction_and_a_spring_act_on_their_own_channel():
@@ -84,7 +85,8 @@ def test_a_links_change_goes_through_its_own_columns_of_the_regressor():
         np.testing.assert_allclose(by[:, 0], e.regressor[:, c, 10:20] @ point, atol=1e-12)
         along_x = 2.0 * np.array([0, 1, 0, 0, 0, -y, -z, 2 * x, 0, 2 * x])
         np.testing.assert_allclose(by[:, 1], e.regressor[:, c, 10:20] @ along_x, atol=1e-12)
-    change, _ = _link_change(get_effect("inertia_error"), tree, 1, np.arange(10.0))
+    here = LinkPlace(tree, PlacedEffect(get_effect("inertia_error"), "link2"), 1, 1.0)
+    change, _ = here.change(np.arange(10.0))
     np.testing.assert_allclose(change, np.arange(10.0), atol=1e-12)
 
 
@@ -174,29 +176,29 @@ def test_hidden_states_start_at_rest_in_every_run():
     assert torque[150] == pytest.approx(0.0, abs=1e-4)
 
 
-def test_a_causal_filter_has_seen_the_first_row_for_ever():
+def test_acausal_filter_has_seen_the_first_row_for_ever():
     columns = np.array([[2.0, 1.0], [4.0, 1.0], [6.0, 1.0], [0.0, 3.0]])
-    found = _causal(columns, np.array([0.5, 0.3, 0.2]))
+    found = causal(columns, np.array([0.5, 0.3, 0.2]))
     np.testing.assert_allclose(found[:, 0], [2.0, 0.5 * 4 + 0.5 * 2, 0.5 * 6 + 0.3 * 4 + 0.2 * 2, 0.3 * 6 + 0.2 * 4])
     np.testing.assert_allclose(found[:, 1], [1.0, 1.0, 1.0, 2.0])
-    np.testing.assert_allclose(_causal(columns, np.array([2.0])), 2 * columns)
+    np.testing.assert_allclose(causal(columns, np.array([2.0])), 2 * columns)
 
 
-def test_the_impulse_response_of_a_delay_has_unit_sum_and_its_delay_as_its_middle():
+def test_theimpulse_response_of_a_delay_has_unit_sum_and_its_delay_as_its_middle():
     """Padé's delay passes a constant whole and a ramp by the delay late: moments 1 and 4 samples."""
-    response = _impulse_response(get_effect("sensor_delay"), np.array([4 * PERIOD]), PERIOD)
-    assert len(response) < LONGEST - 1
+    response = impulse_response(get_effect("sensor_delay"), np.array([4 * PERIOD]), PERIOD)
+    assert len(response) < RESPONSE - 1
     assert abs(response[-1]) > 1e-9
     assert response.sum() == pytest.approx(1.0, abs=1e-6)
     assert response @ np.arange(len(response)) == pytest.approx(4.0, abs=1e-4)
-    instant = _impulse_response(get_effect("sensor_delay"), np.array([0.0]), PERIOD)
+    instant = impulse_response(get_effect("sensor_delay"), np.array([0.0]), PERIOD)
     assert instant[0] == pytest.approx(1.0, abs=1e-3)
 
 
 def test_what_an_effect_gives_to_a_floating_base_nothing_else_has_to_supply(monkeypatch):
     """A moment of (1, 2, 3) from outside is taken off the base's channels 3 to 5, and so is its derivative."""
     read = {name: np.zeros((N, 3)) for name in ("spin", "spin_gained", "impulse", "spin_rate", "acceleration")}
-    monkeypatch.setattr(effect_terms, "base_signals", lambda _: read | {"time": TIME})
+    monkeypatch.setattr(effect_places, "base_signals", lambda _: read | {"time": TIME})
     terms, *_ = added(run(), "external_torque", "base", [1.0, 2.0, 3.0], joint=5)
     assert [c for c, *_ in terms] == [3, 4, 5]
     for k, (_, moment, by) in enumerate(terms):
