@@ -68,8 +68,9 @@ hostile: .venv/installed ## forty FMUs that crash, hang, fork and lie: each ends
 	$(BIN)/python bench/hostile_fmus.py
 
 MUTANTS ?= 60
-mutants: .venv/installed ## change identification and cosim at random places, and count how often a test notices; branch coverage
+mutants: .venv/installed ## halve and double what decides, change identification and cosim at random places, and count how often a test notices; branch coverage
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt '.[mutants]'
+	$(BIN)/python bench/moved_constants.py
 	$(BIN)/python bench/mutants.py --mutants $(MUTANTS)
 
 proof: .venv/installed ## conceal effects in another engine's recordings, let the tool name them, and score it: half an hour; HOURS=H: what is registered, for so long, resumed

@@ -4,7 +4,8 @@ Cases of the proof's own generator are drawn as the proof's are, from seeds that
 diagnosed; what is done is kept under ``build/calibration``. To these come the lines that ``python -m proof.drives
 score`` kept. A name is right as ``proof/judge.py`` and ``proof/drives/judge.py`` say: it, or one that the recordings
 cannot tell from it, is concealed at its place. The result is the logistic map of names of torques in
-``identification/reliability.json`` (`counting`), with how well each generator is predicted by a map that leaves it out.
+``identification/reliability.json`` (`counting`), with how well each generator is predicted by a map that leaves it out;
+it is written only where such maps have a smaller Brier score on what they leave out than the map that is stored.
 The curve over margins, of link encoders and captures, stays there as it was counted.
 """
 
@@ -23,7 +24,7 @@ from typing import Any
 os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 from .cases import ROUND
-from .counting import RIDGE, Row, counted, of_effects, of_lines
+from .counting import RIDGE, Row, brier, counted, generator_of, of_effects, of_lines, skill
 from .ending import status_of, tell
 from .judge import names_in, rightly_placed
 from .run import diagnose, fill, prepare
@@ -43,22 +44,32 @@ def main() -> int:
     parser.add_argument("--cases", type=int, default=len(ROUND), help="of the proof's own generator; 0: none")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--seed", type=int, default=SEED)
-    parser.add_argument("--drives", type=Path, nargs="*", default=[], help="files of python -m proof.drives score")
+    parser.add_argument(
+        "--drives", type=Path, nargs="*", default=[], help="files of python -m proof.drives score, of either generator"
+    )
     given = parser.parse_args()
 
-    def count() -> None:
+    def count() -> int:
         cases: dict[str, int] = {}
         rows: list[Row] = []
         for file in given.drives:
             lines = [json.loads(x) for x in file.read_text(encoding="utf-8").splitlines()]
             rows += of_lines(lines)
-            cases["drives"] = cases.get("drives", 0) + len(lines)
+            for line in lines:
+                cases[generator_of(line)] = cases.get(generator_of(line), 0) + 1
         if given.cases:
             rows += own(given.cases, given.seed, given.workers, tell)
             cases[OWN] = given.cases
-        stored = mapped(rows, cases, json.loads(JSON.read_text(encoding="utf-8")), sys.argv[1:])
-        write_json(JSON, stored)
+        before = json.loads(JSON.read_text(encoding="utf-8"))
+        stored = mapped(rows, cases, before, sys.argv[1:])
         tell(json.dumps(stored["counted"], indent=1))
+        left_out, old = counted(rows).brier, brier(before["logit"], rows)
+        tell(f"Brier score of each generator left out: {left_out}; of the map that is stored: {old:.3f}")
+        if left_out is not None and left_out >= old:
+            tell("no better than the map that is stored, which stays")
+            return 1
+        write_json(JSON, stored)
+        return 0
 
     return status_of(count, (ValueError, OSError))
 
@@ -84,8 +95,11 @@ def mapped(
     found = counted(rows)
     generators = {}
     for name, count in sorted(cases.items()):
-        right = [r.right for r in rows if r.generator == name]
-        generators[name] = {"cases": count, "names": len(right), "right": sum(right), "skill": found.skill.get(name)}
+        own = [r for r in rows if r.generator == name]
+        right = sum(r.right for r in own)
+        before = skill(stored["logit"], own) if own else None
+        generators[name] = {"cases": count, "names": len(own), "right": right, "skill": found.skill.get(name)}
+        generators[name]["skill_of_the_map_before"] = before
     return stored | {
         "logit": list(found.logit),
         "counted": {

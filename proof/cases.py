@@ -4,7 +4,7 @@ A case is a random robot, its friction, disturbances, noise, motions and what it
 (seed, number, attempt), so that answers need not lie on a disk to be scored later.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -12,19 +12,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.concealed import FRICTION, Concealed, Planned, Rng, TooMuch
+from bench.concealed import Concealed, Planned, Rng, TooMuch
 from bench.lugre import LuGre
 from bench.motion import Motion, fourier_motion, point_to_point_motion
 from bench.mujoco_plant import Servo, write_csv
 from bench.parts import Disturbance
 
 from .concealed import MAKERS, with_mass
+from .model_text import model_text
 from .outside import OUTSIDE
 from .plant import ProofPlant, band_rms, floor, record
 from .robots import N_JOINTS, by_joint, random_friction, random_robot
 
 RATE = 250.0  # Hz
-TRAIN, HOLDOUT = 20.0, 12.0  # s
+TRAIN, HOLDOUT, THIRD = 20.0, 12.0, 12.0  # s
+RECORDINGS = ("train.csv", "hold.csv", "third.csv")
+"""One to fit, one to confirm by, and one that nothing is given until the score."""
+
 SIZES = (0.5, 1.0, 2.0, 4.0)
 BANDS = np.arange(2.0, 62.0, 2.0)
 """Edges [Hz] below which a case's floor is noted."""
@@ -77,8 +81,8 @@ class Truth:
 class Answer:
     """What is sealed of a case.
 
-    ``channels``: where each concealed effect shows most. ``floor``: RMS [T] of what no model explains of a holdout
-    channel below each band.
+    ``channels``: where each concealed effect shows most. ``floor``: RMS [T] of what no model explains of a channel of
+    the third recording below each band.
     """
 
     case: int
@@ -100,28 +104,28 @@ class Answer:
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A case before it is recorded: the plant, its two motions, the model's text, the answer.
+    """A case before it is recorded: the plant, its motions, the model's text, the answer.
 
     ``twin`` and ``twin_model``: the same arm with nothing concealed, and a model that knows its friction.
     """
 
     plant: ProofPlant
-    motions: tuple[Motion, Motion]
+    motions: tuple[Motion, Motion, Motion]
     model: str
     answer: Answer
     hidden: tuple[Concealed, ...]
     planned: tuple[Planned, ...]
-    noise: tuple[Rng, Rng] = field(repr=False)
+    noise: tuple[Rng, Rng, Rng] = field(repr=False)
     twin: ProofPlant
     twin_model: str
 
     def write(self, folder: Path) -> None:
-        """Record it: model, URDF, ``train.csv``, ``hold.csv``. Raises ValueError where the arm cannot be recorded."""
+        """Record it: model, URDF and recordings (`RECORDINGS`). Raises ValueError where the arm cannot be recorded."""
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "arm.urdf").write_text(self.plant.arm.urdf())
         (folder / "arm.toml").write_text(self.model)
-        lengths, names = (TRAIN, HOLDOUT), ("train.csv", "hold.csv")
-        for motion, length, rng, name in zip(self.motions, lengths, self.noise, names, strict=True):
+        lengths = (TRAIN, HOLDOUT, THIRD)
+        for motion, length, rng, name in zip(self.motions, lengths, self.noise, RECORDINGS, strict=True):
             recording = record(self.plant, motion, length, RATE, rng)
             q = np.column_stack([recording[f"q.{joint}"] for joint in self.plant.arm.joints])
             astray = float(np.abs(q - motion(recording["time"])[0]).max())
@@ -158,6 +162,14 @@ def draw(plan: tuple[str, tuple[str, ...], float], seed: int, number: int, attem
             continue
 
 
+def planned_case(plan: tuple[str, tuple[str, ...], float], seed: int, number: int, attempt: int) -> Case | None:
+    """One attempt at a case, whose arm does not depend on the size; or None where hardware has no such effect on it."""
+    try:
+        return _drawn(plan, number, np.random.default_rng([seed, number, attempt]))
+    except (TooMuch, ValueError):
+        return None
+
+
 def _drawn(plan: tuple[str, tuple[str, ...], float], number: int, rng: Rng) -> Case:
     group, kinds, size = plan
     n = int(rng.choice(N_JOINTS))
@@ -190,8 +202,14 @@ def _drawn(plan: tuple[str, tuple[str, ...], float], number: int, rng: Rng) -> C
         servo=Servo(bandwidth=float(rng.uniform(3.0, 5.0)) * min(1.0, 3.5 / n)),
     )
     plant = replace(twin, friction=laws, **parts)
-    noises = (rng.spawn(1)[0], rng.spawn(1)[0])
-    lowest = floor(plant, HOLDOUT, RATE, noises[1])
+    # Drawn last, so that a case is what it was before there was a third: sums of sines, or moves with stops.
+    if rng.random() < 0.5:
+        terms, highest = int(rng.integers(4, 8)), float(rng.uniform(0.5, 0.9))
+        last = fourier_motion(arm, rng, THIRD, terms=terms, highest=highest, share=0.9)
+    else:
+        last = point_to_point_motion(arm, rng, THIRD, slowest=0.3, share=0.9)
+    noises = (rng.spawn(1)[0], rng.spawn(1)[0], rng.spawn(1)[0])
+    lowest = floor(plant, THIRD, RATE, noises[2])
     by_band = np.array([band_rms(lowest, RATE, band) for band in BANDS])
     truths = () if group in ("clean", "wrong", "outside") else tuple(map(_truth, kinds, hidden))
     answer = Answer(
@@ -208,8 +226,8 @@ def _drawn(plan: tuple[str, tuple[str, ...], float], number: int, rng: Rng) -> C
         {f"tau.{joint}": tuple(float(f"{x:.5g}") for x in by_band[:, k]) for k, joint in enumerate(arm.joints)},
     )
     secret = {(name, m.name) for h, m in zip(hidden, planned, strict=True) for name in h.unknown}
-    model, twin_model = _model(kinds, hidden, plant, secret), _model((), hidden, twin, ())
-    return Case(plant, motions, model, answer, tuple(hidden), planned, noises, twin, twin_model)
+    model, twin_model = model_text(kinds, hidden, plant, secret), model_text((), hidden, twin, ())
+    return Case(plant, (*motions, last), model, answer, tuple(hidden), planned, noises, twin, twin_model)
 
 
 def _make(group: str, kind: str, m: Planned, rms: float, rng: Rng) -> Concealed:
@@ -272,22 +290,3 @@ def _truth(kind: str, made: Concealed) -> Truth:
     if kind in SKEWED:
         return Truth("sensor_delay", made.at)
     return Truth(kind, made.at, tuple(name for name in made.unknown if name != kind))
-
-
-def _model(
-    kinds: Collection[str], hidden: Sequence[Concealed], plant: ProofPlant, secret: Collection[tuple[str, str]]
-) -> str:
-    """The model file: friction known everywhere but where it is concealed; and the wrong numbers that a case wants."""
-    knows = dict.fromkeys((*FRICTION, *(name for h in hidden for name in h.knows)))
-    known = [(e, j) for e in knows for j in plant.arm.joints if (e, j) not in secret]
-    listed = ", ".join(f'{{name = "{e}", at = "{j}"}}' for e, j in known)
-    text = f'name = "arm"\nsystem = "arm"\nurdf = "arm.urdf"\neffects = [{listed}]\n'
-    if "free inertia" in kinds:
-        text += 'inertia = "free"\n'
-    if "friction values" in kinds:
-        text += "[parameters]\n"
-        for joint, law in plant.friction.items():
-            assert isinstance(law, LuGre)
-            text += f'"viscous_friction.{joint}.coefficient" = {2.0 * law.viscous}\n'
-            text += f'"coulomb_friction.{joint}.level" = {0.5 * law.level}\n'
-    return text

@@ -172,5 +172,24 @@ MAKERS: dict[str, Maker] = {
 }
 """By the vocabulary's name. Those missing act on rigs, floating bases and snares, not on an arm."""
 
+VALUES = {
+    "coulomb_friction": "level",
+    "stribeck_friction": "level",
+    "asymmetric_friction": "level_difference",
+    "load_dependent_friction": "coefficient",
+    "viscous_friction": "coefficient",
+    "quadratic_friction": "coefficient",
+    "presliding_hysteresis": "travel",
+    "rotor_inertia": "inertia",
+    "harness_stiffness": "stiffness",
+    "joint_elasticity": "stiffness",
+    "backlash": "gap",
+    "payload_mass": "mass",
+    "sensor_bias": "offset",
+    "sensor_gain": "error",
+    "sensor_delay": "delay",
+}
+"""The vocabulary's parameter that a maker's value is, but for its sign; of the others the law has other parameters."""
+
 STRUCTURE = ("inertia_error", "payload_mass", "com_offset")
 """What a wrong parameter of the rigid body may be called."""

@@ -40,10 +40,11 @@ class Row(NamedTuple):
 class Counted:
     """``logit``: level, by_gain, by_held, by_share; ``skill``: by generator, the Brier skill of the map that leaves
     it out against the constant that is its own frequency of right names; None where there is no such map, or nothing
-    to be told."""
+    to be told. ``brier``: over all rows, each by the map that leaves its generator out; None where there is but one."""
 
     logit: tuple[float, ...]
     skill: Mapping[str, float | None]
+    brier: float | None
 
 
 def counted(rows: Sequence[Row]) -> Counted:
@@ -56,11 +57,13 @@ def counted(rows: Sequence[Row]) -> Counted:
     """
     if not rows:
         raise ValueError("no name was told: nothing can be counted; give more cases")
-    skill = {}
-    for name in sorted({r.generator for r in rows}):
+    found, errors = {}, 0.0
+    names = sorted({r.generator for r in rows})
+    for name in names:
         own, others = [r for r in rows if r.generator == name], [r for r in rows if r.generator != name]
-        skill[name] = _skill(fitted(others), own) if others else None
-    return Counted(fitted(rows), skill)
+        found[name] = skill(logit := fitted(others), own) if others else None
+        errors += len(own) * brier(logit, own) if others else 0.0
+    return Counted(fitted(rows), found, errors / len(rows) if len(names) > 1 else None)
 
 
 def fitted(rows: Sequence[Row]) -> tuple[float, ...]:
@@ -96,12 +99,15 @@ def _evidence(rows: Sequence[Row]) -> Array:
     )
 
 
-def _skill(logit: Sequence[float], rows: Sequence[Row]) -> float | None:
-    right = np.array([r.right for r in rows], float)
-    constant = float(np.mean((right - right.mean()) ** 2))
-    if not constant > 0:
-        return None
-    return 1 - float(np.mean((probability(logit, rows) - right) ** 2)) / constant
+def brier(logit: Sequence[float], rows: Sequence[Row]) -> float:
+    """Mean square error of a map's probabilities (Brier 1950)."""
+    return float(np.mean((probability(logit, rows) - np.array([r.right for r in rows], float)) ** 2))
+
+
+def skill(logit: Sequence[float], rows: Sequence[Row]) -> float | None:
+    """Of a map against the constant that is the rows' own frequency; None where that is 0 or 1."""
+    constant = float(np.var([r.right for r in rows]))
+    return 1 - brier(logit, rows) / constant if constant > 0 else None
 
 
 def of_effects(effects: Sequence[Mapping[str, Any]], right: Sequence[bool], generator: str) -> list[Row]:
@@ -124,14 +130,19 @@ def of_effects(effects: Sequence[Mapping[str, Any]], right: Sequence[bool], gene
     return found
 
 
-def of_lines(lines: Sequence[Mapping[str, Any]], generator: str = "drives") -> list[Row]:
-    """Rows of what ``python -m proof.drives score`` kept; names that are true of every case's background, and are
-    neither right nor wrong, are left out."""
+def of_lines(lines: Sequence[Mapping[str, Any]]) -> list[Row]:
+    """Rows of what ``python -m proof.drives score`` kept of the second or third generator; names that are true of every
+    case's background, and are neither right nor wrong, are left out."""
     found = []
     for line in lines:
         pairs = [(e, t.member) for e, t in zip(line["effects"], judge(line).told, strict=True) if not t.background]
         try:
-            found += of_effects([e for e, _ in pairs], [right for _, right in pairs], generator)
+            found += of_effects([e for e, _ in pairs], [right for _, right in pairs], generator_of(line))
         except ValueError as error:
             raise ValueError(f"{line['case']}: {error}") from None
     return found
+
+
+def generator_of(line: Mapping[str, Any]) -> str:
+    """Of a line that ``python -m proof.drives score`` kept: the third generator plays its disturbance."""
+    return "played" if line["truth"]["disturbance"]["kind"] == "played" else "drives"

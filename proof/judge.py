@@ -15,12 +15,15 @@ import numpy as np
 from snarelab.models.effects import effects
 
 from .cases import BANDS, Answer, Truth
-from .concealed import STRUCTURE
+from .concealed import STRUCTURE, VALUES
 from .oracle import over_floor
 
 Diagnosed = Mapping[str, Any]
 AUDIBLE = 1.02
-"""A holdout error below this multiple of its oracle's leaves nothing to close."""
+"""An error below this multiple of its oracle's leaves nothing to close."""
+
+MASSES, ROTORS = ("payload_mass", "inertia_error"), ("rotor_inertia",)
+"""Names that say that a link's mass, and a joint's rotor, are not what the model says."""
 
 SILENT = "none"
 """Verdict of a method that names nothing, by what it is: it has no false alarms, and no right names."""
@@ -28,8 +31,12 @@ SILENT = "none"
 
 @dataclass(frozen=True)
 class Scored:
-    """One case. ``claims``: (probability, right) of each class named; ``error``: holdout error over its floor where the
-    concealed effects show, (before, after); ``oracle``: there, too, what the same arm with nothing concealed leaves.
+    """One case.
+
+    ``claims``: (probability, right) of each class named. ``error``: error on the third recording over its floor where
+    the concealed effects show, (before, after); ``oracle``: there, too, what that arm leaves with nothing concealed.
+    ``moved``: of each number of the body that is right (a mass a link, a rotor a joint), whether it is said to be
+    wrong. ``deviations``: of the values of right names, (told - true) / std.
     """
 
     answer: Answer
@@ -43,10 +50,12 @@ class Scored:
     sizes: tuple[int, ...]
     error: tuple[float, float] | None
     oracle: float = 1.0
+    moved: tuple[bool, ...] = ()
+    deviations: tuple[float, ...] = ()
 
     @property
     def closure(self) -> float | None:
-        """(before − after) / (before − oracle) of the holdout; where there was nothing to close, 1 if it stayed so."""
+        """(before − after) / (before − oracle), third recording; where there was nothing to close, 1 if that stayed."""
         return self._closed(self.oracle)
 
     @property
@@ -64,7 +73,7 @@ class Scored:
 
 
 def judge(answer: Answer, found: Diagnosed, oracle: Mapping[str, float] | None = None) -> Scored:
-    """Score one case; ``oracle``: holdout error over its floor of every channel, in the band of what was found."""
+    """Score one case; ``oracle``: error over its floor of every channel, in the band of what was found."""
     classes = [_class(e) for e in names_in(found)]
     right = [_fits(c, answer.truths) for c in classes]
     placed = rightly_placed(answer, found)
@@ -85,6 +94,8 @@ def judge(answer: Answer, found: Diagnosed, oracle: Mapping[str, float] | None =
         sizes=tuple(len(c) for c in classes),
         error=_error(answer, found),
         oracle=over_floor(oracle or {}, answer.channels),
+        moved=_moved(answer, classes),
+        deviations=_deviations(answer, found),
     )
 
 
@@ -114,6 +125,30 @@ def _found(truth: Truth, classes: Sequence[Sequence[tuple[str, str]]], at: bool 
     return any(truth.name in c for c in named) or (len(parts) > 1 and sum(bool(c & set(parts)) for c in named) > 1)
 
 
+def _deviations(answer: Answer, found: Diagnosed) -> tuple[float, ...]:
+    """Of what was concealed and named at its place, where the value has a standard deviation and is at no bound."""
+    told = []
+    for truth, value in zip(answer.truths, answer.value, strict=False):
+        for e in names_in(found):
+            if (e["name"], joint(e["at"])) == (truth.name, joint(truth.at)):
+                own = e.get("parameters", {}).get(VALUES.get(truth.name, ""))
+                if own and own["std"] and not own.get("at_bound", False):
+                    told.append((abs(own["value"]) - abs(value)) / own["std"])
+    return tuple(told)
+
+
+def _moved(answer: Answer, classes: Sequence[Sequence[tuple[str, str]]]) -> tuple[bool, ...]:
+    """None where a number of the body is what is wrong, or at the joints where something is concealed."""
+    if answer.group == "wrong":
+        return ()
+    joints = set(range(1, answer.joints + 1)) - {joint(t.at) for t in answer.truths}
+    found = []
+    for names in MASSES, ROTORS:
+        said = {joint(c[0][1]) for c in classes if all(name in names for name, _ in c)}
+        found += [k in said for k in sorted(joints)]
+    return tuple(found)
+
+
 def is_physics(name: str) -> bool:
     """Whether a name is more than a wrong parameter or a faulty sensor."""
     return effects()[name].family != "measurement" and name not in STRUCTURE
@@ -125,13 +160,13 @@ def joint(place: str) -> int:
 
 
 def _error(answer: Answer, found: Diagnosed) -> tuple[float, float] | None:
-    """Holdout RMS before and after over its floor, in the channels where what is concealed shows most."""
-    if not found["fit"] or not answer.channels:
+    """RMS on the third recording before and after over its floor, where what is concealed shows most."""
+    if not found["third"] or not answer.channels:
         return None
     pairs = []
     for channel in answer.channels:
         lowest = float(np.interp(found["band"]["value"], BANDS, answer.floor[channel]))
-        fit = found["fit"][channel]["holdout"]
-        pairs.append((fit["rms_before"] / lowest, fit["rms_after"] / lowest))
+        before, after = found["third"][channel]
+        pairs.append((before / lowest, after / lowest))
     before, after = np.sqrt(np.mean(np.square(pairs), axis=0))
     return float(before), float(after)

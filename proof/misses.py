@@ -59,7 +59,7 @@ def explained(c: Scored, found: Diagnosed) -> str:
     if wrong and c.answer.truths:
         parts.append(f"Not concealed, but named: {', '.join(wrong)}.")
     if c.error is not None and c.answer.truths:
-        parts.append(f"Holdout error over its floor: {c.error[0]:.2f} before, {c.error[1]:.2f} after.")
+        parts.append(f"Error on the third recording over its floor: {c.error[0]:.2f} before, {c.error[1]:.2f} after.")
     return " ".join(p for p in parts if p)
 
 

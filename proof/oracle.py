@@ -12,15 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from snarelab.identification.fitting.assembly import TorqueModel
-from snarelab.identification.fitting.experiment import load_experiments, scales
-from snarelab.identification.fitting.fit import channel_rms, fit
-from snarelab.identification.search.rest import fitted
-from snarelab.models.model_file import load_model
-from snarelab.models.rigid_body import RigidBody
-
-from .cases import HOLDOUT, RATE, draw
+from .cases import RATE, THIRD, draw
 from .plant import band_rms, floor
+from .third import left
 
 
 @dataclass(frozen=True)
@@ -35,14 +29,14 @@ class Wanted:
 
 
 def run(wanted: Wanted) -> dict[str, Any]:
-    """``over_floor``: for each band the holdout error of every channel over its floor.
+    """``over_floor``: for each band the error on the third recording of every channel over its floor.
 
     ``none`` says why there is no oracle, where its arm cannot be recorded; the floor stands for it then.
     """
     if not wanted.bands:
         return {"over_floor": []}
     case = draw(wanted.plan, wanted.seed, wanted.number, wanted.attempt)
-    lowest = floor(case.twin, HOLDOUT, RATE, case.noise[1])
+    lowest = floor(case.twin, THIRD, RATE, case.noise[2])
     found = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -50,16 +44,10 @@ def run(wanted: Wanted) -> dict[str, Any]:
             replace(case, plant=case.twin, model=case.twin_model).write(folder)
         except ValueError as error:
             return {"over_floor": [{} for _ in wanted.bands], "none": str(error)}
-        model = load_model(folder / "arm.toml")
-        body = RigidBody(model.tree)
-        for wide in wanted.bands:
-            train = load_experiments(model, [folder / "train.csv"], body, wide)
-            band = train[0].motion.band
-            held = load_experiments(model, [folder / "hold.csv"], body, band)
-            assembly = TorqueModel(model.tree, model.effects, None, scales(train), model.values)
-            theta = fit(assembly, fitted(assembly, train)).theta
-            left = channel_rms(assembly, held, theta)[0] / band_rms(lowest, RATE, band)
-            found.append(dict(zip((f"tau.{joint}" for joint in model.joints), left.tolist(), strict=True)))
+        for band in wanted.bands:
+            own = left(folder, folder / "arm.toml", band, refit=True)
+            least = band_rms(lowest, RATE, band)
+            found.append({channel: x / float(least[k]) for k, (channel, x) in enumerate(own.items())})
     return {"over_floor": found}
 
 

@@ -84,7 +84,7 @@ def _figures(scores: Mapping[str, Score]) -> str:
     heads = ["figure", "bar", TOOL, "95 % interval", "cases", "", *(r.replace("_", " ") for r in rivals)]
     lost = behind(scores)
     text = (
-        "No rival does better on any figure with a bar, nor on the holdout error."
+        "No rival does better on any figure with a bar, nor on the error on the third recording."
         if not lost
         else "A rival does better on: "
         + "; ".join(f"{f.replace('_', ' ')} ({r.replace('_', ' ')})" for f, r in lost)
@@ -94,7 +94,8 @@ def _figures(scores: Mapping[str, Score]) -> str:
         "Shares have exact intervals (Clopper and Pearson 1934), medians and the calibration error bootstrapped ones. "
         "n/a: the method says nothing that the figure could count.",
         "Rivals: joint BIC without whitening, over textbook columns; PySINDy on the residual of the frozen baseline; a "
-        "Gaussian process on each joint's residual, which names nothing. They are given the same rigid body, baseline "
+        "Gaussian process on each joint's residual, which names nothing; mujoco.sysid with every joint's friction "
+        "and rotor, and every link's mass, free. They are given the same rigid body, baseline "
         "physics and recordings, and their errors are counted below their own filter's edge.",
     )
     return table("", heads, rows, numeric=(1, 2, 3, 4, *range(6, len(heads)))) + "".join(
@@ -178,9 +179,9 @@ def _cases(own: Score) -> str:
     heads = ["case", "concealed", "said", "before", "after", "oracle", "closure", "joints"]
     heads += ["disturbance [N·m]", "noise [N·m]"]
     about = paragraph(
-        "Before, after, oracle: holdout error over its floor where the concealed effects show most. Closure: "
-        "(before − after) / (before − oracle). The oracle is the tool's fit of the same arm, motion, disturbance and "
-        "noise with nothing concealed; where that arm cannot be recorded, it is the floor."
+        "Before, after, oracle: error on the third recording over its floor where the concealed effects show most. "
+        "Closure: (before − after) / (before − oracle). The oracle is the tool's fit of the same arm, motion, "
+        "disturbance and noise with nothing concealed; where that arm cannot be recorded, it is the floor."
     )
     return folded(f"{len(rows)} cases", about + table("", heads, rows, numeric=range(3, 10)))
 

@@ -1,7 +1,8 @@
 """The proof's pictures: confusion matrix and reliability curve."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -76,4 +77,30 @@ def reliability(claims: Sequence[tuple[float, bool]]) -> bytes:
         axes.set_ylim(0, 1.02)
         axes.set_xlabel("probability stated")
         axes.set_ylabel("frequency of being right")
+        return svg(picture)
+
+
+def power(found: Mapping[str, Any]) -> bytes:
+    """How often each effect is seen, and by its right name, over multiples of its limit, as SVG: a panel an effect."""
+    effects = found["effects"]
+    columns = 4
+    rows = -(-len(effects) // columns)
+    with drawing():
+        picture = Figure(figsize=(2.2 * columns, 0.6 + 1.6 * rows), layout="constrained")
+        panels = picture.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
+        for axes, (name, every) in zip(panels, effects.items(), strict=False):
+            some = [r for r in every if r["cases"]]
+            x = [r["ratio"] for r in some]
+            low, high = np.array([r["seen_interval"] for r in some]).T
+            axes.fill_between(x, low, high, color=GREY, alpha=0.25, linewidth=0)
+            axes.plot(x, [r["seen"] for r in some], color=GREY, marker="o", label="seen")
+            axes.plot(x, [r["named"] for r in some], color=AFTER, marker="o", label="by its name")
+            axes.axvline(1.0, color=GREY, linewidth=0.5)
+            axes.set_title(f"{name.replace('_', ' ')} ({max(r['cases'] for r in some)})", fontsize=8)
+            axes.set_ylim(-0.05, 1.05)
+        for axes in panels[len(effects) :]:
+            axes.set_visible(False)
+        panels[0].legend(fontsize=7)
+        picture.supxlabel("size over the limit stated")
+        picture.supylabel("share of arms")
         return svg(picture)

@@ -39,12 +39,13 @@ def result(
 
 
 def behind(scores: Mapping[str, Score], tool: str = "snarelab") -> list[tuple[str, str]]:
-    """(figure, rival) wherever a rival does better on a figure with a bar, or on the holdout error."""
+    """(figure, rival) wherever a rival does better on a figure with a bar, or on the error on the third recording."""
     found = []
     for name, own in scores[tool].figures.items():
         for rival in scores:
             other = scores[rival].figures[name]
-            if rival == tool or own.value is None or other.value is None or not (own.bar or name == "holdout_error"):
+            counts = own.bar is not None or name in ("third_error", "right_moved")
+            if rival == tool or own.value is None or other.value is None or not counts:
                 continue
             if (other.value < own.value) if own.at_most else (other.value > own.value):
                 found.append((name, rival))
@@ -71,7 +72,7 @@ def interval(figure: Figure) -> str:
 
 def is_share(figure: Figure) -> bool:
     """Whether it counts cases."""
-    return not figure.name.startswith(("closure", "calibration", "holdout", "class"))
+    return not figure.name.startswith(("closure", "calibration", "third", "class"))
 
 
 def terminal(scores: Mapping[str, Score], tool: str = "snarelab") -> str:

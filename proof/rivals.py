@@ -1,4 +1,4 @@
-"""The usual ways, on the same recordings: joint BIC, a residual fit with PySINDy, a Gaussian process per joint.
+"""The usual ways, on the same recordings: joint BIC, PySINDy on the residual, a Gaussian process, MuJoCo's sysid.
 
 ``run(folder)`` gives each one's answer in the tool's own JSON form, so that one scorer judges all.
 
@@ -8,6 +8,7 @@
   Proctor and Kutz 2016), bagged, picks columns for each joint's residual; the threshold is the one that predicts the
   last quarter of the training recording best. Probabilities are inclusion frequencies (Fasel et al. 2022).
 - ``gaussian_process``: each joint's residual as a smooth function of its q, qd, qdd and load. It names nothing.
+- ``mujoco_sysid``: MuJoCo's own toolbox with friction, rotors and masses free (`rival_sysid`).
 """
 
 import time
@@ -21,7 +22,7 @@ from numpy.typing import NDArray
 
 from .rival_columns import CUTOFF, TRAVELS, Column, Recording, baseline, fixed, library, read
 
-NAMES = ("joint_bic", "pysindy", "gaussian_process")
+NAMES = ("joint_bic", "pysindy", "gaussian_process", "mujoco_sysid")
 MOST = 8
 """Most effects that a rival may name."""
 THRESHOLDS = (0.02, 0.05, 0.1, 0.2, 0.4)
@@ -37,7 +38,7 @@ Columns = Mapping[Column, NDArray]
 class Task:
     """What all rivals start from: both recordings, the frozen baseline's residuals (m, J), the columns."""
 
-    def __init__(self, folder: Path, names: tuple[str, str] = ("train.csv", "hold.csv")) -> None:
+    def __init__(self, folder: Path, names: tuple[str, str] = ("train.csv", "third.csv")) -> None:
         """Read, condition, fit the baseline."""
         self.train, self.hold = (read(folder, name) for name in names)
         self.library, self.library_hold = library(self.train), library(self.hold, self.train)
@@ -68,16 +69,13 @@ class Task:
         return np.linalg.lstsq(self.flat(columns), (self.target / self.scale).ravel())[0]
 
     def answer(self, effects: list[dict[str, Any]], left: NDArray, verdict: str = "") -> dict[str, Any]:
-        """In the tool's form; ``left`` (m, J) is the holdout's residual after."""
+        """In the tool's form; ``left`` (m, J) is the third recording's residual after."""
         joints = self.train.model.joints
         before, after = (np.sqrt(np.mean(x**2, axis=0)) for x in (self.residual_hold, left))
         return {
             "verdict": verdict or ("missing_physics" if effects else "adequate"),
             "effects": effects,
-            "fit": {
-                f"tau.{j}": {"holdout": {"rms_before": float(b), "rms_after": float(a)}}
-                for j, b, a in zip(joints, before, after, strict=True)
-            },
+            "third": {f"tau.{j}": [float(b), float(a)] for j, b, a in zip(joints, before, after, strict=True)},
             "band": {"value": CUTOFF},
         }
 
@@ -87,6 +85,7 @@ def run(folder: Path) -> dict[str, Any]:
     start = time.perf_counter()
     task = Task(folder)
     found = {"joint_bic": joint_bic(task), "pysindy": pysindy(task), "gaussian_process": gaussian_process(task)}
+    found["mujoco_sysid"] = mujoco_sysid(task, folder / "arm.urdf")
     return found | {"seconds": round(time.perf_counter() - start, 1)}
 
 
@@ -213,6 +212,15 @@ def gaussian_process(task: Task) -> dict[str, Any]:
             process = GaussianProcessRegressor(kernel).fit((x[rows] - middle) / size, task.residual[rows, k] / unit)
         left[:, k] -= unit * np.ravel(process.predict((held - middle) / size))
     return task.answer([], left, "none")
+
+
+def mujoco_sysid(task: Task, urdf: Path) -> dict[str, Any]:
+    """Friction, rotors and masses of every joint and link at once, by MuJoCo's toolbox."""
+    from .rival_sysid import fitted
+
+    found = fitted(urdf, task.train, task.scale)
+    known = {(p.effect.name, p.at) for p in task.train.model.effects}
+    return task.answer(found.effects(known), task.hold.tau - found.torque(found.model, task.hold))
 
 
 def _inputs(r: Recording, k: int) -> NDArray:

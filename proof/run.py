@@ -28,9 +28,10 @@ from .page import write_page
 from .result import result, terminal
 from .rival_columns import CUTOFF
 from .score import score
-from .seal import INPUTS, BrokenSeal, Seal, digest, sha256, text, tool, write_json
+from .seal import INPUTS, SEALED, BrokenSeal, Seal, digest, sha256, text, tool, write_json
 from .seal import oracle as oracle_digest
 from .seal import rivals as rivals_digest
+from .third import left
 
 SEED = 700004
 """The proof's own: 700001 to 700003 were, until their misses had been read. 90000 to 99999 is for work on the tool."""
@@ -56,7 +57,7 @@ def record(seed: int, count: int, number: int, folder: Path) -> int:
 
 def diagnose(folder: Path) -> Diagnosed:
     """The tool as a user starts it, in a process whose folder holds model and recordings, and which is alone there."""
-    words = ["diagnose", "arm.toml", "train.csv", "--holdout", "hold.csv", "--json", "-"]
+    words = ["diagnose", "arm.toml", "train.csv", "--holdout", "hold.csv", "--json", "-", "--save-model", "found.toml"]
     keep = {name: os.environ[name] for name in ("PATH", "HOME", "PYTHONPATH", "TMPDIR") if name in os.environ}
     threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     start = time.perf_counter()
@@ -64,6 +65,7 @@ def diagnose(folder: Path) -> Diagnosed:
         with tempfile.TemporaryDirectory() as alone:
             for name in INPUTS:
                 shutil.copy(folder / name, alone)
+            # The third recording is not in this folder.
             done = subprocess.run(
                 [sys.executable, "-m", "snarelab.cli", *words],
                 cwd=alone,
@@ -72,15 +74,27 @@ def diagnose(folder: Path) -> Diagnosed:
                 text=True,
                 timeout=LONGEST,
             )
-        found = json.loads(done.stdout) if done.returncode == 0 else failed(done.stderr.strip()[-300:])
+            seconds = round(time.perf_counter() - start, 1)
+            found = json.loads(done.stdout) if done.returncode == 0 else failed(done.stderr.strip()[-300:])
+            if done.returncode == 0:
+                found["third"] = gained(folder, Path(alone) / "found.toml", found["band"]["value"])
     except subprocess.TimeoutExpired:
-        found = failed(f"no answer within {LONGEST:g} s")
-    return found | {"seconds": round(time.perf_counter() - start, 1)}
+        found, seconds = failed(f"no answer within {LONGEST:g} s"), LONGEST
+    return found | {"seconds": seconds}
+
+
+def gained(folder: Path, model: Path, band: float) -> dict[str, list[float]]:
+    """RMS on the third recording by channel: of a fit without a name, and of the model that was found, where there is
+    one."""
+    before = left(folder, folder / "arm.toml", band, refit=True)
+    after = left(folder, model, band, refit=False) if model.exists() else before
+    return {channel: [before[channel], after[channel]] for channel in before}
 
 
 def failed(why: str) -> Diagnosed:
     """What stands for a diagnosis that the tool could not make; it is scored as any other, and never right."""
-    return {"verdict": "failed", "effects": [], "fit": {}, "notes": [why], "candidates": [], "band": {"value": 10.0}}
+    none = {"verdict": "failed", "effects": [], "fit": {}, "third": {}, "candidates": [], "band": {"value": 10.0}}
+    return none | {"notes": [why]}
 
 
 def prepare(count: int, seed: int, pool: Executor, tell: Tell, folder: Path) -> tuple[list[Answer], list[Path], Seal]:
@@ -103,7 +117,7 @@ def prepare(count: int, seed: int, pool: Executor, tell: Tell, folder: Path) -> 
     else:
         answers = [draw(plan[k], seed, k, seal.attempts[k]).answer for k in range(count)]
     (folder / "answers.json").unlink(missing_ok=True)
-    if sha256(text(answers)) != seal.answers or digest(f / n for f in folders for n in INPUTS) != seal.recordings:
+    if sha256(text(answers)) != seal.answers or digest(f / n for f in folders for n in SEALED) != seal.recordings:
         raise BrokenSeal(f"{folder}: answers or recordings are not those sealed at {seal.time}; delete the folder")
     tell(f"answers sealed at {seal.time}, SHA-256 {seal.answers}")
     return answers, folders, seal

@@ -10,6 +10,8 @@ from .concealed import STRUCTURE
 from .judge import SILENT, Diagnosed, Scored, is_physics, judge
 from .statistics import bootstrap, calibration_error, clopper_pearson
 
+DEVIATIONS = 2.0
+
 
 @dataclass(frozen=True)
 class Figure:
@@ -85,6 +87,7 @@ def _figures(cases: Sequence[Scored]) -> list[Figure]:
     every_closure = [x for c in known if (x := c.closure) is not None]
     gone = [c for c in named if c.error]
     silent = all(c.verdict == SILENT for c in cases)
+    moved = [] if silent else [m for c in cases for m in c.moved]
     found = [
         _share(
             "false_alarms",
@@ -130,8 +133,8 @@ def _figures(cases: Sequence[Scored]) -> list[Figure]:
             *_interval(closures, _median),
             len(closures),
             0.9,
-            meaning="share of the avoidable holdout error that naming removes, median over rightly named cases; "
-            "avoidable: what the oracle, a fit of the same arm with nothing concealed, does not leave",
+            meaning="share of the avoidable error on the third recording that naming removes, median over rightly "
+            "named cases; avoidable: what the oracle, a fit of the same arm with nothing concealed, does not leave",
         ),
         Figure(
             "closure_worst",
@@ -156,7 +159,7 @@ def _figures(cases: Sequence[Scored]) -> list[Figure]:
             gone,
             lambda c: c.error is not None and c.error[0] > 1.02 * c.error[1],
             0.95,
-            "inverse test: without the name the holdout error is at least 2 % higher again",
+            "inverse test: without the name the error on the third recording is at least 2 % higher again",
         ),
         _share(
             "decoys",
@@ -199,13 +202,23 @@ def _figures(cases: Sequence[Scored]) -> list[Figure]:
             meaning="closure, median over all cases with one concealed effect, whatever was said",
         ),
         Figure(
-            "holdout_error",
+            "third_error",
             _median(errors),
             *_interval(errors, _median),
             len(errors),
             None,
             True,
-            "holdout RMS over its floor, median over all cases with a named truth, whatever was said",
+            "RMS on the third recording over its floor, median over all cases with a named truth, whatever was said",
+        ),
+        _covered([abs(d) <= DEVIATIONS for c in cases for d in c.deviations]),
+        Figure(
+            "right_moved",
+            float(np.mean(moved)) if moved else None,
+            *(clopper_pearson(sum(moved), len(moved)) if moved else (None, None)),
+            len(moved),
+            None,
+            True,
+            "masses and rotors that were right and are said to be wrong, of all that were right",
         ),
         Figure(
             "class_size",
@@ -219,6 +232,15 @@ def _figures(cases: Sequence[Scored]) -> list[Figure]:
         ),
     ]
     return found
+
+
+def _covered(inside: Sequence[bool]) -> Figure:
+    """After selection: only names that were told have values."""
+    low, high = clopper_pearson(sum(inside), len(inside))
+    value = float(np.mean(inside)) if inside else None
+    return Figure(
+        "coverage", value, low, high, len(inside), 0.9, False, "true values of right names within two deviations"
+    )
 
 
 def _median(values: Sequence[float]) -> float | None:

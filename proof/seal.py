@@ -17,7 +17,9 @@ from .cases import Answer
 
 ROOT = Path(__file__).resolve().parents[1]
 INPUTS = ("arm.toml", "arm.urdf", "train.csv", "hold.csv")
-"""All that a case's folder holds, and all that the tool is given."""
+"""What of a case's folder the tool is given."""
+SEALED = (*INPUTS, "third.csv")
+"""What it holds."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,7 @@ class Seal:
     def make(answers: Sequence[Answer], attempts: Sequence[int], folders: Sequence[Path], seed: int) -> "Seal":
         """Digest answers and recordings."""
         now = datetime.now(UTC).isoformat(timespec="seconds")
-        recordings = digest(folder / name for folder in folders for name in INPUTS)
+        recordings = digest(folder / name for folder in folders for name in SEALED)
         return Seal(sha256(text(answers)), recordings, generator(), seed, len(answers), tuple(attempts), now)
 
     def write(self, path: Path) -> None:
@@ -76,7 +78,7 @@ def digest(paths: Iterable[Path]) -> str:
 
 def generator() -> str:
     """SHA-256 over the sources that cases and recordings follow from."""
-    own = [ROOT / "proof" / f"{name}.py" for name in ("robots", "plant", "concealed", "outside", "cases")]
+    own = [ROOT / "proof" / f"{name}.py" for name in ("robots", "plant", "concealed", "outside", "cases", "model_text")]
     used = [ROOT / "bench" / f"{n}.py" for n in ("arm", "concealed", "lugre", "motion", "mujoco_plant", "parts")]
     return digest([*own, *used])
 
@@ -96,8 +98,8 @@ def rivals() -> str:
 
 
 def oracle() -> str:
-    """SHA-256 over the source of the oracle."""
-    return digest([ROOT / "proof" / "oracle.py"])
+    """SHA-256 over the sources of the oracle, and of what is counted on the third recording."""
+    return digest([ROOT / "proof" / "oracle.py", ROOT / "proof" / "third.py"])
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:

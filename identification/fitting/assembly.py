@@ -258,7 +258,7 @@ class TorqueModel:
                 j = here.joint
                 passed.setdefault(j, []).append(sense)
                 apart = len(rigid) if here.apart else 0
-                blocks[apart:] = [Block(j, b.index, sense(b.values)) if b.channel == j else b for b in blocks[apart:]]
+                blocks[apart:] = _sensed(blocks[apart:], j, sense)
             if by_load is not None:
                 blocks += self._through_load(p, by_load, rigid)
             for channel, values, columns in terms:
@@ -301,3 +301,13 @@ class TorqueModel:
                 load[:, channel] += values
                 blocks.append(Block(channel, self._index[k], columns[:, self._free[k]]))
         return load, blocks
+
+
+def _sensed(blocks: Sequence[Block], channel: int, sense: Callable[[Array], Array]) -> list[Block]:
+    """Blocks with a channel's as its sensor reads them, all columns in one pass."""
+    own = [b for b in blocks if b.channel == channel]
+    if not own:
+        return list(blocks)
+    stops = np.cumsum([b.values.shape[1] for b in own])[:-1]
+    read = iter(np.split(sense(np.concatenate([b.values for b in own], axis=1)), stops, axis=1))
+    return [Block(channel, b.index, next(read)) if b.channel == channel else b for b in blocks]

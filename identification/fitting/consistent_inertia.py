@@ -113,6 +113,8 @@ def consistent_inertia(
     beta = _finite("beta", beta, (n_base,))
     root = _root(_finite("information", information, (n_base, n_base)))
     nominal = _nominal(_finite("phi_nominal", phi_nominal, (n_standard,)))
+    if not root.shape[1]:
+        return ConsistentInertia(nominal, base.matrix @ nominal, 0.0, False)
     search = _Search(root.T @ base.matrix, root.T @ beta, nominal)
     phi = search.exact()
     if phi is None:
@@ -244,7 +246,7 @@ def _root(information: Array) -> Array:
     scale = np.where(spread > 0, spread, 1.0)
     scaled = information / np.outer(scale, scale)
     values, vectors = np.linalg.eigh(scaled)
-    if np.abs(scaled - scaled.T).max() > 1e-6 or values[0] < -1e-9 * len(scaled) or not spread.any():
+    if np.abs(scaled - scaled.T).max() > 1e-6 or values[0] < -1e-9 * len(scaled):
         raise InputError("information: not symmetric and positive; give the inverse of the covariance of beta")
     shown = values > 1e-13 * values[-1]
     return spread[:, None] * vectors[:, shown] * np.sqrt(values[shown])

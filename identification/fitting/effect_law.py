@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import fftconvolve
+from scipy.fft import irfft, next_fast_len, rfft
 
 from ...models.effect import Effect
 from ...models.hidden_state import LawEvaluation, evaluate_law
@@ -72,12 +72,15 @@ def impulse_response(effect: Effect, parameters: Array, period: float) -> Array:
     """Reading of a linear sensor for a unit impulse (m,), from the law itself; ``period`` in seconds."""
     impulse = np.zeros(RESPONSE)
     impulse[1] = 1.0
-    response = evaluate_law(effect, {"value": impulse}, parameters, period).values[1:, 0]
+    response = evaluate_law(effect, {"value": impulse}, parameters, period, bare=True).values[1:, 0]
     last = np.flatnonzero(np.abs(response) > 1e-9)
     return response[: last[-1] + 1] if len(last) else response[:1]
 
 
 def causal(columns: Array, response: Array) -> Array:
     """Columns (n, k) through a causal filter (m,) that has seen the first row for ever."""
-    lead = np.repeat(columns[:1], len(response) - 1, axis=0)
-    return fftconvolve(np.concatenate([lead, columns]), response[:, None], mode="valid", axes=0)
+    count, before = len(columns), len(response) - 1
+    seen = np.empty((columns.shape[1], before + count))
+    seen[:, :before], seen[:, before:] = columns[:1].T, columns.T
+    size = next_fast_len(before + count, real=True)  # what comes round the circle ends in the lead
+    return irfft(rfft(seen, size) * rfft(response, size), size)[:, before : before + count].T

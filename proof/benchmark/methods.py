@@ -2,7 +2,7 @@
 
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -52,15 +52,36 @@ def by_joint_bic(case: Path, torque: Path) -> Answer:
     whole = np.concatenate([baseline(last, task.travels), *(every[key] for key in chosen)], axis=2)
     predicted = fixed(last) + whole @ theta
     write(torque, {f"tau.{j}": predicted[:, k] for k, j in enumerate(last.model.joints)})
-    said = [
+    return {"verdict": "missing_physics" if effects else "adequate", "effects": _alike(effects)}
+
+
+def by_mujoco_sysid(case: Path, torque: Path) -> Answer:
+    """MuJoCo's toolbox with every joint's friction and rotor and every link's mass free (`proof.rival_sysid`)."""
+    from ..rival_sysid import fitted
+
+    task = Task(case, ("fit.csv", "confirm.csv"))
+    found = fitted(case / "arm.urdf", task.train, task.scale)
+    last = read(case, "predict.csv", predict=True)
+    predicted = found.torque(found.model, last)
+    write(torque, {f"tau.{j}": predicted[:, k] for k, j in enumerate(last.model.joints)})
+    effects = found.effects({(p.effect.name, p.at) for p in last.model.effects})
+    return {"verdict": "missing_physics" if effects else "adequate", "effects": _alike(effects)}
+
+
+def _alike(effects: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Effects in the form of the rules: with those that the method cannot tell from them."""
+    return [
         {"alike": [{k: r[k] for k in ("name", "at", "probability")} for r in e["rivals"] if not r["separable"]]}
         | {k: e[k] for k in ("name", "at", "probability")}
         for e in effects
     ]
-    return {"verdict": "missing_physics" if said else "adequate", "effects": said}
 
 
-METHODS: dict[str, Callable[[Path, Path], Answer]] = {"snarelab": by_snarelab, "joint_bic": by_joint_bic}
+METHODS: dict[str, Callable[[Path, Path], Answer]] = {
+    "snarelab": by_snarelab,
+    "joint_bic": by_joint_bic,
+    "mujoco_sysid": by_mujoco_sysid,
+}
 
 
 def answer(

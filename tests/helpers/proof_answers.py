@@ -16,10 +16,9 @@ def finding(name, at, probability=0.9, rivals=()):
 
 
 def diagnosis(*effects, verdict="", before=1.0, after=0.55):
-    fit = {"tau.joint1": {"holdout": {"rms_before": 0.6, "rms_after": 0.6}}}
-    fit["tau.joint2"] = {"holdout": {"rms_before": before, "rms_after": after}}
+    third = {"tau.joint1": [0.6, 0.6], "tau.joint2": [before, after]}
     verdict = verdict or ("missing_physics" if effects else "adequate")
-    return {"verdict": verdict, "effects": list(effects), "fit": fit, "band": {"value": 30.0}, "candidates": []}
+    return {"verdict": verdict, "effects": list(effects), "third": third, "band": {"value": 30.0}, "candidates": []}
 
 
 RIGHT = finding("harness_stiffness", "joint2")

@@ -147,7 +147,7 @@ def test_of_the_second_generator_a_class_is_right_and_what_is_true_of_every_case
 
 def test_the_command_keeps_the_curve_of_encoders_and_says_what_was_counted(tmp_path, monkeypatch, capsys):
     stored, lines = tmp_path / "reliability.json", tmp_path / "drives.jsonl"
-    stored.write_text('{"margin": [0.5], "probability": [0.9], "names": 117, "logit": [0, 0, 0]}')
+    stored.write_text('{"margin": [0.5], "probability": [0.9], "names": 117, "logit": [0, 0, 0, 0]}')
     right = {"name": "coulomb_friction", "at": "joint1", "size": 1.0, "values": {}}
     cases = [line([effect("coulomb_friction", f"joint{1 + k % 3}", 5.0 + k)], [right]) for k in range(9)]
     lines.write_text("".join(json.dumps(x) + "\n" for x in [*cases, line([], [])]))
@@ -157,13 +157,45 @@ def test_the_command_keeps_the_curve_of_encoders_and_says_what_was_counted(tmp_p
     made = json.loads(stored.read_text())
     assert (made["margin"], made["probability"], made["names"]) == ([0.5], [0.9], 117)
     assert made["logit"] == list(fitted(of_lines(cases)))
-    assert made["counted"]["generators"] == {"drives": {"cases": 10, "names": 9, "right": 3, "skill": None}}
+    assert made["counted"]["generators"] == {
+        "drives": {"cases": 10, "names": 9, "right": 3, "skill": None, "skill_of_the_map_before": pytest.approx(-0.125)}
+    }  # a coin's Brier score is 1/4, that of the frequency of 3 of 9 is 2/9
     assert made["counted"]["command"] == f"python -m proof.calibrate --cases 0 --drives {lines}"
     before = stored.read_text()
     lines.write_text("")
     assert calibrate.main() == 2
     assert "no name was told" in capsys.readouterr().err
     assert stored.read_text() == before
+
+
+def test_a_map_that_predicts_a_generator_left_out_no_better_is_not_stored(tmp_path, monkeypatch, capsys):
+    """Of two generators, in whose names the same evidence speaks against each other; and of two that agree."""
+    stored = tmp_path / "reliability.json"
+    text = '{"margin": [0.5], "probability": [0.9], "logit": [0, 0, 0, 0]}'
+    monkeypatch.setattr(calibrate, "JSON", stored)
+
+    def left_after(right_where_played) -> str:
+        stored.write_text(text)
+        files = [tmp_path / "drives.jsonl", tmp_path / "played.jsonl"]
+        for file, kind, right in zip(files, ("white", "played"), (lambda k: k > 20, right_where_played), strict=True):
+            some = []
+            for k in range(40):
+                at = "joint1" if right(k) else "joint2"
+                own = line(
+                    [effect("backlash", at, 5.0 + 10 * k)],
+                    [{"name": "backlash", "at": "joint1", "size": 1.0, "values": {}}],
+                )
+                own["truth"]["disturbance"] = {"kind": kind}
+                some.append(own)
+            file.write_text("".join(json.dumps(x) + "\n" for x in some))
+        monkeypatch.setattr("sys.argv", ["calibrate", "--cases", "0", "--drives", *map(str, files)])
+        done = calibrate.main()
+        assert ("stays" in capsys.readouterr().out) == (done == 1)
+        return stored.read_text()
+
+    assert left_after(lambda k: k < 20) == text
+    made = json.loads(left_after(lambda k: k > 18))
+    assert {name: g["right"] for name, g in made["counted"]["generators"].items()} == {"drives": 19, "played": 21}
 
 
 def test_names_of_the_proofs_own_generator_are_judged_as_the_proof_judges_them(tmp_path, monkeypatch):

@@ -4,6 +4,7 @@ import copy
 import hashlib
 import json
 import re
+import shutil
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -20,13 +21,14 @@ from bench.concealed import FRICTION
 from bench.lugre import LuGre
 from proof import cases, oracle, rivals, run
 from proof.cases import ROUND, SIZES, draw, planned_cases, shows
-from proof.concealed import MAKERS, NOT_YET, play, with_mass
+from proof.concealed import MAKERS, NOT_YET, VALUES, play, with_mass
 from proof.judge import judge
 from proof.outside import OUTSIDE
 from proof.plant import ProofPlant, band_rms, floor, record
 from proof.robots import random_friction, random_robot
 from proof.score import score
 from proof.seal import BrokenSeal
+from proof.third import left
 from snarelab.models.effects import effects
 from snarelab.models.model import places
 from snarelab.models.model_file import load_model
@@ -53,6 +55,8 @@ def test_plan_has_every_effect_of_an_arm_at_every_size(tmp_path):
     assert set(MAKERS) == vocabulary - set(NOT_YET)
     page = (Path(__file__).resolve().parents[2] / "docs" / "proof.md").read_text(encoding="utf-8")
     assert all(f"`{name}`" in page for name in NOT_YET)
+    assert all(VALUES[n] in [p.name for p in effects()[n].parameters] for n in VALUES)
+    assert set(VALUES) <= set(MAKERS)
     assert {(*k, s) for g, k, s in ROUND if g == "single"} == {(n, s) for n in MAKERS for s in SIZES}
     assert len(ROUND) >= 120
     assert sorted(planned_cases(len(ROUND), 3)) == sorted(ROUND)
@@ -201,6 +205,7 @@ def harness(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(cases, "TRAIN", 8.0)
         patch.setattr(cases, "HOLDOUT", 6.0)
+        patch.setattr(cases, "THIRD", 6.0)
         patch.setattr(cases, "N_JOINTS", (3,))
         case = drawn("harness_stiffness", 4.0, number=1)
         case.write(folder)
@@ -225,6 +230,36 @@ def test_floor_is_what_the_true_dynamics_leave_of_a_recording():
     inside = slice(50, -50)  # a spline's ends
     assert band_rms((left - lowest)[inside], 250.0, 20.0) == pytest.approx(0.0, abs=0.1 * case.answer.disturbance)
     assert band_rms(lowest, 250.0, 125.0) == pytest.approx(np.sqrt(np.mean(lowest**2, axis=0)))
+
+
+# The third recording
+
+
+def test_gain_is_of_the_recording_that_nothing_was_given(harness, tmp_path):
+    """The spring with its true stiffness against none: what is left is disturbance and noise, as the floor says."""
+    case, folder = harness
+    (truth,) = case.answer.truths
+    text = (folder / "arm.toml").read_text()
+    named = text.replace("effects = [", f'effects = [{{name = "harness_stiffness", at = "{truth.at}"}}, ')
+    assert named != text
+    (folder / "named.toml").write_text(named)
+    (channel,) = case.answer.channels
+    lowest = float(np.interp(20.0, cases.BANDS, case.answer.floor[channel]))
+    before, after = (left(folder, folder / f"{n}.toml", 20.0, refit=True)[channel] for n in ("arm", "named"))
+    assert before > 2.0 * lowest
+    assert after == pytest.approx(lowest, rel=0.25)
+    blind = tmp_path / "blind"
+    shutil.copytree(folder, blind)
+    (blind / "hold.csv").unlink()
+    assert left(blind, folder / "named.toml", 20.0, refit=True)[channel] == after
+
+
+def test_a_third_recording_changes_nothing_of_the_two_before(harness):
+    """Drawn last: motions and noise of seeds that were run before are what they were."""
+    _, folder = harness
+    assert {p.name for p in folder.glob("*.csv")} == set(cases.RECORDINGS)
+    found = [rms(np.loadtxt(folder / name, delimiter=",", skiprows=1)[:, 1:]) for name in cases.RECORDINGS[:2]]
+    assert found == pytest.approx([22.19298, 29.04359], rel=1e-3)  # of the generator that made two
 
 
 # The oracle
@@ -271,6 +306,7 @@ def test_no_oracle_where_the_twin_cannot_be_recorded(monkeypatch):
 def test_answers_are_sealed_before_the_tool_runs_and_nowhere_to_be_read(tmp_path, monkeypatch):
     monkeypatch.setattr(cases, "TRAIN", 8.0)
     monkeypatch.setattr(cases, "HOLDOUT", 5.0)
+    monkeypatch.setattr(cases, "THIRD", 5.0)
     seen, told, scored = [], [], []
     over = (1.1, 1.2)
     monkeypatch.setattr(oracle, "run", lambda x: {"over_floor": [{"tau.joint1": x.number + o} for o in over]})
@@ -279,14 +315,14 @@ def test_answers_are_sealed_before_the_tool_runs_and_nowhere_to_be_read(tmp_path
     def tool(folder: Path):
         seal = json.loads((tmp_path / "sealed.json").read_text())
         assert any(seal["answers"] in words for words in told)
-        assert {p.name for p in folder.iterdir()} == {"arm.toml", "arm.urdf", "train.csv", "hold.csv"}
+        assert {p.name for p in folder.iterdir()} == {"arm.toml", "arm.urdf", "train.csv", "hold.csv", "third.csv"}
         assert {p.name for p in tmp_path.iterdir()} <= {"sealed.json", "recordings", "diagnoses.jsonl"}
         seen.append(folder)
         return said(after=1.0) | {"seconds": 1.0}
 
     def said(after):
-        fit = {f"tau.joint{k}": {"holdout": {"rms_before": 2.0, "rms_after": after}} for k in range(1, 4)}
-        return {"verdict": "adequate", "effects": [], "fit": fit, "band": {"value": 20.0}, "candidates": []}
+        third = {f"tau.joint{k}": [2.0, after] for k in range(1, 4)}
+        return {"verdict": "adequate", "effects": [], "third": third, "band": {"value": 20.0}, "candidates": []}
 
     monkeypatch.setattr(rivals, "run", lambda folder: dict.fromkeys(rivals.NAMES, said(2.0)) | {"seconds": 1.0})
     monkeypatch.setattr(cases, "N_JOINTS", (3,))

@@ -112,3 +112,37 @@ def test_exact_interval_of_none_in_twenty():
 def test_calibration_error_is_nothing_where_frequencies_are_the_probabilities():
     assert calibration_error([0.75] * 4, [1, 1, 1, 0]) == pytest.approx(0.0)
     assert calibration_error([1.0, 1.0], [1, 0]) == pytest.approx(0.5)
+
+
+def test_numbers_that_were_right_and_are_said_to_be_wrong_are_counted():
+    """Of an arm of two joints: a mass and a rotor each, less those where something is concealed."""
+    mass, rotor = finding("inertia_error", "link1"), finding("rotor_inertia", "joint1")
+    assert judge(answer(), diagnosis(RIGHT)).moved == (False, False)
+    assert judge(answer(), diagnosis(RIGHT, mass)).moved == (True, False)
+    assert judge(answer(), diagnosis(mass, rotor)).moved == (True, True)
+    # Where something else may stand in its place, it is not said; where a parameter is wrong, none is right.
+    either = finding("inertia_error", "link1", 0.6, [("sensor_gain", "tau.joint1", 0.3, False)])
+    assert judge(answer(), diagnosis(either)).moved == (False, False)
+    assert judge(answer("clean", size=0.0), diagnosis(rotor)).moved == (False, False, True, False)
+    assert judge(answer("wrong", "link too light"), diagnosis(mass)).moved == ()
+    shares = score([answer(), answer("clean", size=0.0)], [diagnosis(RIGHT, mass), diagnosis()]).figures["right_moved"]
+    assert (shares.value, shares.count) == (pytest.approx(1 / 6), 6)
+    silent = score([answer()], [diagnosis(verdict="none")]).figures["right_moved"]
+    assert silent.value is None
+
+
+def test_values_of_right_names_are_held_against_what_was_concealed():
+    """Of a stiffness of 1: told as 1.3 and as -0.9, at a deviation of 0.1; at a bound, elsewhere or without one not."""
+
+    def told(value, std=0.1, at="joint2", **more):
+        stiffness = {"value": value, "std": std, **more}
+        return diagnosis(
+            RIGHT | {"at": at, "parameters": {"stiffness": stiffness, "torque_at_zero": {"value": 9.0, "std": 0.1}}}
+        )
+
+    assert judge(answer(), told(1.3)).deviations == pytest.approx([3.0])
+    assert judge(answer(), told(-0.9)).deviations == pytest.approx([-1.0])
+    for none in (told(1.3, at_bound=True), told(1.3, std=None), told(1.3, at="joint1"), diagnosis(RIGHT)):
+        assert judge(answer(), none).deviations == ()
+    figure = score([answer()] * 3, [told(1.3), told(-0.9), diagnosis()]).figures["coverage"]
+    assert (figure.value, figure.count, figure.met) == (0.5, 2, False)

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from made_studies import made_study
 
 import snarelab
 from snarelab.models.effects import get_effect
@@ -73,10 +74,7 @@ def test_the_carts_bytes_come_to_a_mass_near_its_makers(tmp_path):
 @pytest.mark.parametrize(("study", "name"), [(cart, "cart"), (tx40, "tx40")])
 def test_a_study_leaves_its_page_and_numbers(study, name, tmp_path, monkeypatch):
     place = folder(name, {"cart": "cartTest2/0m05.csv", "tx40": "pos_read_data.csv"}[name])
-    monkeypatch.setenv("SNARELAB_RECORDINGS", str(place.parent.resolve()))
-    monkeypatch.chdir(tmp_path)
-    assert study.main() == 0
-    left = tmp_path / "build" / "studies" / name
+    left = made_study(name, study, place.parent, tmp_path, monkeypatch)
     assert "What cannot be told apart" in (left / "report.html").read_text()
     result = json.loads((left / "result.json").read_text())
     values = {q["name"]: q["ours"] for q in result["quantities"]}

@@ -226,11 +226,18 @@ def test_directions_without_information_are_free():
     assert not found.changed
 
 
+def test_without_information_the_links_are_the_nominal_ones():
+    nominal = random_bodies(np.random.default_rng(5), 1)
+    found = consistent_inertia(SLIDE, [-1e6], [[0.0]], nominal)
+    np.testing.assert_allclose(found.phi, nominal)
+    np.testing.assert_allclose(found.beta_consistent, SLIDE.matrix @ nominal)
+    assert not found.changed
+
+
 @pytest.mark.parametrize(("beta", "information", "nominal", "words"), [
     ([1.0, 2.0], [[1.0]], np.ones(10), r"beta has shape \(2,\)"),
     ([1.0], [[np.nan]], np.ones(10), r"information has shape \(1, 1\); give \(1, 1\), all finite"),
     ([1.0], [[-1.0]], np.ones(10), "information: not symmetric and positive"),
-    ([1.0], [[0.0]], np.ones(10), "information: not symmetric and positive"),
     ([1.0], [[1.0]], np.ones(20), "phi_nominal has shape"),
 ])  # fmt: skip
 def test_unusable_input_is_refused(beta, information, nominal, words):
