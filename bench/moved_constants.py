@@ -1,11 +1,13 @@
 """Halve and double every constant that decides, one at a time, and count how often a test of the decision fails.
 
-``python bench/moved_constants.py [FILE ...] [--names NAME ...]``; by default ``identification/deciding.py``. A constant is a name in
-capitals that a module sets to a number, or to a tuple of them; a tuple's numbers are moved together. A constant of
-``deciding.py`` is tried by the files of ``tests/identification/test_deciding_*.py`` that name it, one of another module
-by the test files that import that module, so that a mutant costs seconds. Tests of the documentation, which compare its
-tables with the source and so would notice any number, are not asked. Lines are written to
-``build/mutants/constants.jsonl`` as they come, and what was tried in the same commit's files is not tried again.
+``python bench/moved_constants.py [FILE ...] [--names NAME ...]``; by default ``identification/deciding.py``.
+
+A constant is a name in capitals that a module sets to a number, or to a tuple of them; a tuple's numbers are moved
+together. A constant of ``deciding.py`` is tried by the files of ``tests/identification/test_deciding_*.py`` that name
+it, one of another module by the test files that import that module, so that a mutant costs seconds. Tests of the
+documentation, which compare its tables with the source and so would notice any number, are not asked.
+Lines are written to ``build/mutants/constants.jsonl`` as they come, and what was tried in one commit's files is not
+tried again.
 """
 
 import argparse
