@@ -7,6 +7,9 @@ STUDIES := emps kuka bam tx40 cart free-floating ground-capture zero-g-rig orbit
 # Where processes share the cores, threads of a linear algebra library wait for each other, and burn the time they wait.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
+# Hundreds of processes are started: what an interpreter compiles, it keeps, whatever the environment says.
+unexport PYTHONDONTWRITEBYTECODE
+
 BENCHES := torque friction_fit diagnosis joints fast floating cosim fmu snare ecos_inspection tolerance
 
 .PHONY: help demo test test-slow check fix hooks studies bench accuracy fuzz kills first-hour hostile mutants proof ledger fmus docs clean $(STUDIES:%=study-%)

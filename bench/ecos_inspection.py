@@ -119,7 +119,7 @@ def columns(table: dict[str, np.ndarray], stem: str, axes: str = "xyz") -> np.nd
 
 def relative(table: dict[str, np.ndarray]) -> np.ndarray:
     """Pin's foot in the end effector's frame (n, 3) [m]."""
-    turn = Rotation.from_quat(columns(table, "arm::quat.tip", "xyzw"))
+    turn = Rotation.from_quat(columns(table, "arm::quat.tip", "wxyz"), scalar_first=True)
     return turn.inv().apply(columns(table, "arm::pos.mount") - columns(table, "arm::pos.tip"))
 
 

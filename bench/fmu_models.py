@@ -128,6 +128,17 @@ def made_slave(folder, equations, version: Any = 3, **start):
     return Slave(path, folder / f"{equations.name}{version}", start)
 
 
+def accelerations(folder, equations, q, qd, tau):
+    """Joints' accelerations (J,) of an arm's FMU at a position and rate, under a torque, each (J,)."""
+    joints = [f"joint{k + 1}" for k in range(len(q))]
+    given = {f"{stem}.{j}": x for stem, values in (("start.q", q), ("start.qd", qd), ("tau", tau))
+             for j, x in zip(joints, values, strict=True)}  # fmt: skip
+    s = made_slave(folder, equations, **given)
+    found = s.get([f"qdd.{j}" for j in joints])
+    s.close()
+    return found
+
+
 def rewritten(source, target, change):
     """A copy of an archive with ``change(name, bytes)`` applied to each entry; None drops it."""
     with zipfile.ZipFile(source) as old, zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as new:

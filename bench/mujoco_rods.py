@@ -162,7 +162,7 @@ def _bend(model: Any, data: Any, points: Array) -> None:
             turn = Rotation.from_rotvec(axis * (np.arctan2(sine, along @ direction) / max(sine, 1e-300)))
             joint = before.inv() * turn * before
             here = address + 4 * i + (i > 0)
-            data.qpos[here : here + 4] = np.roll(joint.as_quat(), 1)
+            data.qpos[here : here + 4] = joint.as_quat(scalar_first=True)
             before = turn * before
 
 

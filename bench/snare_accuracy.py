@@ -53,7 +53,7 @@ def cases(number: int) -> list[Case]:
         tilt = Rotation.from_rotvec(np.deg2rad(rng.uniform(-2, 2, 3)))
         mass, friction = 10 ** rng.uniform(1, 2.3), rng.uniform(0, 0.3)
         position = (0.2369, radius * np.cos(azimuth), radius * np.sin(azimuth))
-        orientation = np.roll(tilt.as_quat(canonical=True), 1).tolist()
+        orientation = tilt.as_quat(canonical=True, scalar_first=True).tolist()
         target = Target("pendulum", position=position, orientation=orientation, mass=mass)
         drawn.append(Case(SnareParameters(friction=friction), target))
     return drawn

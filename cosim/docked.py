@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from ..models.docking.closed_forms import seated_share
 from ..models.docking.parameters import PRELOAD_WINDOW, RESIDUAL, RESIDUAL_ANGLE, DockingParameters
 from ..models.inertia import Array
-from .orbit_capture import OrbitCapture, column, columns
+from .orbit_capture import OrbitCapture, column, columns, frames_of
 from .whole_capture import WholeRun
 
 CABLE_STRENGTH = 8000.0
@@ -63,20 +63,12 @@ class DockingRun:
 def docked_of(whole: WholeRun) -> DockingRun:
     """Read a run's recording."""
     table = whole.run.recording
-
-    def frames(body: str) -> Array:
-        result = np.empty((table.sizes["time"], 6, 3))
-        for row, kind in enumerate(("pos", "vel", "omega")):
-            result[:, row] = columns(table, f"{kind}.{body}")
-        result[:, 3:] = Rotation.from_quat(columns(table, f"quat.{body}", "xyzw")).as_matrix()
-        return result
-
     touching = np.flatnonzero(column(table, "snare.touching") > 0)
     times = table["time"].to_numpy()
     names = [str(key).partition(" ")[0] for key in table.variables]
     joints = [name.removeprefix("q.") for name in names if name.startswith("q.")]
     capture = OrbitCapture(
-        times, frames("carriage"), frames("pin"), frames("base"),
+        times, frames_of(table, "carriage"), frames_of(table, "pin"), frames_of(table, "base"),
         np.column_stack([column(table, f"q.{joint}") for joint in joints]),
         np.column_stack([column(table, f"qd.{joint}") for joint in joints]),
         columns(table, "snare.impulse.effector"), columns(table, "snare.angular_impulse.effector"),
@@ -87,7 +79,7 @@ def docked_of(whole: WholeRun) -> DockingRun:
         whole, capture, column(table, "effector.travel"), column(table, "effector.force.motor"),
         column(table, "snare.tension"), off.reshape(-1, 3, 2),
         np.column_stack([column(table, f"effector.normal.{i}") for i in range(1, 7)]),
-        columns(table, "force.wrist"), frames("tip"),
+        columns(table, "force.wrist"), frames_of(table, "tip"),
     )  # fmt: skip
 
 

@@ -25,6 +25,7 @@ from ..models.snare.drive import Pose
 from ..models.snare.model import Accuracy
 from ..models.snare.parameters import WIDE_RING, SnareParameters
 from ..models.snare.target import Target
+from ..recordings.signals import POSE, QUATERNION
 from .master import Master
 from .participants.floating_arm import FloatingArmParticipant
 from .participants.snare_impulses import ImpulseSnareParticipant
@@ -43,7 +44,6 @@ TARGET_MASS, TARGET_SIDE = 1e4, 2.0
 """Of the floating target: mass [kg] (Li et al.); side of a uniform cube, pin in a face's middle [m], chosen."""
 ALONG_TIP = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
 """The end effector's axes on the arm's tip: its x is the last link's z."""
-_FRAME = [(kind, axes) for kind, axes in (("pos", "xyz"), ("quat", "wxyz"), ("vel", "xyz"), ("omega", "xyz"))]
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ def arrival(case: CaseName, foot: ArrayLike, turn: Rotation, speed: float = 0.0)
     place, turned = pose.translation[0], Rotation.from_matrix(pose.rotation[0])
     at = place + turned.apply(foot)
     pin = turned * turn
-    orientation = np.roll(pin.as_quat(), 1).tolist()
+    orientation = pin.as_quat(scalar_first=True).tolist()
     approach = np.concatenate([speed * turned.as_matrix()[:, 0], np.zeros(3)])
     rates = np.linalg.pinv(tip_jacobians(arm, np.array([CAPTURE_POSE]))[1][0]) @ approach
     if case == "inspection":
@@ -141,7 +141,7 @@ def step_control(start: Setting, tolerance: float = 3e-3, largest: float = 4e-3)
     for on_arm, on_snare in _ports(start):
         for kind, size in (("pos", 0.01), ("vel", 0.01), ("omega", 0.02)):
             sizes |= {f"arm.{kind}.{on_arm}.{x}": size for x in "xyz"}
-        sizes |= {f"arm.quat.{on_arm}.{x}": 0.02 for x in "wxyz"}
+        sizes |= {f"arm.quat.{on_arm}.{x}": 0.02 for x in QUATERNION}
         sizes |= {f"snare.{k}.{on_snare}.{x}": 0.02 for k in ("impulse", "angular_impulse") for x in "xyz"}
     return StepControl(tolerance, sizes, smallest=2.5e-4, largest=largest)
 
@@ -163,7 +163,7 @@ def system(start: Setting, passive: JointResistance, snare: SnareParameters, acc
     }
     links = []
     for on_arm, on_snare in _ports(start):
-        links += [(f"arm.{k}.{on_arm}.{x}", f"snare.{k}.{on_snare}.{x}") for k, axes in _FRAME for x in axes]
+        links += [(f"arm.{k}.{on_arm}.{x}", f"snare.{k}.{on_snare}.{x}") for k, axes, *_ in POSE for x in axes]
         links += [
             (f"snare.{k}.{on_snare}.{x}", f"arm.{k}.{on_arm}.{x}")
             for k in ("impulse", "angular_impulse")
@@ -261,25 +261,27 @@ def columns(recording: xr.Dataset, stem: str, axes: str = "xyz") -> Array:
     return np.column_stack([column(recording, f"{stem}.{axis}") for axis in axes])
 
 
+def frames_of(table: xr.Dataset, body: str) -> Array:
+    """Position, velocity, angular velocity [m, m/s, rad/s] and rotation matrix of a body in a recording (n, 6, 3)."""
+    result = np.empty((table.sizes["time"], 6, 3))
+    for row, kind in enumerate(("pos", "vel", "omega")):
+        result[:, row] = columns(table, f"{kind}.{body}")
+    result[:, 3:] = Rotation.from_quat(columns(table, f"quat.{body}", QUATERNION), scalar_first=True).as_matrix()
+    return result
+
+
 def capture_of(run: Run, case: CaseName | Literal["ground"]) -> OrbitCapture:
     """Read a run's recording."""
     table = run.recording
-
-    def frames(body: str) -> Array:
-        result = np.empty((table.sizes["time"], 6, 3))
-        for row, kind in enumerate(("pos", "vel", "omega")):
-            result[:, row] = columns(table, f"{kind}.{body}")
-        result[:, 3:] = Rotation.from_quat(columns(table, f"quat.{body}", "xyzw")).as_matrix()
-        return result
 
     times = table["time"].to_numpy()
     touching = np.flatnonzero(np.abs(columns(table, "force.pin")).max(axis=1) > 0)
     joints = range(1, 8)
     return OrbitCapture(
         times,
-        frames("tip"),
-        frames("mount" if case == "inspection" else "pin"),
-        frames("base"),
+        frames_of(table, "tip"),
+        frames_of(table, "mount" if case == "inspection" else "pin"),
+        frames_of(table, "base"),
         np.column_stack([column(table, f"q.joint{i}") for i in joints]),
         np.column_stack([column(table, f"qd.joint{i}") for i in joints]),
         columns(table, "snare.impulse.effector"),

@@ -25,6 +25,7 @@ An input names the output that it reads, so that no input can be connected twice
 import importlib
 import sys
 from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +38,7 @@ from .participant import Participant
 from .step_control import StepControl
 from .system import Connection, PowerBond, System
 
-_RUN = {"step": float, "start": float, "stop": float, "scheme": str, "hold": str}
+_RUN = {field.name: type(field.default) for field in fields(Setup) if isinstance(field.default, float | str)}
 _KEYS = (*_RUN, "name", "iterate", "control", "participants", "connections", "bonds")
 _PARTICIPANT = ("fmu", "python", "options", "parameters", "own_process", "timeout")
 
@@ -120,9 +121,9 @@ def _connection(target: str, source: Any) -> Connection:
 
 def _options(given: Any, kind: type, place: str) -> dict[str, Any]:
     """Fields of a dataclass, as a table gives them."""
-    fields = [field for field in kind.__dataclass_fields__ if field not in ("name", "target")]
-    required = {"source", "effort", "flow"} & set(fields)
-    _known(_typed(given, dict, place), fields, place)
+    named = [field.name for field in fields(kind) if field.name not in ("name", "target")]
+    required = {"source", "effort", "flow"} & set(named)
+    _known(_typed(given, dict, place), named, place)
     if missing := required - set(given):
         raise InputError(f"{place}: has no {min(missing)}; add it")
     numbers = {"tolerance", "smallest", "largest", "factor", "offset"}

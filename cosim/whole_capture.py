@@ -19,6 +19,7 @@ from ..models.inertia import Array
 from ..models.snare.model import Accuracy
 from ..models.snare.parameters import SnareParameters
 from ..models.snare.target import Target
+from ..recordings.signals import pose_names
 from .master import Master
 from .orbit_capture import SNARE, JointResistance, Setting
 from .participant import StepError
@@ -29,11 +30,6 @@ from .record import Run
 from .state_table import StateTable
 from .system import System
 
-_FRAME = [
-    f"{kind}.{{}}.{axis}"
-    for kind, axes in (("pos", "xyz"), ("quat", "wxyz"), ("vel", "xyz"), ("omega", "xyz"))
-    for axis in axes
-]
 SIZES = dict.fromkeys(("PULL", "SEAT", "BACK_OFF", "UNLOAD"), 2.5e-3) | dict.fromkeys(("SETTLE", "SNUG", "SLIDE"), 1e-2)
 """Macro steps by the program's state [s]: short where bodies meet or part, long where slack cables slide; `USUAL`
 in all others."""
@@ -49,7 +45,8 @@ def connections() -> list[tuple[str, str]]:
     """Between ``snare``, ``effector`` and ``program``: the source's output, the target's input."""
     links: list[tuple[str, str]] = []
     for ours, theirs in (("carriage", "effector"), ("pin", "pin")):
-        links += [(f"effector.{name.format(ours)}", f"snare.{name.format(theirs)}") for name in _FRAME]
+        both = zip(pose_names(ours), pose_names(theirs), strict=True)
+        links += [(f"effector.{here}", f"snare.{there}") for here, there in both]
         links += [
             (f"snare.{kind}.{theirs}.{axis}", f"effector.{kind}.{ours}.{axis}")
             for kind in ("impulse", "angular_impulse")

@@ -11,10 +11,9 @@ import casadi as ca
 from ..models.floating.arm import FloatingArm
 from ..models.floating.symbols import by_base
 from ..models.rotation import quaternion_rate, rotation_of
+from ..recordings.signals import POSE
 from .equations import Ledger
 from .placed_laws import PlacedLaws
-
-_POSE = (("pos", "xyz", "m"), ("quat", "wxyz", "1"), ("vel", "xyz", "m/s"), ("omega", "xyz", "rad/s"))
 
 
 class Base:
@@ -103,7 +102,7 @@ class Base:
 def _start(ledger: Ledger) -> list[ca.SX]:
     """Pose (7,) and twist (6,) at the start; parameters, which give the twist in the world frame."""
     first = []
-    for stem, axes, unit in _POSE:
+    for stem, axes, unit, _ in POSE:
         for axis in axes:
             name = f"{stem}.base.{axis}"
             words = f"{name} at the start, in the world frame"

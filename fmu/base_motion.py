@@ -7,6 +7,7 @@ import casadi as ca
 
 from ..models.floating.tree import CARRIERS
 from ..models.rotation import rotation_of
+from ..recordings.signals import QUATERNION
 from .equations import Ledger
 
 _GIVEN = (
@@ -33,7 +34,7 @@ class BaseMotion:
     def __init__(self, ledger: Ledger) -> None:
         """Register the inputs."""
         self._first = ledger.inputs().numel()
-        for axis in "wxyz":
+        for axis in QUATERNION:
             words = f"attitude of the base in the world frame (quaternion), {axis}"
             ledger.input(f"quat.base.{axis}", "1", words, float(axis == "w"))
         for name, unit, words in _GIVEN:

@@ -10,6 +10,7 @@ from ..models.rig.rig import Rig
 from ..models.rigid_body import symbolic_torque
 from ..models.rotation import quaternion_of
 from ..models.tree import Tree
+from ..recordings.signals import QUATERNION
 from .base import Base
 from .base_motion import carried_turning
 from .equations import Ledger
@@ -88,6 +89,6 @@ def body_outputs(ledger: Ledger, arm: FloatingArm, base: Base, end: Tip, qd: ca.
     for body, position, quaternion, motion in bodies:
         ledger.vector(f"pos.{body}", "m", position, f"position of {body} in the world frame")
         words = f"attitude of {body} in the world frame (quaternion)"
-        ledger.vector(f"quat.{body}", "1", quaternion, words, "wxyz")
+        ledger.vector(f"quat.{body}", "1", quaternion, words, QUATERNION)
         ledger.vector(f"vel.{body}", "m/s", turn @ motion[:3], f"velocity of {body} in the world frame")
         ledger.vector(f"omega.{body}", "rad/s", turn @ motion[3:], f"angular velocity of {body} in the world frame")

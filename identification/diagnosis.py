@@ -133,7 +133,7 @@ class ParameterShift:
 
 @dataclass(frozen=True)
 class Trace:
-    """A channel of one recording in the analysis band, for pictures; all arrays (n_samples,)."""
+    """A channel of one recording in the analysis band, for pictures; all arrays (n,)."""
 
     recording: str
     role: Literal["train", "holdout"]

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..files import written_whole
 from ..models.table import TIMES, UNITS, Table
+from ..report.words import percent
 from .formulate import FormulaChoice, Term
 
 Array = NDArray[np.float64]
@@ -37,7 +38,7 @@ def write_effect(found: FormulaChoice, path: Path) -> None:
         over=table.words,
         at=found.at,
         formula=found.best.words(table),
-        share=100 * found.best.share,
+        share=percent(found.best.share, 3),
         imports="from ._direction import direction\n" if table.times == "direction" else "",
         law=" + ".join(lines),
         factor=_FACTORS[table.times],
@@ -108,7 +109,7 @@ def _written(t: Term, table: Table, values: Array, k: int) -> tuple[str, list[st
     return f"{p.format('coefficient')} * {plain}", [amplitude("coefficient", units, values[0])]
 
 
-_FILE = '''"""A formula for an empirical law over {over}, first found at {at}: {share:.1f} % of its table."""
+_FILE = '''"""A formula for an empirical law over {over}, first found at {at}: {share} of its table."""
 
 import casadi as ca
 

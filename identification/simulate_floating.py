@@ -21,6 +21,7 @@ from ..models.model import Model
 from ..models.rig.points import far_end
 from ..models.rigid_body import RigidBody
 from ..recordings.condition import Motion, condition
+from ..recordings.signals import QUATERNION
 from .fitting.assembly import TorqueModel
 from .fitting.experiment import Experiment, scales, without_torque
 from .fitting.floating_terms import outside, told, wheel_impulse, with_base, with_twist
@@ -122,7 +123,7 @@ def _pose(dataset: xr.Dataset, tree: FloatingTree, row: int, recorded: bool) -> 
     place = np.array([float(dataset[name][row]) if name in dataset else 0.0 for name in here])
     if not recorded:
         return place, np.array([1.0, 0.0, 0.0, 0.0])
-    return place, np.array([float(dataset[f"quat.{tree.body}.{axis}"][row]) for axis in "wxyz"])
+    return place, np.array([float(dataset[f"quat.{tree.body}.{axis}"][row]) for axis in QUATERNION])
 
 
 def _with_base(motion: Motion, found: BaseTrajectory) -> Motion:
@@ -149,7 +150,7 @@ def _table(
         "omega": turned.apply(found.twist[:, 3:]),
     }
     columns |= {f"{kind}.{tree.body}.{a}": x[:, c] for kind, x in vectors.items() for c, a in enumerate("xyz")}
-    columns |= {f"quat.{tree.body}.{a}": found.quaternion[:, c] for c, a in enumerate("wxyz")}
+    columns |= {f"quat.{tree.body}.{a}": found.quaternion[:, c] for c, a in enumerate(QUATERNION)}
     for kind, x in (("force." + tree.body, path.outside[:, :3]), ("torque." + tree.body, path.outside[:, 3:])):
         columns |= {f"{kind}.{a}": x[:, c] for c, a in enumerate("xyz") if x.any()}
     if path.wheels.any():

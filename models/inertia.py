@@ -9,7 +9,6 @@ mass given, this is the triangle inequality of the principal moments about the c
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import nnls
 
 Array = NDArray[np.float64]
 
@@ -98,6 +97,8 @@ def nearest_physical(mass: float, com: ArrayLike, inertia: ArrayLike) -> Array:
     s >= 0 along its axes, moments are ``(s2 + s3, s1 + s3, s1 + s2)``, a non-negative least-squares problem
     (Lawson, Hanson 1974).
     """
+    from scipy.optimize import nnls  # here only: a second at the start of every process that knows a body
+
     moments, axes = np.linalg.eigh(np.asarray(inertia, float))
     to_moments = 1.0 - np.eye(3)
     second, _ = nnls(to_moments, moments)

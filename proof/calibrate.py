@@ -25,6 +25,7 @@ os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM
 
 from .cases import ROUND
 from .counting import RIDGE, Row, brier, counted, generator_of, of_effects, of_lines, skill
+from .ending import status_of, tell
 from .judge import names_in, rightly_placed
 from .run import diagnose, fill, prepare
 from .score import score
@@ -48,12 +49,9 @@ def main() -> int:
     )
     given = parser.parse_args()
 
-    def tell(words: str) -> None:
-        print(words, flush=True)
-
-    cases: dict[str, int] = {}
-    rows: list[Row] = []
-    try:
+    def count() -> int:
+        cases: dict[str, int] = {}
+        rows: list[Row] = []
         for file in given.drives:
             lines = [json.loads(x) for x in file.read_text(encoding="utf-8").splitlines()]
             rows += of_lines(lines)
@@ -64,20 +62,16 @@ def main() -> int:
             cases[OWN] = given.cases
         before = json.loads(JSON.read_text(encoding="utf-8"))
         stored = mapped(rows, cases, before, sys.argv[1:])
-    except (ValueError, OSError) as error:
-        print(error, file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("stopped; the same command goes on where it was", file=sys.stderr)
-        return 130
-    tell(json.dumps(stored["counted"], indent=1))
-    left_out, old = counted(rows).brier, brier(before["logit"], rows)
-    tell(f"Brier score of each generator left out: {left_out}; of the map that is stored: {old:.3f}")
-    if left_out is not None and left_out >= old:
-        tell("no better than the map that is stored, which stays")
-        return 1
-    write_json(JSON, stored)
-    return 0
+        tell(json.dumps(stored["counted"], indent=1))
+        left_out, old = counted(rows).brier, brier(before["logit"], rows)
+        tell(f"Brier score of each generator left out: {left_out}; of the map that is stored: {old:.3f}")
+        if left_out is not None and left_out >= old:
+            tell("no better than the map that is stored, which stays")
+            return 1
+        write_json(JSON, stored)
+        return 0
+
+    return status_of(count, (ValueError, OSError))
 
 
 def own(cases: int, seed: int, workers: int, tell: Callable[[str], None]) -> list[Row]:

@@ -1,9 +1,10 @@
 """``python -m proof register``, ``verify`` and ``registered``: a proof that was announced before it was run."""
 
 import argparse
-import sys
 from collections.abc import Sequence
 from pathlib import Path
+
+from .ending import status_of, tell
 
 COMMANDS = ("register", "verify", "registered")
 
@@ -21,22 +22,12 @@ def main(words: Sequence[str]) -> int:
     running.add_argument("--hours", type=float, default=1.0)
     running.add_argument("--folder", type=Path, default=Path("build/proof/registered"))
     given = parser.parse_args(words)
-    try:
-        return _do(given)
-    except (ValueError, FileNotFoundError) as error:
-        print(error, file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("stopped; the same command goes on where it was", file=sys.stderr)
-        return 130
+    return status_of(lambda: _do(given))
 
 
 def _do(given: argparse.Namespace) -> int:
     from . import register
     from .seal import write_json
-
-    def tell(words: str) -> None:
-        print(words, flush=True)
 
     if given.command == "register":
         seeds = {name: own for name in ("drives", "played") if (own := getattr(given, name))}

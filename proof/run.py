@@ -23,6 +23,7 @@ from snarelab.files import written_whole
 
 from . import oracle, rivals
 from .cases import ROUND, Answer, draw, planned_cases
+from .ending import status_of, tell
 from .page import write_page
 from .result import result, terminal
 from .rival_columns import CUTOFF
@@ -187,14 +188,10 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=SEED)
     parser.add_argument("--folder", type=Path, default=FOLDER)
     given = parser.parse_args()
-    try:
+
+    def run() -> None:
         with ProcessPoolExecutor(given.workers, get_context("spawn")) as pool:
-            prove(given.cases, given.seed, pool, folder=given.folder, tell=lambda words: print(words, flush=True))
-    except BrokenSeal as error:
-        print(error, file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        print("stopped; the same command goes on where it was", file=sys.stderr)
-        return 130
-    print(f"page: {given.folder / 'report.html'}\nnumbers: {given.folder / 'result.json'}")
-    return 0
+            prove(given.cases, given.seed, pool, folder=given.folder, tell=tell)
+        tell(f"page: {given.folder / 'report.html'}\nnumbers: {given.folder / 'result.json'}")
+
+    return status_of(run, (BrokenSeal,), refused=1)

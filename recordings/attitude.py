@@ -5,6 +5,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from .signals import QUATERNION
 
 OFF = 0.1  # by how much a quaternion's length may miss 1: rounding stays far below, a wrong column far above
 
@@ -17,7 +18,7 @@ def attitude(data: xr.Dataset, body: str, path: object) -> NDArray[np.float64]:
     InputError
         Where a quaternion's length is not 1.
     """
-    turns = np.stack([np.asarray(data[f"quat.{body}.{axis}"].values, float) for axis in "wxyz"], 1)
+    turns = np.stack([np.asarray(data[f"quat.{body}.{axis}"].values, float) for axis in QUATERNION], 1)
     turns[~np.isfinite(turns).all(1)] = np.nan
     size = np.linalg.norm(turns, axis=1)
     if np.any(np.abs(size - 1) > OFF):

@@ -21,8 +21,18 @@ _JOINT = {
 FREE = "free"
 """Gain of a torque whose constant is identified beside the rest; until then one unit of the column counts as one."""
 
+QUATERNION = "wxyz"
+"""Order of a quaternion's parts, in names of signals and in arrays (..., 4)."""
+POSE = (
+    ("pos", "xyz", "m", "position"),
+    ("quat", QUATERNION, "1", "attitude (quaternion)"),
+    ("vel", "xyz", "m/s", "velocity"),
+    ("omega", "xyz", "rad/s", "angular velocity"),
+)
+"""What a body's pose and twist in the world frame are made of: kind, axes, unit, meaning."""
+
 _SCALAR = {"tension": "N", "temp": "degC"}
-_VECTOR = {"pos": "m", "quat": "dimensionless", "vel": "m/s", "omega": "rad/s", "force": "N", "torque": "N*m"}
+_VECTOR = {kind: unit for kind, _, unit, _ in POSE} | {"quat": "dimensionless", "force": "N", "torque": "N*m"}
 _SINGLE = {"time": "s", "angle.ring": "rad", "closed.latches": "dimensionless"}
 
 #: How signal names look, for messages.
@@ -30,6 +40,20 @@ FORMS = (
     "time, q|qd|qdd|q_link|tau|command|temp.<joint>, tension.<sling>, pos|vel|omega.<body>.x|y|z, quat.<body>.w|x|y|z, "
     "force|torque.<sensor>.x|y|z, angle.ring, closed.latches"
 )
+
+
+def pose_names(body: str) -> list[str]:
+    """The thirteen signals of a body's pose and twist, in the order of `POSE`."""
+    return [f"{kind}.{body}.{axis}" for kind, axes, _, _ in POSE for axis in axes]
+
+
+def pose_texts(body: str, text: str) -> list[tuple[str, str, str]]:
+    """Name, unit and meaning of each of them; ``text`` names the body."""
+    return [
+        (f"{kind}.{body}.{axis}", unit, f"{meaning} of {text} in the world frame, {axis}")
+        for kind, axes, unit, meaning in POSE
+        for axis in axes
+    ]
 
 
 @dataclass(frozen=True)

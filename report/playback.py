@@ -171,7 +171,7 @@ class Playback:
         times, positions = self._checked(name, times, positions, (3,))
         turns = np.tile([1.0, 0.0, 0.0, 0.0], (times.size, 1)) if quaternions is None else quaternions
         turns = self._checked(name, times, turns, (4,))[1]
-        matrices = Rotation.from_quat(np.roll(turns, -1, axis=1)).as_matrix()  # scipy has w last
+        matrices = Rotation.from_quat(turns, scalar_first=True).as_matrix()
         for frame, k in self._frames(times):
             self._place(name, frame, RigidTransform(RotationMatrix(matrices[k]), positions[k]), len(times) > 1)
 

@@ -93,11 +93,11 @@ def _published(train: Path, holdout: Path) -> list[Quantity]:
     for p in found["parameters"]:
         paper, unit = PUBLISHED[p["name"]]
         quantities.append(Quantity(p["name"], unit, p["value"], "predicted", paper))
-        _say(f"  {p['name']:<14}{paper:>12.4f}{p['value']:>12.4f}{100 * (p['value'] / paper - 1):>11.2f} % {unit}")
+        _say(f"  {p['name']:<14}{paper:>12.4f}{p['value']:>12.4f}{percent(p['value'] / paper - 1, 3):>13} {unit}")
     for role, paper in PUBLISHED_ERROR.items():
         ours = found["fit"]["tau.slide"][role]["relative"]
         quantities.append(Quantity(f"relative_error_{role}", "1", ours, "predicted", paper))
-        _say(f"  error, {role:<8}{100 * paper:>10.2f} %{100 * ours:>10.2f} %")
+        _say(f"  error, {role:<8}{percent(paper, 3):>12}{percent(ours, 3):>12}")
     return quantities
 
 

@@ -1,5 +1,7 @@
 """Whether the closed snare has the pin inside, from the shapes of cables and pin alone."""
 
+from collections.abc import Mapping
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -56,7 +58,7 @@ def radial_error(history: SnareHistory, time: int = -1) -> float:
 
 
 def _pin(history: SnareHistory, time: int) -> tuple[np.ndarray, np.ndarray]:
-    turn = Rotation.from_quat(np.roll(history.target_quaternion[time], -1)).as_matrix()
+    turn = Rotation.from_quat(history.target_quaternion[time], scalar_first=True).as_matrix()
     return history.target_position[time], -turn[:, 0]
 
 
@@ -85,3 +87,8 @@ def _winding(loop: np.ndarray, foot: np.ndarray, axis: np.ndarray) -> int:
     angles = np.arctan2(across[:, 2], across[:, 1])
     steps: np.ndarray = np.diff(np.append(angles, angles[0]))
     return round(float(np.sum(np.mod(steps + np.pi, 2 * np.pi) - np.pi)) / (2 * np.pi))
+
+
+def turned(values: Mapping[str, float]) -> Rotation:
+    """The target's axes in the end effector's."""
+    return Rotation.from_euler("xyz", [values["roll"], values["pitch"], values["yaw"]])

@@ -7,14 +7,13 @@ Misalignments are of the pin against the end effector at the start: the paper's 
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ..models.snare.history import SnareHistory
 from ..models.snare.model import SnareModel
 from ..models.snare.parameters import SnareParameters
 from ..models.snare.target import PAPER_POSITION, Target
 from .capture import Axis, Capture, Outcome, source_version
-from .enclosure import encloses, radial_error
+from .enclosure import encloses, radial_error, turned
 
 DURATION = 10.0
 """The paper's end of a soft capture, 80 degrees at 8 degrees/s [s]; our ring, with its ramps, has 0.4 degrees left."""
@@ -40,9 +39,7 @@ AXES = (
 
 def simulate(values: Mapping[str, float]) -> SnareHistory:
     """The capture itself; raises InputError for a pin that starts inside a cable, SnareStepError if it diverges."""
-    w, x, y, z = np.roll(
-        Rotation.from_euler("xyz", [values["roll"], values["pitch"], values["yaw"]]).as_quat(canonical=True), 1
-    )
+    w, x, y, z = turned(values).as_quat(canonical=True, scalar_first=True)
     target = Target(
         "spring",
         position=(PAPER_POSITION[0] + values["axial"], values["radial_y"], values["radial_z"]),

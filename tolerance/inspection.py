@@ -27,7 +27,7 @@ from ..cosim.orbit_capture import (
 )
 from ..models.snare.parameters import SnareParameters
 from .capture import Axis, Capture, Outcome, source_version
-from .enclosure import runs_through
+from .enclosure import runs_through, turned
 from .ground import DURATION, WAIT
 from .ground import SOURCES as SNARE_SOURCES
 
@@ -85,7 +85,7 @@ class SimulatedCapture:
 
 def simulate(values: Mapping[str, float], case: CaseName = "inspection") -> SimulatedCapture:
     """The capture itself; raises InputError for a pin that starts inside a cable, StepError if a step breaks down."""
-    turn = Rotation.from_euler("xyz", [values["roll"], values["pitch"], values["yaw"]])
+    turn = turned(values)
     foot = [AHEAD + values["axial"], values["radial_y"], values["radial_z"]]
     start = arrival(case, foot, turn, values["speed"])
     snare = SNARE.with_values(friction=values["friction"])
@@ -142,8 +142,8 @@ def film(values: Mapping[str, float], case: CaseName = "inspection") -> str:
     done = simulate(values, case)
     rows, cables = done.seen()
     tip, pin = done.motion.tip[rows, 3:], done.motion.pin[rows, 3:]
-    turned = Rotation.from_matrix(tip.transpose(0, 2, 1) @ pin).as_quat(canonical=True)
-    seen = SceneData(done.motion.times[rows], done.motion.relative[rows], np.roll(turned, 1, axis=1), cables)
+    attitude = Rotation.from_matrix(tip.transpose(0, 2, 1) @ pin).as_quat(canonical=True, scalar_first=True)
+    seen = SceneData(done.motion.times[rows], done.motion.relative[rows], attitude, cables)
     return snare_scene(seen, done.snare).html(start=done.motion.first_contact or 0.0)
 
 

@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from functools import partial
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ..cosim.docked import docked_of, margin
 from ..cosim.orbit_capture import SNARE, CaseName, JointResistance, Setting, arrival, column, resistance
@@ -19,6 +18,7 @@ from ..cosim.whole_capture import WholeRun, co_simulate_whole
 from ..models.docking.parameters import DockingParameters
 from ..models.snare.parameters import SnareParameters
 from .capture import Axis, Capture, Outcome, source_version
+from .enclosure import turned
 from .inspection import AHEAD
 from .inspection import AXES as ARRIVAL
 from .inspection import SOURCES as ARRIVAL_SOURCES
@@ -40,11 +40,6 @@ def in_orbit(values: Mapping[str, float], case: CaseName) -> Outcome:
         case, [AHEAD + values["axial"], values["radial_y"], values["radial_z"]], turned(values), values["speed"]
     )
     return outcome(start, SNARE, values, passive=resistance(values["joint_friction"]))
-
-
-def turned(values: Mapping[str, float]) -> Rotation:
-    """The target's axes in the end effector's."""
-    return Rotation.from_euler("xyz", [values["roll"], values["pitch"], values["yaw"]])
 
 
 def outcome(

@@ -2,15 +2,14 @@
 
 from collections.abc import Mapping
 
-import numpy as np
-
 from ..cosim.ground_capture import PROGRAM, ground
 from ..cosim.state_table import read_table
 from ..models.snare.parameters import SnareParameters
 from ..models.snare.target import PAPER_POSITION
 from .capture import Capture, Outcome, source_version
+from .enclosure import turned
 from .ground import AXES as HUNG
-from .latched import SEAT, SOURCES, outcome, turned
+from .latched import SEAT, SOURCES, outcome
 
 SCALE, SIZES = 0.25, {"CLOSE": 2.5e-3} | dict.fromkeys(("SETTLE", "SNUG", "SLIDE"), 5e-3)
 """Of the macro steps, and those [s] that differ from the orbits': the cables that hug its pin are coupled in steps to a
@@ -21,7 +20,7 @@ AXES = (*(a for a in HUNG if a.name != "wait"), SEAT)
 def run(values: Mapping[str, float]) -> Outcome:
     """One case, to its end; raises InputError for a pin that starts inside a cable."""
     position = (PAPER_POSITION[0] + values["axial"], values["radial_y"], values["radial_z"])
-    w, x, y, z = np.roll(turned(values).as_quat(canonical=True), 1)
+    w, x, y, z = turned(values).as_quat(canonical=True, scalar_first=True)
     start = ground(position, (w, x, y, z), values["speed"], values["target_mass"])
     return outcome(start, SnareParameters(), values, table=read_table(PROGRAM), scale=SCALE, sizes=SIZES)
 

@@ -14,6 +14,7 @@ from ...models.floating.arm import FloatingArm
 from ...models.floating.joint_drive import Drive
 from ...models.snare.parameters import WIDE_RING, SnareParameters
 from ...models.snare.target import Target
+from ...recordings.signals import pose_texts
 from ..participant import Participant, StepError, Variable
 
 _AXES = "xyz"
@@ -188,10 +189,7 @@ class EndEffectorParticipant(Participant):
     def _names_shown(self, joints: list[str]) -> list[tuple[str, str, str]]:
         shown = []
         for body, text in _BODIES.items():
-            shown += [(f"pos.{body}.{a}", "m", f"position of {text} in the world") for a in _AXES]
-            shown += [(f"quat.{body}.{a}", "1", f"attitude of {text} in the world") for a in ("w", *_AXES)]
-            shown += [(f"vel.{body}.{a}", "m/s", f"velocity of {text}, world frame") for a in _AXES]
-            shown += [(f"omega.{body}.{a}", "rad/s", f"angular velocity of {text}, world frame") for a in _AXES]
+            shown += pose_texts(body, text)
         shown += [(f"q.{name}", "rad", "joint position") for name in joints]
         shown += [(f"qd.{name}", "rad/s", "joint rate") for name in joints]
         for who, text in (("", "base and arm"), (".target", "a floating target")):

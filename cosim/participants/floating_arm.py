@@ -15,6 +15,7 @@ from ...models.dormand_prince import StepFault
 from ...models.floating.arm import FloatingArm
 from ...models.floating.joint_drive import Drive
 from ...models.floating.motion import FloatingMotion
+from ...recordings.signals import pose_texts
 from ..participant import Participant, StepError, Variable
 
 _AXES = "xyz"
@@ -174,10 +175,7 @@ def _outputs(joints: list[tuple[str, str]], start: np.ndarray, mounted: bool) ->
     shown = []
     bodies = [("tip", "the tip"), ("base", "the base's frame"), ("mount", "the mount")]
     for body, text in bodies if mounted else bodies[:2]:
-        shown += _axes(f"pos.{body}", "m", f"position of {text} in the world")
-        shown += [(f"quat.{body}.{part}", "1", f"attitude of {text} in the world, {part}") for part in ("w", *_AXES)]
-        shown += _axes(f"vel.{body}", "m/s", f"velocity of {text}'s origin, world frame")
-        shown += _axes(f"omega.{body}", "rad/s", f"angular velocity of {text}, world frame")
+        shown += pose_texts(body, text)
     shown += [(f"q.{name}", unit, "joint position") for name, unit in joints]
     shown += [(f"qd.{name}", f"{unit}/s", "joint rate") for name, unit in joints]
     shown += _axes("momentum.linear", "N*s", "linear momentum of base and arm, world frame")

@@ -18,6 +18,7 @@ from ...models.snare.drive import Pose
 from ...models.snare.model import Accuracy, SnareModel, SnareStepError
 from ...models.snare.parameters import SnareParameters
 from ...models.snare.target import Target, unit_quaternion
+from ...recordings.signals import pose_texts
 from ..participant import Participant, StepError, Variable
 
 _POSE_SIZE = 13
@@ -207,27 +208,17 @@ class SnareParticipant(Participant):
 
 def _pose(values: np.ndarray, name: str) -> Pose:
     quaternion = unit_quaternion(values[3:7], f"{name}: an input quaternion")
-    rotation = Rotation.from_quat(np.roll(quaternion, -1)).as_matrix()
+    rotation = Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
     return Pose(values[:3], rotation, values[7:10], values[10:13])
 
 
 def _values(pose: Pose) -> np.ndarray:
-    quaternion = np.roll(Rotation.from_matrix(pose.rotation).as_quat(canonical=True), 1)
+    quaternion = Rotation.from_matrix(pose.rotation).as_quat(canonical=True, scalar_first=True)
     return np.concatenate([pose.position, quaternion, pose.velocity, pose.angular_velocity])
 
 
 def _pose_variables(body: str, causality: Any, values: np.ndarray) -> list[Variable]:
-    kinds = (
-        ("pos", "m", "xyz", "position"),
-        ("quat", "1", "wxyz", "attitude (quaternion)"),
-        ("vel", "m/s", "xyz", "velocity"),
-        ("omega", "rad/s", "xyz", "angular velocity"),
-    )
-    described = [
-        (f"{kind}.{body}.{axis}", unit, f"{words} of {_BODIES[body]} in the world frame, {axis}")
-        for kind, unit, axes, words in kinds
-        for axis in axes
-    ]
+    described = pose_texts(body, _BODIES[body])
     return [
         Variable(key, causality, unit, float(value), words)
         for (key, unit, words), value in zip(described, values, strict=True)

@@ -44,8 +44,8 @@ STILL = 0.02
 class ReadingFit:
     """A reading's fit.
 
-    ``value`` is its log evidence, ``relative`` (C,) each channel's residual over its torque, ``prior`` the price of the
-    parameters in nats, ``residual`` (n, C) relative to the channel's RMS.
+    ``value`` is its log evidence, ``relative`` (c,) each channel's residual over its torque, ``prior`` the price of the
+    parameters in nats, ``residual`` (n, c) relative to the channel's RMS.
     """
 
     value: float

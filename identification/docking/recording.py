@@ -18,6 +18,7 @@ from ...models.docking.bench import NEVER, SEEN, DockingCommand
 from ...models.model import Model
 from ...recordings import read_recording
 from ...recordings.attitude import attitude
+from ...recordings.signals import QUATERNION
 
 Array = NDArray[np.float64]
 
@@ -73,7 +74,7 @@ def _record(model: Model, path: str | Path, data: xr.Dataset) -> DockingRecordin
         raise InputError(f"{path}: it lasts {since[-1]:.3g} s; give {SHORTEST:g} s of a docking test or more")
     if np.median(np.diff(time)) > EVERY / FEWEST:
         raise InputError(f"{path}: a sample every {np.median(np.diff(time)):.3g} s; give {FEWEST / EVERY:g} Hz or more")
-    for name in ("q.carriage", *(f"pos.effector.{a}" for a in "xyz"), *(f"quat.effector.{a}" for a in "wxyz")):
+    for name in ("q.carriage", *(f"pos.effector.{a}" for a in "xyz"), *(f"quat.effector.{a}" for a in QUATERNION)):
         if name not in data:
             raise InputError(f"{path}: {name} is missing; a docking test is told by the carriage's travel and the pose")
     times = np.asarray(EVERY * np.arange(int(since[-1] / EVERY + 1e-6) + 1), float)

@@ -10,6 +10,7 @@ from ...errors import InputError
 from ...models.docking.bench import SEEN
 from ...models.docking.bench_setup import DockingTree
 from ...models.model import Model
+from ...recordings.signals import QUATERNION
 from .recording import EVERY, KNOTS, load_records
 from .runs import SHIFTS, DockingRuns
 from .source import start
@@ -50,7 +51,7 @@ def simulate_docking(model: Model, motion: str | Path | None = None) -> xr.Datas
     quaternion = (Rotation.from_rotvec(turned) * Rotation.from_quat(m.quaternion, scalar_first=True)).as_quat(
         scalar_first=True
     )
-    columns |= {f"quat.effector.{a}": quaternion[:, i] for i, a in enumerate("wxyz")}
+    columns |= {f"quat.effector.{a}": quaternion[:, i] for i, a in enumerate(QUATERNION)}
     middle = 0.5 * (m.times[1:] + m.times[:-1])
     columns["q.carriage"] = np.interp(middle, m.times, m.travel)
     begun, closed = m.latch

@@ -55,7 +55,7 @@ class Members:
         return self.amplitudes[self._slices[number]]
 
     def gains(self) -> Array:
-        """Log Bayes factor of every item on top of these, for each size (n_items, n_sizes); of a law without
+        """Log Bayes factor of every item on top of these, for each size (N, n_sizes); of a law without
         amplitudes the first alone, the others -inf."""
         found = np.full((len(self.on.evidence.items), len(SIZES)), -np.inf)
         if self.taken:

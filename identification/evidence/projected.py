@@ -33,8 +33,8 @@ class ProjectedEvidence:
         weight: Array | None = None,
         known: tuple[Array, Array] | None = None,
     ) -> None:
-        """``weight`` (P,): factors on the prior deviations of what always stands beside. ``known``: mean (q,) and
-        covariance (q, q) of the first q of them, from other recordings; in place of their prior."""
+        """``weight`` (P,): factors on the prior deviations of what always stands beside. ``known``: mean (m,) and
+        covariance (m, m) of the first m of them, from other recordings; in place of their prior."""
         self.evidence, self.recordings = evidence, tuple(recordings)
         n_always, n_columns = evidence.n_always, evidence.n_columns
         self._weight = np.ones(n_always) if weight is None else weight
@@ -52,11 +52,11 @@ class ProjectedEvidence:
         turned, self._mean = np.diag(self._weight), np.zeros(n_always)
         if known is not None:
             mean, covariance = known
-            q = len(mean)
-            self._mean[:q] = mean
-            energy += float(mean @ matrix[:q, :q] @ mean - 2 * mean @ seen[:q])
-            seen = seen - matrix[:, :q] @ mean
-            turned[:q, :q] = cholesky(covariance + 1e-12 * np.trace(covariance) * np.eye(q) / max(q, 1), lower=True)
+            m = len(mean)
+            self._mean[:m] = mean
+            energy += float(mean @ matrix[:m, :m] @ mean - 2 * mean @ seen[:m])
+            seen = seen - matrix[:, :m] @ mean
+            turned[:m, :m] = cholesky(covariance + 1e-12 * np.trace(covariance) * np.eye(m) / max(m, 1), lower=True)
             matrix, seen, beside = turned.T @ matrix @ turned, turned.T @ seen, turned.T @ beside
         else:
             matrix, seen = matrix * np.outer(self._weight, self._weight), seen * self._weight
@@ -127,10 +127,10 @@ class ProjectedEvidence:
         item = self.evidence.items[other]
         return self.cross(one)[:, item.index] * item.spread
 
-    def posterior(self, q: int) -> tuple[Array, Array]:
-        """Mean (q,) and covariance (q, q) of the first q parameters beside, with no hypothesis."""
-        half = solve_triangular(self._low, np.eye(len(self._low))[:, :q] * self._weight[:q], lower=True)
-        return self.beside([])[:q], half.T @ half
+    def posterior(self, m: int) -> tuple[Array, Array]:
+        """Mean (m,) and covariance (m, m) of the first m parameters beside, with no hypothesis."""
+        half = solve_triangular(self._low, np.eye(len(self._low))[:, :m] * self._weight[:m], lower=True)
+        return self.beside([])[:m], half.T @ half
 
     def beside(self, members: Sequence[tuple[int, Array]]) -> Array:
         """Posterior mean of what always stands beside (P,) given items at amplitudes."""

@@ -50,7 +50,7 @@ class Scan:
 
 @dataclass(frozen=True)
 class MemberOdds:
-    """A member of the best set, and who could stand in its place: log odds (n_hypotheses,) and shares of them, the last
+    """A member of the best set, and who could stand in its place: log odds (N,) and shares of them, the last
     share being nobody's."""
 
     taken: Member
@@ -98,7 +98,7 @@ class Search:
         return self.members(taken).value + self._log_prior(taken) + sum(t.offset for t in taken)
 
     def _prior(self, taken: Sequence[Member]) -> Array:
-        """Log odds (n_hypotheses,) of every hypothesis beside a set, before the recordings are looked at."""
+        """Log odds (N,) of every hypothesis beside a set, before the recordings are looked at."""
         own = [self.pool[t.hypothesis].kind for t in taken]
         return np.array([h.prior_beside(own.count(h.kind)) for h in self.pool])
 

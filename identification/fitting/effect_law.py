@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft
+from scipy.fft import next_fast_len
 
 from ...models.effect import Effect
 from ...models.hidden_state import LawEvaluation, evaluate_law
@@ -27,17 +27,17 @@ def law_along(
     bare: bool = False,
     direction: slice = FORWARD,
 ) -> LawEvaluation:
-    """The law over all N samples; one with hidden states starts afresh, at rest, in every segment of the recording.
+    """The law over all n samples; one with hidden states starts afresh, at rest, in every segment of the recording.
 
     Parameters
     ----------
     experiment : Experiment
     effect : Effect
-    signals : mapping of str to array (N,) or (N, size)
+    signals : mapping of str to array (n,) or (n, size)
         What the law reads; it leaves the others.
     parameters : array (p,)
     bare : bool
-        Leave out the derivative by the parameters of an effect with hidden states: (N, m, 0).
+        Leave out the derivative by the parameters of an effect with hidden states: (n, m, 0).
     direction : slice
         `FORWARD`, or `BACKWARD` for states that follow time in reverse.
     """
@@ -56,9 +56,9 @@ def law_along(
 def passing(
     experiment: Experiment, effect: Effect, parameters: Array, by_value: Array | None, direction: slice
 ) -> Callable[[Array], Array]:
-    """What a sensor makes of columns (N, k) of its channel: a gain, or its impulse response.
+    """What a sensor makes of columns (n, k) of its channel: a gain, or its impulse response.
 
-    ``by_value`` (N, 1, 1) is the derivative of a stateless sensor's law by the true value; None: it passes it on.
+    ``by_value`` (n, 1, 1) is the derivative of a stateless sensor's law by the true value; None: it passes it on.
     """
     segments = experiment.motion.segments
     if effect.states:
@@ -78,9 +78,10 @@ def impulse_response(effect: Effect, parameters: Array, period: float) -> Array:
 
 
 def causal(columns: Array, response: Array) -> Array:
-    """Columns (N, k) through a causal filter (m,) that has seen the first row for ever."""
-    n, before = len(columns), len(response) - 1
-    seen = np.empty((columns.shape[1], before + n))
+    """Columns (n, k) through a causal filter (m,) that has seen the first row for ever."""
+    count, before = len(columns), len(response) - 1
+    seen = np.empty((columns.shape[1], before + count))
     seen[:, :before], seen[:, before:] = columns[:1].T, columns.T
-    size = next_fast_len(before + n, real=True)  # what comes round the circle ends in the lead
-    return irfft(rfft(seen, size) * rfft(response, size), size)[:, before : before + n].T
+    size = next_fast_len(before + count, real=True)  # what comes round the circle ends in the lead
+    spectrum = np.fft.rfft(seen, size) * np.fft.rfft(response, size)
+    return np.fft.irfft(spectrum, size)[:, before : before + count].T

@@ -1,6 +1,6 @@
 """Places of effects on any arm: what a law reads there along a recording, and how it reaches the torque channels.
 
-Letters: N samples, J joints, m numbers that a law gives, p parameters of an effect. Places that only a suspension rig
+Letters: n samples, J joints, m numbers that a law gives, p parameters of an effect. Places that only a suspension rig
 has are in `rig_places`.
 """
 
@@ -24,11 +24,11 @@ from .floating_terms import base_signals
 Array = NDArray[np.float64]
 
 ChannelTerm = tuple[int, Array, Array]
-"""A channel, what is added to it (N,) [N·m or N], and its derivative by the effect's parameters (N, p)."""
+"""A channel, what is added to it (n,) [N·m or N], and its derivative by the effect's parameters (n, p)."""
 
 
 class TorqueState(NamedTuple):
-    """A recording with the torque that has been modelled so far, each (N, J) [N·m or N]."""
+    """A recording with the torque that has been modelled so far, each (n, J) [N·m or N]."""
 
     experiment: Experiment
     load: Array
@@ -42,9 +42,9 @@ class EffectTerms(NamedTuple):
 
     terms: list[ChannelTerm]
     by_load: Array | None = None
-    """Derivative of the torque at the place by the load there (N,); None where the law does not read the load."""
+    """Derivative of the torque at the place by the load there (n,); None where the law does not read the load."""
     passed: Callable[[Array], Array] | None = None
-    """Of a sensor: what it makes of columns (N, k) of its channel."""
+    """Of a sensor: what it makes of columns (n, k) of its channel."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,11 +71,11 @@ class EffectPlace(ABC):
 
     @abstractmethod
     def signals(self, along: TorqueState) -> dict[str, Array]:
-        """What the law reads, each (N,) or (N, size), SI units."""
+        """What the law reads, each (n,) or (n, size), SI units."""
 
     @abstractmethod
     def spread(self, experiment: Experiment, values: Array, by_parameter: Array) -> list[ChannelTerm]:
-        """How what the law gives (N, m), and its derivative (N, m, p), reach the torque channels."""
+        """How what the law gives (n, m), and its derivative (n, m, p), reach the torque channels."""
 
     def terms(self, along: TorqueState, parameters: Array, bare: bool = False) -> EffectTerms:
         """What the effect adds with these parameters (p,); `law_along` says what ``bare`` leaves out."""
@@ -83,7 +83,7 @@ class EffectPlace(ABC):
         return EffectTerms(self.spread(along.experiment, law.values, law.by_parameter), self.by_load(law))
 
     def by_load(self, law: LawEvaluation) -> Array | None:
-        """Derivative of the torque at the place by its load (N,); None where nothing follows it."""
+        """Derivative of the torque at the place by its load (n,); None where nothing follows it."""
         return None
 
 
@@ -128,8 +128,9 @@ class JointPlace(EffectPlace):
 
     def by_load(self, law: LawEvaluation) -> Array | None:
         """Of a torque, what the law says."""
-        follows = self.placed.effect.acts_on == "torque" and law.by_signal is not None
-        return law.by_signal[:, 0, 0] if follows else None
+        if self.placed.effect.acts_on != "torque" or law.by_signal is None:
+            return None
+        return law.by_signal[:, 0, 0]
 
 
 class SensorPlace(JointPlace):
@@ -154,7 +155,7 @@ class SensorPlace(JointPlace):
     def error(
         self, along: TorqueState, signals: dict[str, Array], value: Array, parameters: Array, bare: bool
     ) -> tuple[Array, Array, Array | None]:
-        """Reading minus true ``value`` (N,), its derivative by parameters (N, p) and the law's by value (N, 1, 1)."""
+        """Reading minus true ``value`` (n,), its derivative by parameters (n, p) and the law's by value (n, 1, 1)."""
         inputs, effect = signals | {"value": value}, self.placed.effect
         law = law_along(along.experiment, effect, inputs, parameters, bare, self.direction)
         return law.values[:, 0] - value, law.by_parameter[:, 0], law.by_signal
@@ -224,9 +225,9 @@ class BasePlace(EffectPlace):
 
 
 def moved(experiment: Experiment, joint: int, values: Array, by_parameter: Array) -> list[ChannelTerm]:
-    """What a change of a joint's position, rate and acceleration (N, 3) adds to every channel, to first order.
+    """What a change of a joint's position, rate and acceleration (n, 3) adds to every channel, to first order.
 
-    ``by_parameter`` (N, 3, p) is the change's derivative.
+    ``by_parameter`` (n, 3, p) is the change's derivative.
     """
     by_position, by_rate = experiment.tangent
     paths = np.stack([by_position[:, :, joint], by_rate[:, :, joint], experiment.mass_matrix[:, :, joint]], 2)

@@ -27,6 +27,7 @@ from ...errors import InputError
 from ...models.floating.tree import CARRIERS, UNNAMED, FloatingTree
 from ...recordings.attitude import attitude
 from ...recordings.condition import Motion
+from ...recordings.signals import QUATERNION
 
 if TYPE_CHECKING:
     from .experiment import Experiment
@@ -122,7 +123,7 @@ def _impulse(dataset: xr.Dataset, wheels: Array) -> Array:
     return cumulative_trapezoid(wheels, np.asarray(dataset["time"].values, float), axis=0, initial=0.0)
 
 
-_NEEDED = (("quat", "wxyz"), ("vel", "xyz"), ("omega", "xyz"))
+_NEEDED = (("quat", QUATERNION), ("vel", "xyz"), ("omega", "xyz"))
 
 
 def as_carriers(motion: Motion) -> Motion:

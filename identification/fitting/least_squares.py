@@ -1,6 +1,6 @@
 """Bounded nonlinear least squares on normal equations: Levenberg–Marquardt with Marquardt's scaling.
 
-One pass over the samples gives cost, gradient and normal matrix; the (n_samples, n_parameters) Jacobian need never
+One pass over the samples gives cost, gradient and normal matrix; the (n, P) Jacobian need never
 stand in memory at once, which is what makes it quicker than a general solver where samples are many and parameters few
 (Levenberg 1944; Marquardt 1963). Where residuals stay large, the curvature that the normal matrix lacks is learnt from
 the steps, and used while it predicts them better. Bounds are kept by solving each step's quadratic program (Stark &
@@ -22,7 +22,7 @@ _GROWTH = 10.0
 
 @dataclass(frozen=True)
 class NormalEquations:
-    """Cost ½‖r‖², its gradient Jᵀr (n_parameters,), and the normal matrix JᵀJ (n_parameters, n_parameters)."""
+    """Cost ½‖r‖², its gradient Jᵀr (P,), and the normal matrix JᵀJ (P, P)."""
 
     cost: float
     gradient: Array
@@ -36,8 +36,8 @@ class Objective:
     Parameters
     ----------
     normal : callable
-        ``theta (n_parameters,) -> Normal``; may return a cost of inf where the model cannot be evaluated.
-    low, high : array (n_parameters,)
+        ``theta (P,) -> Normal``; may return a cost of inf where the model cannot be evaluated.
+    low, high : array (P,)
     """
 
     normal: Callable[[Array], NormalEquations]
@@ -69,7 +69,7 @@ def minimise(
     Parameters
     ----------
     objective : Objective
-    start : array (n_parameters,)
+    start : array (P,)
         It is moved inside the bounds.
     max_steps : int
         Most trial steps.
@@ -77,7 +77,7 @@ def minimise(
         Settled when a step's predicted gain falls below this share of the cost.
     damping : float
         To begin with: 0 where the model is linear, more where its first step is not to be believed.
-    stride : float or array (n_parameters,)
+    stride : float or array (P,)
         Most that a parameter may change in one step.
     """
     normal, low, high = objective.normal, objective.low, objective.high

@@ -35,7 +35,7 @@ class Problem:
     assembly : TorqueModel
         With the effects that reach these channels only; P parameters.
     experiments : tuple of Experiment
-    channels : array (C,) of int
+    channels : array (c,) of int
     index : array (P,) of int
         Where its parameters stand in the whole model's.
     """
@@ -64,11 +64,11 @@ class Problem:
         return mask
 
     def minimise(self, theta: Array, sigma: Array, tolerance: float = 1e-8) -> Solution:
-        """Best parameters from one start, channels weighted by 1 / sigma (C,)."""
+        """Best parameters from one start, channels weighted by 1 / sigma (c,)."""
         return minimise_projected(self.objective(sigma), theta, self.shapes, tolerance=tolerance)
 
     def objective(self, sigma: Array) -> Objective:
-        """What is minimised, channels weighted by 1 / sigma (C,)."""
+        """What is minimised, channels weighted by 1 / sigma (c,)."""
         return Objective(lambda x: self.normal(x, sigma), self.assembly.low, self.assembly.high)
 
     def channel_fits(self, experiment: Experiment, theta: Array) -> Iterator[tuple[Array, Index, Array]]:
@@ -90,7 +90,7 @@ class Problem:
             yield residual, index, columns.reshape(len(residual), len(index))
 
     def normal(self, theta: Array, sigma: Array) -> NormalEquations:
-        """Cost, gradient and normal matrix, channels weighted by 1 / sigma (C,); inf where torque is not finite."""
+        """Cost, gradient and normal matrix, channels weighted by 1 / sigma (c,); inf where torque is not finite."""
         size = len(theta)
         cost, gradient, matrix = 0.0, np.zeros(size), np.zeros((size, size))
         # A trial far out may overflow: that is an answer, not a fault.
@@ -105,7 +105,7 @@ class Problem:
         return NormalEquations(cost if finite else np.inf, gradient, matrix)
 
     def rms(self, theta: Array) -> Array:
-        """RMS residual of each of its channels in the analysis band (C,)."""
+        """RMS residual of each of its channels in the analysis band (c,)."""
         residuals = [
             (e.measured - e.all_to_band(self.assembly.torque(e, theta)))[:, self.channels] for e in self.experiments
         ]

@@ -29,8 +29,8 @@ def minimise_projected(
     Parameters
     ----------
     objective : Objective
-    start : array (n_parameters,)
-    shapes : array (n_parameters,) of bool
+    start : array (P,)
+    shapes : array (P,) of bool
         Parameters that r is not linear in. Linearity in the others is used for speed, not trusted: what is
         returned was evaluated.
     max_steps, tolerance
@@ -64,7 +64,7 @@ def minimise_projected(
 def project(
     objective: Objective, theta: Array, shapes: NDArray[np.bool_], scale: Array | float = 0.0
 ) -> tuple[Array, float, NormalEquations]:
-    """Solve the amplitudes, shapes held: parameters (n_parameters,), cost there, normal equations at ``theta``.
+    """Solve the amplitudes, shapes held: parameters (P,), cost there, normal equations at ``theta``.
 
     ``scale`` is the most influence that each parameter is known to have: one that lost nearly all of it stays.
     """

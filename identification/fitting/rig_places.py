@@ -1,6 +1,6 @@
 """Places of effects that only a suspension rig has: slings, slides, booms.
 
-Letters: N samples, J joints, m numbers that a law gives, p parameters of an effect.
+Letters: n samples, J joints, m numbers that a law gives, p parameters of an effect.
 """
 
 from typing import cast
@@ -30,7 +30,7 @@ class RigPlace(EffectPlace):
         return cast(Rig, self.tree)
 
     def reach(self, experiment: Experiment) -> Array:
-        """Drive torque per number that the law gives (N, J, m)."""
+        """Drive torque per number that the law gives (n, J, m)."""
         kind, at = self.placed.effect.at, self.placed.at
         key = (kind, at)
         if key not in experiment.store:
@@ -55,7 +55,7 @@ class SlingPlace(RigPlace):
     """A sling: a wrench on the arm at its hang point (m = 6)."""
 
     def signals(self, along: TorqueState) -> dict[str, Array]:
-        """The hang point's velocity (N, 3) [m/s], the weight and tension that the sling carries [N], and time [s]."""
+        """The hang point's velocity (n, 3) [m/s], the weight and tension that the sling carries [N], and time [s]."""
         experiment, sling, n = along.experiment, sling_of(self.rig, self.placed.at), len(along.experiment.motion.time)
         motion, key = experiment.motion, ("velocity", self.placed.at)
         if key not in experiment.store:
@@ -69,15 +69,15 @@ class BoomPlace(RigPlace):
     """A boom, a link that bends and twists: upward force per lever on the slings beyond it (m = 2)."""
 
     def signals(self, along: TorqueState) -> dict[str, Array]:
-        """Sum of squared levers of the slings beyond it, for torsion and bending (N, 2) [m²], and time [s]."""
+        """Sum of squared levers of the slings beyond it, for torsion and bending (n, 2) [m²], and time [s]."""
         return {"spread": self._geometry(along.experiment)[1], "time": along.experiment.elapsed}
 
     def reach(self, experiment: Experiment) -> Array:
-        """Drive torque per force and lever (N, J, 2)."""
+        """Drive torque per force and lever (n, J, 2)."""
         return self._geometry(experiment)[0]
 
     def _geometry(self, experiment: Experiment) -> tuple[Array, Array]:
-        """Reach (N, J, 2) and spread (N, 2)."""
+        """Reach (n, J, 2) and spread (n, 2)."""
         keys = ("boom", self.placed.at), ("spread", self.placed.at)
         if keys[0] not in experiment.store:
             link = [link.name for link in self.rig.links].index(self.placed.at)

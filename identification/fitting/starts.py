@@ -31,10 +31,10 @@ def best_start(problem: Problem, theta: Array, sigma: Array, rng: np.random.Gene
     Parameters
     ----------
     problem : Problem
-        P parameters, C channels.
+        P parameters, c channels.
     theta : array (P,)
         One more start, and the amplitudes to begin with.
-    sigma : array (C,)
+    sigma : array (c,)
         Channels are weighted by 1 / sigma.
     rng : numpy.random.Generator
         Of the random starts.

@@ -162,7 +162,7 @@ class Covariance:
 
     @cached_property
     def _steps(self) -> Array:
-        """Maps (n, d + 1, d + 1) from what is predicted of the hidden values (d,), and a sample, to what is predicted
+        """Maps (n, m + 1, m + 1) from what is predicted of m hidden values, and a sample, to what is predicted
         next, and the sample's innovation."""
         n, s = len(self._variance), len(self._levels)
         weights = np.stack([*self._levels, *(self._derivative or ())], axis=1)

@@ -20,6 +20,7 @@ from ...models.snare.ring_drive import RingDrive
 from ...models.snare.setup import CaptureSetup, SnareTree
 from ...recordings import read_recording
 from ...recordings.attitude import attitude
+from ...recordings.signals import QUATERNION
 
 Array = NDArray[np.float64]
 
@@ -95,7 +96,7 @@ def _capture(model: Model, path: str | Path, data: xr.Dataset) -> CaptureRecordi
     notes = [*data.attrs["notes"]]
     place = _columns(data, f"pos.{body}", "xyz")
     assert place is not None  # `body_of` saw to it
-    if all(f"quat.{body}.{axis}" in data for axis in "wxyz"):
+    if all(f"quat.{body}.{axis}" in data for axis in QUATERNION):
         turn = attitude(data, body, path)
     else:
         turn = np.tile(model.tree.setup.target.orientation, (len(time), 1))

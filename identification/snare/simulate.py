@@ -8,6 +8,7 @@ import xarray as xr
 from ...errors import InputError
 from ...models.model import Model
 from ...models.snare.setup import SnareTree
+from ...recordings.signals import QUATERNION
 from .handles import key_of
 from .recording import ON_TARGET, load_captures
 
@@ -61,7 +62,7 @@ def simulate_capture(model: Model, motion: str | Path | None = None) -> xr.Datas
         f"force.{ON_TARGET[0]}": history.mean_pin_force,
     }
     columns = {f"{name}.{a}": x[:, i] for name, x in vectors.items() for i, a in enumerate("xyz")}
-    columns |= {f"quat.{body}.{a}": history.target_quaternion[:, i] for i, a in enumerate("wxyz")}
+    columns |= {f"quat.{body}.{a}": history.target_quaternion[:, i] for i, a in enumerate(QUATERNION)}
     columns["angle.ring"] = history.ring_angle
     variables = {name: ("time", np.ascontiguousarray(x)) for name, x in columns.items()}
     attributes = {"path": str(motion or model.path), "notes": []}

@@ -16,8 +16,6 @@ PRELOAD = 5500.0
 """Axial force that the carriage pulls with before the latches close [N]; calibrated to `PRELOAD_WINDOW`."""
 PRELOAD_WINDOW = (5380.0, 5660.0)
 """Peak of the rigidizing force in nominal captures [N]: 1210 and 1272 lbf (process_SSRMS_LEE_data.m)."""
-PRELOAD_DROP = 445.0
-"""What the force may drop by while it is held [N]: 100 lbf (same source)."""
 RESIDUAL, RESIDUAL_ANGLE = 1.5e-3, radians(0.9)
 """What a docking mechanism of 4.5 t ends within [m, rad] (Scientific Reports, s41598-025-88757-z, table 1)."""
 

@@ -70,9 +70,6 @@ class MonolithicAssembly(SnareAssembly):
         end_nodes = [self.cable_nodes[c * (n + 1) + k] for c in range(3) for k in (0, n)]
         carrier = system.AddObject(items.ObjectGenericODE2(nodeNumbers=[*end_nodes, self.tree_node]))
         marker = system.AddMarker(items.MarkerObjectODE2Coordinates(objectNumber=carrier))
-        self.ground = system.AddObject(items.ObjectGround())
-        ground_node = system.AddNode(items.NodePointGround())
-        ground_marker = system.AddMarker(items.MarkerNodeCoordinates(nodeNumber=ground_node))
         rows = np.concatenate([6 * end + np.arange(3) for end in range(6)])
         matrix = np.zeros((18, 36 + self.n_tree))
         for end in range(6):
@@ -92,14 +89,7 @@ class MonolithicAssembly(SnareAssembly):
                 matrix[3 * end : 3 * end + 3, 36:] = -(jacobian[:3] + turning)
             return matrix
 
-        self.ends_object = system.AddObject(
-            items.ObjectConnectorCoordinateVector(
-                markerNumbers=[ground_marker, marker],
-                scalingMarker0=np.zeros((18, 1)),
-                constraintUserFunction=cast(Any, residual),
-                jacobianUserFunction=cast(Any, derivative),
-            )
-        )
+        self._hold_ends(marker, residual, derivative)
 
     def _ring_ends(self, frame: Array, time: float) -> Array:
         p = self.parameters

@@ -90,9 +90,6 @@ class SnareAssembly:
         end_nodes = [self.cable_nodes[c * (n + 1) + k] for c in range(N_CABLES) for k in (0, n)]
         carrier = system.AddObject(items.ObjectGenericODE2(nodeNumbers=end_nodes))
         marker = system.AddMarker(items.MarkerObjectODE2Coordinates(objectNumber=carrier))
-        ground = system.AddObject(items.ObjectGround())
-        ground_node = system.AddNode(items.NodePointGround())
-        ground_marker = system.AddMarker(items.MarkerNodeCoordinates(nodeNumber=ground_node))
         jacobian = np.zeros((18, 36))
         for end in range(6):
             jacobian[3 * end : 3 * end + 3, 6 * end : 6 * end + 3] = np.eye(3)
@@ -105,15 +102,21 @@ class SnareAssembly:
         def derivative(*_: Any) -> Any:
             return jacobian
 
+        self._hold_ends(marker, residual, derivative)
+
+    def _hold_ends(self, marker: Any, residual: Any, derivative: Any) -> None:
+        """One constraint of the ends' 18 coordinates at a marker, and the ground that it holds them to."""
+        system = self.system
+        self.ground = system.AddObject(items.ObjectGround())
+        still = system.AddMarker(items.MarkerNodeCoordinates(nodeNumber=system.AddNode(items.NodePointGround())))
         self.ends_object = system.AddObject(
             items.ObjectConnectorCoordinateVector(
-                markerNumbers=[ground_marker, marker],
+                markerNumbers=[still, marker],
                 scalingMarker0=np.zeros((18, 1)),
-                constraintUserFunction=cast(Any, residual),
-                jacobianUserFunction=cast(Any, derivative),
+                constraintUserFunction=residual,
+                jacobianUserFunction=derivative,
             )
         )
-        self.ground = ground
 
     def ring_at(self, time: float) -> tuple[float, float]:
         """Angle [rad] and rate [rad/s] of the ring at a time [s]."""

@@ -219,7 +219,7 @@ class Recorder:
             return np.array([r[name] for r in rows])
 
         times, totals, pins, energies = stack("time"), stack("totals"), stack("pin"), stack("energies")
-        quaternions = np.roll(Rotation.from_matrix(pins[:, 3:]).as_quat(canonical=True), 1, axis=1)
+        quaternions = Rotation.from_matrix(pins[:, 3:]).as_quat(canonical=True, scalar_first=True)
         intervals = np.diff(times, prepend=times[0])[:, None]
         wrench, pin_wrench = stack("wrench"), stack("pin_wrench")
 

@@ -1,9 +1,10 @@
 """``python -m proof export DIR``, ``answer DIR`` and ``score DIR ANSWERS.json``: a benchmark for any tool."""
 
 import argparse
-import sys
 from collections.abc import Sequence
 from pathlib import Path
+
+from ..ending import status_of, tell
 
 COMMANDS = ("export", "answer", "score")
 
@@ -25,22 +26,11 @@ def main(words: Sequence[str]) -> int:
     scoring.add_argument("folder", type=Path, metavar="DIR")
     scoring.add_argument("answers", type=Path, metavar="ANSWERS.json")
     given = parser.parse_args(words)
-    try:
-        _do(given)
-    except (ValueError, FileNotFoundError) as error:
-        print(error, file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("stopped; the same command goes on where it was", file=sys.stderr)
-        return 130
-    return 0
+    return status_of(lambda: _do(given))
 
 
 def _do(given: argparse.Namespace) -> None:
     from .case_set import CaseSet, export
-
-    def tell(words: str) -> None:
-        print(words, flush=True)
 
     cases = CaseSet(given.folder)
     if given.command == "export":

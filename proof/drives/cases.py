@@ -49,9 +49,9 @@ class Plan:
 
 def planned(seed: int, count: int) -> list[Plan]:
     """The first ``count`` cases of a seed, the same however many follow."""
-    singles = _cycle(seed, 1, [(name, size) for name in NAMES for size in SIZES])
-    lawless = _cycle(seed, 2, [(name, size) for name in NAMELESS for size in (2.0, 4.0)])
-    kinds = {group: _cycle(seed, 3 + k, KINDS) for k, group in enumerate(GROUPS)}
+    singles = endless(seed, 1, [(name, size) for name in NAMES for size in SIZES])
+    lawless = endless(seed, 2, [(name, size) for name in NAMELESS for size in (2.0, 4.0)])
+    kinds = {group: endless(seed, 3 + k, KINDS) for k, group in enumerate(GROUPS)}
     pairs = np.random.default_rng([seed, 0, 9])
     plans: list[Plan] = []
     while len(plans) < count:
@@ -71,7 +71,7 @@ def planned(seed: int, count: int) -> list[Plan]:
     return plans[:count]
 
 
-def _cycle(seed: int, stream: int, items: Sequence):
+def endless(seed: int, stream: int, items: Sequence):
     """All items in a random order, then again in another."""
     rng = np.random.default_rng([seed, 1, stream])
     while True:

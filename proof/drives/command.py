@@ -5,9 +5,9 @@ from the repository's root. What was done is not done again. Seeds 1 to 99 are f
 """
 
 import argparse
-import sys
 from pathlib import Path
 
+from ..ending import status_of, tell
 from .cases import GROUPS
 from .make import make, written
 
@@ -30,21 +30,10 @@ def main() -> int:
     telling = commands.add_parser("table", help="print the figures")
     telling.add_argument("file", type=Path)
     given = parser.parse_args()
-    try:
-        _do(given)
-    except (ValueError, FileNotFoundError) as error:
-        print(error, file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("stopped; the same command goes on where it was", file=sys.stderr)
-        return 130
-    return 0
+    return status_of(lambda: _do(given))
 
 
 def _do(given: argparse.Namespace) -> None:
-    def tell(words: str) -> None:
-        print(words, flush=True)
-
     if given.command == "make":
         make(given.folder, given.seed, given.cases, given.group, tell)
     elif given.command == "score":

@@ -1,13 +1,13 @@
 """The cases: which there are, how each is drawn, and what is written of it. All follows from seed and number."""
 
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..drives.cases import endless
 from .concealed import NAMES, Concealed, TooMuch
 from .laws import Slip
 from .machine import Machine, TooSoft
@@ -45,9 +45,9 @@ class Plan:
 
 def planned(seed: int, count: int) -> list[Plan]:
     """The first ``count`` cases of a seed, the same however many follow."""
-    singles = _cycle(seed, 1, [(name, size) for name in NAMES for size in SIZES])
-    outside = _cycle(seed, 2, [(name, size) for name in OUTSIDE for size in (1.0, 2.0, 4.0)])
-    faults = _cycle(seed, 3, [(name, 0.0) for name in FAULTS])
+    singles = endless(seed, 1, [(name, size) for name in NAMES for size in SIZES])
+    outside = endless(seed, 2, [(name, size) for name in OUTSIDE for size in (1.0, 2.0, 4.0)])
+    faults = endless(seed, 3, [(name, 0.0) for name in FAULTS])
     several = np.random.default_rng([seed, 0, 9])
     plans: list[Plan] = []
     while len(plans) < count:
@@ -65,14 +65,6 @@ def planned(seed: int, count: int) -> list[Plan]:
                 concealed = tuple((name, float(several.choice((1.0, 2.0, 4.0)))) for name in names)
             plans.append(Plan(group, concealed))
     return plans[:count]
-
-
-def _cycle(seed: int, stream: int, items: Sequence):
-    """All items in a random order, then again in another."""
-    rng = np.random.default_rng([seed, 1, stream])
-    while True:
-        for k in rng.permutation(len(items)):
-            yield items[int(k)]
 
 
 def write(plan: Plan, seed: int, number: int, folder: Path) -> None:

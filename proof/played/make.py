@@ -1,11 +1,11 @@
 """Write cases; one that is there is not made again."""
 
 import argparse
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 from ..drives.make import made
+from ..ending import status_of, tell
 from .cases import GROUPS, planned, write
 from .residuals import RECORDINGS, residuals
 from .robots import published
@@ -35,12 +35,8 @@ def main() -> int:
     parser.add_argument("--cases", type=int, required=True)
     parser.add_argument("--group", choices=GROUPS, default="")
     given = parser.parse_args()
-    try:
-        make(given.folder, given.seed, given.cases, given.group, lambda words: print(words, flush=True))
-    except ValueError as error:
-        print(error, file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("stopped; the same command goes on where it was", file=sys.stderr)
-        return 130
-    return 0
+
+    def run() -> None:
+        make(given.folder, given.seed, given.cases, given.group, tell)
+
+    return status_of(run)

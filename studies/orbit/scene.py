@@ -89,4 +89,4 @@ def add_phases(scene: Playback, docked: DockingRun) -> None:
 
 def _quaternions(frames: Array, turned: Rotation | None = None) -> Array:
     turn = Rotation.from_matrix(frames[:, 3:])
-    return np.roll((turn * turned if turned else turn).as_quat(), 1, axis=1)
+    return (turn * turned if turned else turn).as_quat(scalar_first=True)

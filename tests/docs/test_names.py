@@ -3,6 +3,7 @@
 import ast
 import re
 from collections import Counter
+from collections.abc import Iterator
 
 import pytest
 from documentation import DOCS
@@ -47,3 +48,30 @@ def test_no_class_name_stands_for_two_things(classes):
 def test_types_are_nouns(classes):
     assert not any(is_noun(name) for name in ("Taken", "Judged", "LeftOverFound", "NotConverged"))
     assert [name for name in classes if not is_noun(name)] == []
+
+
+def strings(tree) -> Iterator[str]:
+    """Docstrings, and strings under fields and constants."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str):
+            yield node.value.value
+
+
+def letters(text):
+    """Single letters in shapes such as (n, 10 L), (P,) or (n_band, k)."""
+    size = r"(?:\d+|[A-Za-z]|n_\w+)"
+    one = rf"{size}(?: ?[*+] ?{size}| [A-Z])*"
+    found = re.findall(rf"(?<![\w])\({one}(?:, {one})*,?\)", text)
+    return {x for shape in found if "," in shape for x in re.findall(r"\b[A-Za-z]\b", shape)}
+
+
+def test_shapes_in_identification_use_the_glossarys_letters():
+    assert letters("x (n, 10 L), y (P,), z (k + 1, n_band), f(q, x)") == {"n", "L", "P", "k"}
+    page = (DOCS / "glossary.md").read_text(encoding="utf-8")
+    known = set(re.findall(r"`([A-Za-z])`", page[page.index("## Symbols") :]))
+    off = {}
+    for path in sorted((DOCS.parent / "identification").rglob("*.py")):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        if strange := {x for text in strings(tree) for x in letters(text)} - known:
+            off[path.name] = strange
+    assert off == {}

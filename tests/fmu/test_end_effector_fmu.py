@@ -1,13 +1,10 @@
 """FMUs of the end effector and its control program, and an SSP of the whole in a foreign master."""
 
-import subprocess
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
+from ecos import by_hand, in_ecos
 
-from bench.fmu_models import Slave, tool_environment
+from bench.fmu_models import Slave
 from snarelab.cosim.participants.control_program import ControlProgram
 from snarelab.cosim.participants.fmu import Fmu
 from snarelab.cosim.setup import Setup
@@ -65,28 +62,8 @@ def test_the_whole_end_effector_runs_in_ecos_from_our_ssp_file(folder, tmp_path)
     write_ssp(Setup(System(fmus, wires, name="end_effector"), step=SIZE, stop=SIZE * STEPS), tmp_path / "whole.ssp")
 
     slaves = {who: Slave(made(folder, who, 2), folder / f"{who}2") for who in NAMES}
-    for _ in range(STEPS):
-        moved = [
-            (target.partition("."), slaves[source.partition(".")[0]].get([source.partition(".")[2]])[0])
-            for source, target in wires
-        ]
-        for (who, _, variable), value in moved:
-            slaves[who].set({variable: value})
-        for s in slaves.values():
-            s.step(SIZE)
     shown = ["effector::travel", "effector::pos.carriage.x", "snare::angle.ring", "program::rate.ring", "effector::gap"]
-    wanted = [slaves[n.partition("::")[0]].get([n.partition("::")[2]])[0] for n in shown]
-    for s in slaves.values():
-        s.close()
-    command = [
-        sys.executable, str(Path(__file__).parents[1] / "helpers" / "fmu_tools.py"), "ecos_ssp",
-        str(tmp_path / "whole.ssp"),
-        str(SIZE), str(STEPS), f'{{"outputs": {shown}}}'.replace("'", '"'),
-    ]  # fmt: skip
-    run = subprocess.run(command, capture_output=True, text=True, env=tool_environment())
-    if run.returncode and "libtbb" in run.stderr:
-        pytest.skip("ecospy finds no oneTBB: pip install tbb")
-    assert run.returncode == 0, run.stdout + run.stderr
-    found = [float.fromhex(x) for x in run.stdout.split()[-len(shown) :]]
+    wanted = by_hand(slaves, wires, SIZE, STEPS, shown)
+    found = in_ecos(tmp_path / "whole.ssp", SIZE, STEPS, shown)
     assert wanted[2] > 0  # the ring turns, as the program told it
     np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-12)

@@ -1,16 +1,14 @@
 """The Exudyn snare as an FMU: the native numbers, exact rollback, and a run beside a C arm in another tool."""
 
 import importlib.util
-import subprocess
-import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from ecos import by_hand, in_ecos
 from scipy.spatial.transform import Rotation
 
-from bench.fmu_models import Slave, everywhere, tool_environment, write_model
+from bench.fmu_models import Slave, everywhere, write_model
 from snarelab.cosim.participants.fmu import Fmu
 from snarelab.cosim.participants.snare import SnareParticipant
 from snarelab.cosim.setup import Setup
@@ -20,13 +18,10 @@ from snarelab.fmu.build import write_fmu
 from snarelab.fmu.export import export, model_equations
 from snarelab.fmu.hosted import participant_class
 from snarelab.models.model_file import load_model
+from snarelab.recordings.signals import pose_names
 
 SIZE, STEPS = 2.0**-8, 16
-POSE = [
-    f"{stem}.{axis}"
-    for stem, axes in (("pos", "xyz"), ("quat", "wxyz"), ("vel", "xyz"), ("omega", "xyz"))
-    for axis in axes
-]
+POSE = [name.replace(".tip", "") for name in pose_names("tip")]
 
 
 @pytest.fixture(scope="module")
@@ -117,34 +112,9 @@ def test_arm_and_snare_together_in_ecos_from_our_ssp_file(folder, tmp_path):
     for name, value in given.items():
         who, _, variable = name.partition(".")
         slaves[who].set({variable: value})
-    for _ in range(STEPS):
-        moved = [
-            (target.partition("."), slaves[source.partition(".")[0]].get([source.partition(".")[2]])[0])
-            for source, target in wires
-        ]
-        for (who, _, variable), value in moved:
-            slaves[who].set({variable: value})
-        for s in slaves.values():
-            s.step(SIZE)
     shown = ["arm::q.joint1", "arm::qd.joint2", "snare::force.effector.x", "snare::torque.effector.y"]
-    wanted = [slaves[n.partition("::")[0]].get([n.partition("::")[2]])[0] for n in shown]
-    for s in slaves.values():
-        s.close()
-    script = Path(__file__).parents[1] / "helpers" / "fmu_tools.py"
-    command = [
-        sys.executable,
-        str(script),
-        "ecos_ssp",
-        str(tmp_path / "capture.ssp"),
-        str(SIZE),
-        str(STEPS),
-        f'{{"outputs": {shown}}}'.replace("'", '"'),
-    ]
-    run = subprocess.run(command, capture_output=True, text=True, env=tool_environment())
-    if run.returncode and "libtbb" in run.stderr:
-        pytest.skip("ecospy finds no oneTBB: pip install tbb")
-    assert run.returncode == 0, run.stdout + run.stderr
-    found = [float.fromhex(x) for x in run.stdout.split()[-len(shown) :]]
+    wanted = by_hand(slaves, wires, SIZE, STEPS, shown)
+    found = in_ecos(tmp_path / "capture.ssp", SIZE, STEPS, shown)
     assert abs(wanted[2]) > 1e-6
     np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-12)
 

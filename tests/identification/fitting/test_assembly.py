@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from moving_arm import PERIOD, build, jacobian, motion, placed, three_joints
+from moving_arm import PERIOD, build, jacobian, motion, placed
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
@@ -13,17 +13,6 @@ from snarelab.identification.fitting.base_parameters import base_parameters
 from snarelab.identification.fitting.experiment import Experiment, scales
 from snarelab.models.rigid_body import RigidBody
 from snarelab.models.urdf import load_urdf
-
-
-@pytest.fixture(scope="module")
-def arm(tmp_path_factory):
-    return three_joints(tmp_path_factory.mktemp("arm"))
-
-
-@pytest.fixture(scope="module")
-def experiment(arm):
-    tree, body = arm
-    return Experiment(motion([j.kind for j in tree.joints]), body)
 
 
 def test_torque_of_plain_effects_is_the_sum_by_hand(arm, experiment):

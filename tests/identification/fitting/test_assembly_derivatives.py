@@ -1,22 +1,9 @@
 """Derivatives of the torque of a model with many effects, against differences."""
 
 import numpy as np
-import pytest
-from moving_arm import build, jacobian, motion, placed, three_joints
+from moving_arm import build, jacobian, placed
 
 from snarelab.identification.fitting.base_parameters import base_parameters
-from snarelab.identification.fitting.experiment import Experiment
-
-
-@pytest.fixture(scope="module")
-def arm(tmp_path_factory):
-    return three_joints(tmp_path_factory.mktemp("arm"))
-
-
-@pytest.fixture(scope="module")
-def experiment(arm):
-    tree, body = arm
-    return Experiment(motion([j.kind for j in tree.joints]), body)
 
 
 def differences(assembly, experiment, theta):
