@@ -180,11 +180,14 @@ class Evidence:
         self._rows = {key: x for key, x in self._rows.items() if key[1] != c}
 
     def alone(self, c: int, pool: Sequence[Hypothesis]) -> "tuple[Evidence, list[Hypothesis], Index]":
-        """One channel by itself: its evidence, the hypotheses that reach it, and which always stand beside it."""
+        """One channel by itself: its evidence, the hypotheses that reach it, and which always stand beside it.
+
+        A hypothesis may reach a channel at some of its shapes only: of it those remain.
+        """
         always = np.unique(np.concatenate([row[c].index for row in self.channels]))
         at = self.where[c]
-        kept = [h for h in pool if at[h.items[0].index[0]] >= 0]
-        own = [replace(h, items=tuple(replace(x, index=at[x.index]) for x in h.items)) for h in kept]
+        reach = [tuple(replace(x, index=at[x.index]) for x in h.items if at[x.index[0]] >= 0) for h in pool]
+        own = [replace(h, items=items) for h, items in zip(pool, reach, strict=True) if items]
         other = copy(self)
         other.channels = [[replace(row[c], index=np.searchsorted(always, row[c].index))] for row in self.channels]
         other.items = tuple(x for h in own for x in h.items)

@@ -1,15 +1,18 @@
 """The evidence of hypotheses against the Gaussian density of all samples at once, by SciPy, in dense matrices."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from explained import explained
+from explained import STEP, explained, hypotheses
 from scipy.integrate import quad
 from scipy.stats import norm
 
 from snarelab.identification import deciding
 from snarelab.identification.evidence.members import SIZES, Members
-from snarelab.identification.evidence.pool import CandidateColumns
+from snarelab.identification.evidence.pool import CandidateColumns, Hypothesis
 from snarelab.identification.evidence.projected import ProjectedEvidence
+from snarelab.identification.nuisance.covariance import Covariance
 
 FREE = (0, 1, 2, 5)
 """Items whose amplitudes may have either sign."""
@@ -136,6 +139,26 @@ def test_channels_that_an_item_reaches(case):
     made, evidence = case
     assert [evidence.reached(x) for x in made.items[:3]] == [[0], [0, 1], [1]]
     assert not evidence.contribution(0, 0, made.items[2], np.ones(3)).any()
+
+
+@pytest.mark.parametrize("c", [0, 1])
+def test_a_channel_by_itself_keeps_each_shape_that_reaches_it(case, c):
+    """A hypothesis reaches either channel at one of its two shapes only; the channel goes back with other noise."""
+    made, _ = case
+    pool = [Hypothesis("some", True, (made.items[0], made.items[2]), 0.0), *hypotheses([made.items[1]], 1.0)]
+    made.items = [x for h in pool for x in h.items]
+    alone, own, _ = made.evidence().alone(c, pool)
+    assert [len(h.items) for h in own] == [1, 1]
+    others = [Covariance(np.full(len(row[c].residual), 2.0), [], None, STEP, (slice(0, None),)) for row in made.pieces]
+    alone = alone.with_covariances(0, others)
+    ProjectedEvidence(alone, (0, 1))
+    found = ProjectedEvidence(made.evidence().with_channel(c, alone), (0, 1))
+    for row, other in zip(made.pieces, others, strict=True):
+        row[c] = replace(row[c], covariance=other)
+    fresh = ProjectedEvidence(made.evidence(), (0, 1))
+    for one in range(3):
+        np.testing.assert_allclose(found.score(one), fresh.score(one), rtol=1e-9)
+        np.testing.assert_allclose(found.curvature(one, one), fresh.curvature(one, one), rtol=1e-9)
 
 
 def test_columns_are_given_back_in_the_order_that_was_asked_for():
