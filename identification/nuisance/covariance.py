@@ -15,11 +15,14 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dpbtrf, dpbtrs
+from scipy.linalg import get_lapack_funcs
 
 Array = NDArray[np.float64]
 
 ROOT6 = np.sqrt(6.0)
+
+_FACTORISE, _DIVIDE = get_lapack_funcs(("pbtrf", "pbtrs"), dtype=np.float64)
+"""LAPACK without scipy's checks, which take as long: a diagnosis calls them thousands of times."""
 
 
 @dataclass(frozen=True)
@@ -90,8 +93,7 @@ class Covariance:
                 # Sample t's entry stands in column t * width + start; those before the first sample are zero.
                 skip = -(start // width) if start < 0 else 0
                 band[lag, skip * width + start :: width][: n - skip] += product[skip:]
-        # LAPACK without scipy's checks, which take as long: it is called thousands of times for a diagnosis.
-        factor, failed = dpbtrf(band, lower=1)
+        factor, failed = _FACTORISE(band, lower=1)
         if failed:
             raise np.linalg.LinAlgError(f"{failed}-th leading minor not positive definite")
         self._log_det += 2 * float(np.sum(np.log(factor[0])))
@@ -135,7 +137,7 @@ class Covariance:
             for offset, weight in rows:
                 skip = -(offset // width) if offset < 0 else 0
                 hidden[skip * width + offset :: width][: n - skip] += weight[skip:, None] * z[skip:]
-            hidden, _ = dpbtrs(self._factor, hidden, lower=1, overwrite_b=1)
+            hidden, _ = _DIVIDE(self._factor, hidden, lower=1, overwrite_b=1)
             back = np.zeros_like(flat)
             for offset, weight in rows:
                 skip = -(offset // width) if offset < 0 else 0
