@@ -1,11 +1,13 @@
 """Halve and double every constant that decides, one at a time, and count how often a test of the decision fails.
 
-``python bench/moved_constants.py [FILE ...]``; by default ``identification/deciding.py``. A constant is a name in
-capitals that a module sets to a number, or to a tuple of them; a tuple's numbers are moved together. A constant of
-``deciding.py`` is tried by the files of ``tests/identification/test_deciding_*.py`` that name it, one of another module
-by the test files that import that module, so that a mutant costs seconds. Tests of the documentation, which compare its
-tables with the source and so would notice any number, are not asked. Lines are written to
-``build/mutants/constants.jsonl`` as they come, and what was tried in the same commit's files is not tried again.
+``python bench/moved_constants.py [FILE ...] [--names NAME ...]``; by default ``identification/deciding.py``.
+
+A constant is a name in capitals that a module sets to a number, or to a tuple of them; a tuple's numbers are moved
+together. A constant of ``deciding.py`` is tried by the files of ``tests/identification/test_deciding_*.py`` that name
+it, one of another module by the test files that import that module, so that a mutant costs seconds. Tests of the
+documentation, which compare its tables with the source and so would notice any number, are not asked.
+Lines are written to ``build/mutants/constants.jsonl`` as they come, and what was tried in one commit's files is not
+tried again.
 """
 
 import argparse
@@ -129,12 +131,14 @@ def main() -> int:
     """Try every constant that was not tried, and count."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("files", nargs="*", default=[DECIDING], metavar="FILE", help=f"of the sources ({DECIDING})")
+    parser.add_argument("--names", nargs="+", default=[], metavar="NAME", help="of constants (all)")
     given = parser.parse_args()
     version, log = git("rev-parse", "HEAD^{tree}"), FOLDER / "constants.jsonl"
     FOLDER.mkdir(parents=True, exist_ok=True)
     lines = [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
     done = {Moved(**x["mutant"]): x["end"] for x in lines if x["version"] == version}
-    every = [Moved(p, n, f) for p in given.files for n in constants(committed(p)) for f in FACTORS]
+    some = [(p, n) for p in given.files for n in constants(committed(p)) if n in (given.names or [n])]
+    every = [Moved(p, n, f) for p, n in some for f in FACTORS]
     tree, plain = None, {}
     with log.open("a") as file:
         for k, mutant in enumerate(every, 1):

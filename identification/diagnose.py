@@ -144,7 +144,7 @@ def _steps(
     names = list(dict.fromkeys(n.placed.effect.name for n in decided.best.names))
     for k, name in enumerate(names):
         later = [n.placed.key for n in decided.best.names if n.placed.effect.name in names[k + 1 :]]
-        own = without(final, later, train) if later else final
+        own = without(final, later, train, decided.best.found.first) if later else final
         at = [n.placed.at for n in decided.best.names if n.placed.effect.name == name]
         steps.append(line(f"+ {name} at {', '.join(at)}", own))
     return tuple(steps)

@@ -80,10 +80,10 @@ def verdict_sentence(
     """The first sentence of the report; ``noise`` tells what explains the rest of each channel."""
     worst = foremost(findings, fit, remainder)
     if findings:
-        fall = from_to(worst.holdout.relative_before, worst.holdout.relative_after)
+        before, after = worst.holdout.relative_before, worst.holdout.relative_after
         return (
             f"The model leaves out {named(findings)}. With that added, the error of {worst.channel} on the held-out "
-            f"recording falls {fall}.{remainder}"
+            f"recording {'rises' if after > before else 'falls'} {from_to(before, after)}.{remainder}"
         )
     if remainder:
         return f"Something is missing on {worst.channel} that no effect of the vocabulary explains.{remainder}"

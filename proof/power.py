@@ -34,7 +34,7 @@ NEAR = 0.02
 """How near to its ratio an effect's value must come; makers are not all linear in the torque they are asked for."""
 TRIES = 6
 """Secant steps to that value."""
-ATTEMPTS = 100
+ATTEMPTS = 1000
 
 Line = dict[str, Any]
 Diagnose = Callable[[Path], Mapping[str, Any]]
@@ -44,12 +44,17 @@ class NoLimit(ValueError):
     """Nothing can be concealed at a multiple of what was stated."""
 
 
-def base(kind: str, seed: int, number: int) -> tuple[int, Case]:
-    """The first attempt at this case that hardware has, and whose arm follows its motions, and the case."""
+def base(kind: str, seed: int, number: int, folder: Path) -> tuple[int, Case]:
+    """The first attempt at this case that hardware has, and whose arm follows its motions with nothing concealed: the
+    case, and that arm's recordings in ``folder``."""
     for attempt in range(ATTEMPTS):
         case = planned_case(("single", (kind,), 1.0), seed, number, attempt)
-        if case is not None:
-            return attempt, case
+        try:
+            if case is not None:
+                _written(replace(case, plant=case.twin, model=case.twin_model), folder)
+                return attempt, case
+        except NoLimit:
+            continue
     raise NoLimit(f"no arm in {ATTEMPTS} attempts")
 
 
@@ -92,8 +97,8 @@ def lines(kind: str, seed: int, number: int, folder: Path, run: Diagnose) -> lis
     """A line for each ratio; one without a ratio where none can be made."""
     about = {"kind": kind, "seed": seed, "number": number}
     try:
-        attempt, case = base(kind, seed, number)
-        limit = stated(case, _diagnosed(replace(case, plant=case.twin, model=case.twin_model), folder, run))
+        attempt, case = base(kind, seed, number, folder)
+        limit = stated(case, run(folder))
     except NoLimit as error:
         return [about | {"ratio": None, "why": str(error)}]
     found = []
@@ -101,10 +106,11 @@ def lines(kind: str, seed: int, number: int, folder: Path, run: Diagnose) -> lis
         line = about | {"ratio": ratio, "limit": limit}
         try:
             case = sized(kind, seed, number, attempt, ratio * limit)
-            said = _diagnosed(case, folder, run)
+            _written(case, folder)
         except NoLimit as error:
             found.append(line | {"why": str(error)})
             continue
+        said = run(folder)
         judged = judge(case.answer, said)
         found.append(
             line
@@ -118,13 +124,12 @@ def lines(kind: str, seed: int, number: int, folder: Path, run: Diagnose) -> lis
     return found
 
 
-def _diagnosed(case: Case, folder: Path, run: Diagnose) -> Mapping[str, Any]:
+def _written(case: Case, folder: Path) -> None:
     shutil.rmtree(folder, ignore_errors=True)
     try:
         case.write(folder)
     except ValueError as error:
         raise NoLimit(str(error)) from None
-    return run(folder)
 
 
 def result(every: Sequence[Line]) -> dict[str, Any]:

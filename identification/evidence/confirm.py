@@ -178,7 +178,7 @@ def _missed(
 ) -> ArmLoss:
     """Take one effect out of a fit, and fit the rest again."""
     key = name.placed.key
-    rest = without(final, [key], train)
+    rest = without(final, [key], train, found.first)
     other = forecast(_without(model, key), rest, found, train, held, scales)
     c = list(name.channels)
     with_it, measured = channel_rms(final.assembly, held, final.theta)

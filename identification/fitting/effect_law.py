@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft
+from scipy.fft import next_fast_len
 
 from ...models.effect import Effect
 from ...models.hidden_state import LawEvaluation, evaluate_law
@@ -83,4 +83,5 @@ def causal(columns: Array, response: Array) -> Array:
     seen = np.empty((columns.shape[1], before + count))
     seen[:, :before], seen[:, before:] = columns[:1].T, columns.T
     size = next_fast_len(before + count, real=True)  # what comes round the circle ends in the lead
-    return irfft(rfft(seen, size) * rfft(response, size), size)[:, before : before + count].T
+    spectrum = np.fft.rfft(seen, size) * np.fft.rfft(response, size)
+    return np.fft.irfft(spectrum, size)[:, before : before + count].T

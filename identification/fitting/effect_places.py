@@ -128,8 +128,9 @@ class JointPlace(EffectPlace):
 
     def by_load(self, law: LawEvaluation) -> Array | None:
         """Of a torque, what the law says."""
-        follows = self.placed.effect.acts_on == "torque" and law.by_signal is not None
-        return law.by_signal[:, 0, 0] if follows else None
+        if self.placed.effect.acts_on != "torque" or law.by_signal is None:
+            return None
+        return law.by_signal[:, 0, 0]
 
 
 class SensorPlace(JointPlace):

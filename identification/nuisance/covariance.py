@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_solve_banded, cholesky_banded
+from scipy.linalg.lapack import dpbtrf, dpbtrs
 
 Array = NDArray[np.float64]
 
@@ -62,7 +62,7 @@ class Covariance:
         self._levels = [np.broadcast_to(np.asarray(p.level, float), (n,)) for p in there]
         times = [p.time for p in there]
         has = derivative is not None and bool(np.any(derivative > 0))
-        self._width = width = len(self._levels) + has
+        self._width = width = (len(self._levels) + has) * bool(n)
         self._log_det = float(np.sum(np.log(self._variance)))
         self._derivative = self._lagged(np.asarray(derivative, float), segments) if has else None
         if not width:
@@ -89,9 +89,11 @@ class Covariance:
                 lag, start = one - other, other
                 # Sample t's entry stands in column t * width + start; those before the first sample are zero.
                 skip = -(start // width) if start < 0 else 0
-                at = np.arange(skip, n) * width + start
-                band[lag, at] += product[skip:]
-        factor = cholesky_banded(band, lower=True, check_finite=False)
+                band[lag, skip * width + start :: width][: n - skip] += product[skip:]
+        # LAPACK without scipy's checks, which take as long: it is called thousands of times for a diagnosis.
+        factor, failed = dpbtrf(band, lower=1)
+        if failed:
+            raise np.linalg.LinAlgError(f"{failed}-th leading minor not positive definite")
         self._log_det += 2 * float(np.sum(np.log(factor[0])))
         self._factor = factor
 
@@ -126,14 +128,14 @@ class Covariance:
         """K⁻¹ x for columns x (n, k), or one (n,)."""
         flat = x.reshape(len(x), -1)
         z = flat / self._variance[:, None]
-        if self._width:
+        if self._width and flat.size:
             n, width = len(flat), self._width
-            hidden = np.zeros((n * width, flat.shape[1]))
+            hidden = np.zeros((n * width, flat.shape[1]), order="F")
             rows = self._rows()
             for offset, weight in rows:
                 skip = -(offset // width) if offset < 0 else 0
                 hidden[skip * width + offset :: width][: n - skip] += weight[skip:, None] * z[skip:]
-            hidden = cho_solve_banded((self._factor, True), hidden, overwrite_b=True, check_finite=False)
+            hidden, _ = dpbtrs(self._factor, hidden, lower=1, overwrite_b=1)
             back = np.zeros_like(flat)
             for offset, weight in rows:
                 skip = -(offset // width) if offset < 0 else 0

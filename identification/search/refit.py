@@ -29,12 +29,15 @@ def refitted(before: Fit, assembly: TorqueModel, samples: Sequence[Experiment], 
     What it had before is a special case of it, so that it leaves no more, unless it ended in a bad optimum.
     """
     found = fit(assembly, samples, start=carry(before, assembly), multi_start=everywhere, seed=seed)
-    if everywhere:
-        return found
-    with_it, without_it = (channel_rms(f.assembly, samples, f.theta)[0] for f in (found, before))
-    if np.all(with_it <= WORSE * without_it):
+    if everywhere or not _worse(found, before, samples):
         return found
     return fit(assembly, samples, start=carry(before, assembly), multi_start=True, seed=seed)
+
+
+def _worse(found: Fit, case: Fit, samples: Sequence[Experiment]) -> bool:
+    """Whether a fit ended in a bad optimum: it leaves more on a channel than the fit of a special case of it."""
+    with_it, without_it = (channel_rms(f.assembly, samples, f.theta)[0] for f in (found, case))
+    return not np.all(with_it <= WORSE * without_it)
 
 
 def carry(found: Fit, assembly: TorqueModel) -> Array:
@@ -43,7 +46,14 @@ def carry(found: Fit, assembly: TorqueModel) -> Array:
     return np.array([known.get(s.key, s.start) for s in assembly.slots])
 
 
-def without(found: Fit, keys: Sequence[str], experiments: Sequence[Experiment]) -> Fit:
-    """The fit of the same model with some effects taken out of it, from where it was."""
+def without(found: Fit, keys: Sequence[str], experiments: Sequence[Experiment], case: Fit) -> Fit:
+    """The fit of the same model with some effects taken out of it, from where it was.
+
+    ``case`` is the fit of a special case of what is left: where that leaves less, from there and from many starts.
+    """
     assembly = found.assembly.keep([p for p in found.assembly.placed if p.key not in set(keys)], found.theta)
-    return fit(assembly, fitted(assembly, experiments), start=carry(found, assembly), multi_start=False)
+    samples = fitted(assembly, experiments)
+    rest = fit(assembly, samples, start=carry(found, assembly), multi_start=False)
+    if not _worse(rest, case, samples):
+        return rest
+    return fit(assembly, samples, start=carry(case, assembly), multi_start=True)

@@ -16,7 +16,8 @@ EFFECT = Effect(
     sentence="the sensor's scale is off by a constant factor",
     equation="(1 + error) * value",
     source="JCGM 200:2012, 4.12 (sensitivity of a measuring system)",
-    parameters=(Parameter("error", "1", "relative error of the scale", low=-1.0),),
+    # A channel that reads less than a tenth is dead or in another unit; one that reads nothing tells no parameter.
+    parameters=(Parameter("error", "1", "relative error of the scale", low=-0.9),),
     law=_law,
     experiment="load {at} at rest with two known weights, or check its channel against a calibrated sensor",
 )

@@ -41,7 +41,7 @@ def copied(tmp_path):
     def run(*commands):
         """What several commands print, one after the other in one process: engines load once."""
         code = f"from snarelab.cli import main\nfor words in {commands!r}: assert main(words) == 0, words"
-        environment = os.environ | {"PYTHONPATH": str(tmp_path / "copy"), "PYTHONDONTWRITEBYTECODE": "1"}
+        environment = os.environ | {"PYTHONPATH": str(tmp_path / "copy")}
         ran = subprocess.run(
             [sys.executable, "-c", code], cwd=tmp_path, env=environment, capture_output=True, text=True
         )

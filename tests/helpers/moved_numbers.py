@@ -1,6 +1,7 @@
 """A deciding number halved and doubled wherever it was imported to, and the smallest size that is named."""
 
 import sys
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,11 @@ def move(monkeypatch, name: str, factor: float) -> None:
     """A number times a factor wherever it was imported to."""
     value = getattr(deciding, name)
     moved: Any = (factor * np.array(value)).tolist() if isinstance(value, tuple) else factor * value
-    moved = int(moved) if isinstance(value, int) else moved
+    put(monkeypatch, name, int(moved) if isinstance(value, int) else moved)
+
+
+def put(monkeypatch, name: str, moved: Any) -> None:
+    """A number wherever it was imported to."""
     for module in [m for n, m in sys.modules.items() if n.startswith("snarelab.identification")]:
         own = getattr(module, name, None)
         if own is not None:
@@ -36,6 +41,19 @@ def _as(own: Any, moved: Any) -> Any:
     if isinstance(own, tuple):
         return tuple(_as(x, y) for x, y in zip(own, moved, strict=True))
     return np.array(moved) if isinstance(own, np.ndarray) else moved
+
+
+def about(monkeypatch, name: str, value: Any, answer: Callable[[], float]) -> tuple[float, float, float]:
+    """An answer at 0.7 times a number that is written in the test, as it is, and at 1.4 times that number.
+
+    It lies between where the program has the test's number, and not where it has half or twice that.
+    """
+    found = [answer()]
+    for factor in (0.7, 1.4):
+        with monkeypatch.context() as patch:
+            put(patch, name, (factor * np.array(value)).tolist())
+            found.append(answer())
+    return found[1], found[0], found[2]
 
 
 def planted(size: float) -> Explained:

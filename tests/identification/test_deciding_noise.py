@@ -6,10 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 from loud_windows import windows
-from moved_numbers import FACTORS, move
+from moved_numbers import FACTORS, about, move
 from near_rest_of import near_rest
 
-from snarelab.identification import deciding
 from snarelab.identification.evidence import arm
 from snarelab.identification.nuisance import rest
 from snarelab.identification.nuisance.bursts import bursts
@@ -69,7 +68,9 @@ def test_a_level_that_wanders_must_show(monkeypatch):
     rng_noise = rng.normal(size=n)
     level, time = wander()
     assert level > 0
-    assert time in deciding.WANDER_TIMES
+    assert time in (2.0, 8.0, 40.0)
+    more, as_it_is, less = about(monkeypatch, "WANDER_PRIOR", 5.0, lambda: wander()[0])
+    assert less < as_it_is < more
     for factor in FACTORS:
         with monkeypatch.context() as patch:
             move(patch, "WANDER_PRIOR", factor)

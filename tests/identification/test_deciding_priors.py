@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from explained import Explained, hypotheses, white
-from moved_numbers import FACTORS, move, odds_of, planted, searched, smallest
+from moved_numbers import FACTORS, about, move, odds_of, planted, searched, smallest
 
 from snarelab.identification.evidence import hypotheses as hypothesising
 from snarelab.identification.evidence.evidence import Evidence, ResidualChannel
@@ -67,6 +67,15 @@ def test_the_smallest_that_is_named_hangs_on_the_sizes(monkeypatch, spread):
     assert not np.isclose(found[1], before, rtol=2e-3)
 
 
+def test_sizes_that_are_averaged_over():
+    """Log Bayes factor of each, against dense matrices, of an effect of 0.1 in noise of one."""
+    made = planted(0.1)
+    gains = Members(ProjectedEvidence(made.evidence(), (0,))).gains()
+    nothing = made.log_density([0])
+    wanted = [made.log_density([0], [(0, size)]) - nothing for size in (0.003, 0.01, 0.03, 0.1, 0.3)]
+    assert gains[0] == pytest.approx(wanted, abs=1e-4)
+
+
 def test_how_far_a_whole_law_may_be_from_its_own_size(monkeypatch):
     """Of one that does 0.8 of what it should, in noise that tells: named, and with half the deviation not."""
     made = planted(1.0)
@@ -90,6 +99,8 @@ def test_how_far_a_whole_law_may_be_from_its_own_size(monkeypatch):
             found.append(farthest())
     assert found[0] < before - 0.05
     assert found[1] > before + 0.05
+    less, own_size, more = about(monkeypatch, "WHOLE", 0.12, farthest)
+    assert less < own_size < more
 
 
 def test_an_effect_that_is_at_one_joint_is_likelier_at_another(monkeypatch):
@@ -139,8 +150,10 @@ def shaped(monkeypatch, off: float, bent: float, curve: bool) -> float:
     return float(gains[middle].max())
 
 
-@pytest.mark.parametrize(("constant", "off", "bent"), [("SLOPE", 0.6, 0.0), ("BENDS", 0.0, 1.2)])
-def test_how_far_a_law_may_be_from_a_shape_that_is_tried(monkeypatch, constant, off, bent):
+@pytest.mark.parametrize(
+    ("constant", "value", "off", "bent"), [("SLOPE", 0.3, 0.6, 0.0), ("BENDS", (0.15, 0.4), 0.0, 1.2)]
+)
+def test_how_far_a_law_may_be_from_a_shape_that_is_tried(monkeypatch, constant, value, off, bent):
     """One that is far from it is believed more with more freedom, one that is just that shape with less."""
     curve = constant == "BENDS"
 
@@ -154,3 +167,7 @@ def test_how_far_a_law_may_be_from_a_shape_that_is_tried(monkeypatch, constant, 
             other = believed()
         assert (other[0] > far + 0.3) if factor > 1 else (other[0] < far - 0.3), f"{constant} times {factor}"
         assert (other[1] < near - 0.1) if factor > 1 else (other[1] > near + 0.1), f"{constant} times {factor}"
+    less, as_it_is, more = about(monkeypatch, constant, value, lambda: believed()[0])
+    assert less < as_it_is < more
+    less, as_it_is, more = about(monkeypatch, constant, value, lambda: believed()[1])
+    assert less > as_it_is > more

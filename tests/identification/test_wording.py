@@ -96,6 +96,11 @@ def test_the_first_sentence_lists_places_by_effect_and_the_channel_that_gained_m
     )
 
 
+def test_an_error_that_rises_is_said_to_rise():
+    some: Any = [SimpleNamespace(name="backlash", at="a", probability=0.9)]
+    assert verdict_sentence(some, [channel("tau.joint1", 0.26, 1.0)], "").endswith("rises from 26 % to 100 %.")
+
+
 def test_without_a_name_it_is_the_worst_channel_that_is_told():
     assert verdict_sentence([], FITS, " Torque.") == (
         "Something is missing on tau.joint1 that no effect of the vocabulary explains. Torque."

@@ -83,7 +83,26 @@ def test_what_cannot_be_tried_is_counted_by_its_reason(short, tmp_path):
     assert json.loads(json.dumps(found))["untried"] == {"sensor_bias: no limit of its value was stated": 1}
 
 
-def test_arm_of_a_size_that_hardware_does_not_have(short):
-    attempt, _ = power.base("sensor_bias", SEED, 0)
+def test_arm_of_a_size_that_hardware_does_not_have(short, tmp_path):
+    attempt, _ = power.base("sensor_bias", SEED, 0, tmp_path)
     with pytest.raises(power.NoLimit, match="hardware has none"):
         power.sized("sensor_bias", SEED, 0, attempt, 1e9)
+
+
+def test_arm_that_strays_is_drawn_again(short, monkeypatch, tmp_path):
+    """Two attempts that cannot be recorded, then one that can: its arm is that of every size."""
+    left = [ValueError("strays"), ValueError("strays")]
+
+    def write(case, folder):
+        if left:
+            raise left.pop()
+        WRITTEN.append(case)
+
+    monkeypatch.setattr(cases.Case, "write", write)
+    attempt, case = power.base("sensor_bias", SEED, 0, tmp_path)
+    plan = ("single", ("sensor_bias",), 1.0)
+    possible = [k for k in range(attempt + 1) if cases.planned_case(plan, SEED, 0, k) is not None]
+    assert len(possible) == 3
+    assert possible[-1] == attempt
+    assert WRITTEN[-1].plant is case.twin
+    assert power.sized("sensor_bias", SEED, 0, attempt, 0.1).answer.joints == case.answer.joints

@@ -49,11 +49,29 @@ def wider(page: Page) -> list[str]:
         .filter(x => x.checkVisibility() && x.scrollWidth > x.clientWidth + 1).map(x => x.outerHTML.slice(0, 80))""")
 
 
+ORIGIN = Provenance(
+    "snarelab diagnose arm.toml " + "a_recording_of_some_length.csv " * 4 + "--holdout b.csv --report r.html",
+    tuple((role, f"{role}.csv", "0" * 64) for role in ("Model", "Robot", "Training", "Training", "Held-out")),
+    (("snarelab", "0.1.0"), ("Python", "3.13.1"), ("casadi", "3.8.2"), ("drake", "1.51.1"), ("numpy", "2.4.6")),
+)
+
+
+def crowded() -> Diagnosis:
+    """Twenty names on ten joints of a diagnosis, each with three values, rivals that are alike, and curves."""
+    made = VERDICTS["missing_physics"]()
+    speed = np.linspace(-1.0, 1.0, 61)
+    curve = FrictionCurve(
+        "joint5", "joint", ("stribeck_friction",), speed, np.tanh(speed / 0.1), np.full(61, 0.1), "N*m"
+    )
+    names = tuple(replace(made.effects[1], at=f"joint{5 + k}", probability=0.95 - 0.01 * k) for k in range(20))
+    return replace(made, effects=names, curves=(curve,))
+
+
 @pytest.fixture(scope="module")
 def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("pages")
-    for verdict, make in VERDICTS.items():
-        write_report(make(), folder / f"{verdict}.html")
+    for name, make in (*VERDICTS.items(), ("crowded", crowded)):
+        write_report(make(), folder / f"{name}.html", ORIGIN)
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         sections = [Section("Motion", ["What moves."], [picture()])]
@@ -74,7 +92,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     seal, content = Seal.make(answers, [1] * 12, [], 90500), {"seconds_a_diagnosis": 5.0}
     write_proof(folder / "proof.html", answers, scores, seal, content, found)
     others = {"study": study, "tolerance": captures.folder / "report.html"}
-    return {kind: folder / f"{kind}.html" for kind in KINDS} | others
+    return {kind: folder / f"{kind}.html" for kind in (*KINDS, "crowded")} | others
 
 
 @pytest.mark.parametrize(
@@ -158,28 +176,9 @@ def test_a_phone_shows_every_table_and_plot_whole(browser: Browser, pages: dict[
         assert unsaid == []
 
 
-def crowded(kind: str) -> Diagnosis:
-    """Twenty names on ten joints of a diagnosis, each with three values, rivals that are alike, and curves."""
-    made = VERDICTS[kind]()
-    speed = np.linspace(-1.0, 1.0, 61)
-    curve = FrictionCurve(
-        "joint5", "joint", ("stribeck_friction",), speed, np.tanh(speed / 0.1), np.full(61, 0.1), "N*m"
-    )
-    if not made.effects:
-        return made
-    names = tuple(replace(made.effects[1], at=f"joint{5 + k}", probability=0.95 - 0.01 * k) for k in range(20))
-    return replace(made, effects=names, curves=(curve,))
-
-
-@pytest.mark.parametrize("make", [*VERDICTS.values(), lambda: crowded("missing_physics")])
-def test_the_answer_is_one_printed_sheet(browser: Browser, tmp_path: Path, make) -> None:
-    origin = Provenance(
-        "snarelab diagnose arm.toml " + "a_recording_of_some_length.csv " * 4 + "--holdout b.csv --report r.html",
-        tuple((role, f"{role}.csv", "0" * 64) for role in ("Model", "Robot", "Training", "Training", "Held-out")),
-        (("snarelab", "0.1.0"), ("Python", "3.13.1"), ("casadi", "3.8.2"), ("drake", "1.51.1"), ("numpy", "2.4.6")),
-    )
-    write_report(make(), tmp_path / "report.html", origin)
-    with opened(browser, tmp_path / "report.html", size=(680, 1009)) as page:  # A4 less its margins
+@pytest.mark.parametrize("name", [*VERDICTS, "crowded"])
+def test_the_answer_is_one_printed_sheet(browser: Browser, pages: dict[str, Path], name: str) -> None:
+    with opened(browser, pages[name], size=(680, 1009)) as page:  # A4 less its margins
         page.emulate_media(media="print")
         answer = page.locator("#answer").bounding_box()
         assert answer is not None
@@ -187,9 +186,8 @@ def test_the_answer_is_one_printed_sheet(browser: Browser, tmp_path: Path, make)
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_a_crowded_answer_is_whole_on_a_phone(browser: Browser, tmp_path: Path, scheme) -> None:
-    write_report(crowded("missing_physics"), tmp_path / "report.html")
-    with opened(browser, tmp_path / "report.html", scheme, (390, 900)) as page:
+def test_a_crowded_answer_is_whole_on_a_phone(browser: Browser, pages: dict[str, Path], scheme) -> None:
+    with opened(browser, pages["crowded"], scheme, (390, 900)) as page:
         assert wider(page) == []
         assert page.locator("#answer tbody tr").count() == 8
         text = page.locator("#answer").inner_text()

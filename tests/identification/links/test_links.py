@@ -31,8 +31,8 @@ NOISE = 1e-5
 """[rad] Of the link's encoder, RMS."""
 
 
-def record(folder, seed=5, **concealed):
-    """Two motions of a random two-joint arm with friction and both encoders, and its model file."""
+def record(folder, seed=5, seconds=(6.0, 6.0, 6.0), **concealed):
+    """Three motions of a random two-joint arm with friction and both encoders, and its model file."""
     rng = np.random.default_rng(seed)
     arm = random_arm(rng, 2)
     plant = Plant(
@@ -46,9 +46,10 @@ def record(folder, seed=5, **concealed):
     (folder / "arm.toml").write_text(
         'name = "arm"\nurdf = "arm.urdf"\neffects = ["viscous_friction", "coulomb_friction", "presliding_hysteresis"]\n'
     )
-    motions = [fourier_motion(arm, rng, 9.0), fourier_motion(arm, rng, 9.0), point_to_point_motion(arm, rng, 8.0)]
+    kinds = fourier_motion, fourier_motion, point_to_point_motion
+    motions = [kind(arm, rng, t) for kind, t in zip(kinds, seconds, strict=True)]
     settings = {"timestep": 5e-4, "settle": 0.5, "link_encoder": True}
-    return [simulate(plant, m, t, 200.0, rng, **settings) for m, t in zip(motions, (9, 9, 8), strict=True)]
+    return [simulate(plant, m, t, 200.0, rng, **settings) for m, t in zip(motions, seconds, strict=True)]
 
 
 def write(folder, recordings, seed=0, change=lambda time, link: link, at="joint2"):
@@ -144,8 +145,9 @@ def test_a_spring_is_told_from_a_delay_and_from_play(tmp_path, gap):
 
 
 @pytest.mark.usefixtures("compiler")
-def test_whole_answer_and_saved_model(rigid, tmp_path):
-    folder, recordings = rigid
+def test_whole_answer_and_saved_model(tmp_path_factory, tmp_path):
+    folder = tmp_path_factory.mktemp("whole")
+    recordings = record(folder, seconds=(9.0, 9.0, 8.0))
     paths = write(tmp_path, recordings, change=lambda t, q: CubicSpline(t, q)(t - 0.003) + 0.002)
     out, saved = tmp_path / "out.json", folder / "new.toml"
     wanted = ["--json", str(out), "--report", str(tmp_path / "out.html"), "--save-model", str(saved)]

@@ -1,12 +1,14 @@
 """Joints that stick under a textbook's friction, and what a fit makes of samples near rest."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from pendulum import diagnosed, recorded
 
 from snarelab.identification.fitting.experiment import Bridge, load_experiments, scales
 from snarelab.identification.fitting.fit import channel_rms, fit
-from snarelab.identification.search.refit import assemble, refitted
+from snarelab.identification.search.refit import assemble, refitted, without
 from snarelab.identification.search.rest import fitted
 from snarelab.models.effects import get_effect
 from snarelab.models.model import PlacedEffect
@@ -66,4 +68,22 @@ def test_what_is_added_leaves_no_more_from_a_bad_start(tmp_path):
     samples = fitted(wider, experiments)
     found = refitted(before, wider, samples, False, 0)
     left, was = (channel_rms(f.assembly, samples, f.theta)[0][0] for f in (found, before))
+    assert left <= 1.001 * was
+
+
+def test_what_is_taken_out_leaves_no_more_than_the_model_as_given(tmp_path):
+    """A reading of a tenth and 0.1 s late is a valley of its own: a cart's recordings once ended there, at an error of
+    100 %."""
+    model = recorded(tmp_path, 5)
+    experiments = load_experiments(model, [tmp_path / "train.csv"], RigidBody(model.tree))
+    known = scales(experiments)
+    first = assemble(model, None, known)
+    case = fit(first, fitted(first, experiments))
+    sensor = [PlacedEffect(get_effect(f"sensor_{name}"), "tau.joint1") for name in ("delay", "gain", "bias")]
+    start = {f"{sensor[0].key}.delay": 0.1, f"{sensor[1].key}.error": -0.9}
+    wider = assemble(model.with_effects(sensor, start), None, known)
+    lost = replace(case, assembly=wider, theta=wider.start)
+    found = without(lost, [sensor[2].key], experiments, case)
+    samples = fitted(found.assembly, experiments)
+    left, was = (channel_rms(f.assembly, samples, f.theta)[0][0] for f in (found, case))
     assert left <= 1.001 * was
