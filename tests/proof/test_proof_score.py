@@ -134,7 +134,7 @@ def test_numbers_that_were_right_and_are_said_to_be_wrong_are_counted():
 def test_values_of_right_names_are_held_against_what_was_concealed():
     """Of a stiffness of 1: told as 1.3 and as -0.9, at a deviation of 0.1; at a bound, elsewhere or without one not."""
 
-    def told(value, std=0.1, at="joint2", **more):
+    def told(value, std: float | None = 0.1, at="joint2", **more):
         stiffness = {"value": value, "std": std, **more}
         return diagnosis(
             RIGHT | {"at": at, "parameters": {"stiffness": stiffness, "torque_at_zero": {"value": 9.0, "std": 0.1}}}
