@@ -31,13 +31,6 @@ def standing(record: DockingRecording) -> NDArray[np.bool_]:
     return (slowest < STICKS[0][0] * np.abs(rate).max()) | (rate[1:] * rate[:-1] < 0)
 
 
-def reseated(record: DockingRecording) -> NDArray[np.bool_]:
-    """Windows (n,) from when the carriage first moves under closed latches: seats have slid, and what friction holds of
-    the latches' pull is told by how they slid. Until then they stick as the latches found them."""
-    moves = ~standing(record) & (record.times[:-1] >= record.motion.latch[1])
-    return np.logical_or.accumulate(moves)
-
-
 def noise_channels(
     records: Sequence[DockingRecording], linear: Linearisation, could: Sequence[Sequence[Array]], scale: Array
 ) -> list[list[NoiseChannel]]:
@@ -46,8 +39,7 @@ def noise_channels(
     While balls touch and slide no law of contact tells the load to the window: a channel may then be off, as a joint
     near rest may hold any torque, by what nothing explains there, in the RMS over `ABOUT` windows either way, and by
     `LEAST_LEVEL` of its size at least, a vector's of the largest of its axes. A motor whose carriage stands may hold
-    anything up to its friction, and a latch what the friction of a seat that has slid leaves it. Where a channel
-    changes fast it may be off by more, which the noise learns.
+    anything up to its friction. Where a channel changes fast it may be off by more, which the noise learns.
 
     Parameters
     ----------
@@ -64,10 +56,8 @@ def noise_channels(
     loose = [touching(r, x) for r, x in zip(records, seen, strict=True)]
     found: list[list[NoiseChannel]] = [[] for _ in records]
     for c, name in enumerate(records[0].channels):
-        if name.startswith("tension."):
-            rows = [reseated(r) for r in records]
-        else:
-            rows = [standing(r) for r in records] if name == "tau.carriage" else loose
+        driven = name.startswith(("tau.", "tension."))
+        rows = [(standing(r) & (name == "tau.carriage")) if driven else k for r, k in zip(records, loose, strict=True)]
         left = np.concatenate([r[k, c] for r, k in zip(linear.residuals, rows, strict=True)])
         columns = np.concatenate([x[k] for x, k in zip(could[c], rows, strict=True)])
         if len(left) > 2 * columns.shape[1]:

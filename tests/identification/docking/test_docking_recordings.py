@@ -9,7 +9,6 @@ import pytest
 from bench.docking_concealed import EFFECTS, program, run_case
 from snarelab.errors import InputError
 from snarelab.identification.diagnose import diagnose
-from snarelab.identification.docking.noise import reseated
 from snarelab.identification.docking.recording import EVERY, load_records
 from snarelab.identification.docking.runs import SHIFTS, DockingRuns
 from snarelab.identification.simulate import simulate
@@ -67,19 +66,6 @@ def test_means_are_over_their_windows(tmp_path, model):
     # Samples of a window are those after its begin, up to its end.
     middles = EVERY * (np.arange(len(record.times) - 1) + 0.5) + 0.5 / RATE
     np.testing.assert_allclose(record.measured[:, record.channels.index("tau.carriage")], 10 * middles, atol=1e-9)
-
-
-def test_a_latch_may_pull_what_friction_leaves_it_once_its_seat_has_slid(tmp_path, model):
-    """The carriage stands while the latches close and until 2.4 s, then unloads: from then on, and not before."""
-    time = np.arange(0.0, 4.0, 1 / RATE)
-    travel = 0.005 * np.clip(time - 0.5, 0.0, 0.4) - 0.005 * np.clip(time - 2.4, 0.0, 0.4)
-    (record,) = load_records(model, [written(tmp_path, told(4.0, {"q.carriage [m]": travel}))])
-    since = record.times[:-1][reseated(record)]
-    assert since[0] == pytest.approx(2.4, abs=0.11)
-    np.testing.assert_allclose(np.diff(since), EVERY)
-    assert since[-1] == record.times[-2]
-    del (columns := told(4.0, {"q.carriage [m]": travel}))["closed.latches"]
-    assert not reseated(load_records(model, [written(tmp_path, columns)])[0]).any()
 
 
 def test_latches_that_were_not_recorded_stay_open(tmp_path, model):
