@@ -57,6 +57,13 @@ def main() -> int:
     parser.add_argument("--result", type=Path, default=RESULT)
     given = parser.parse_args()
     rows = []
+    program = shlex.split(given.run)[0]
+    if given.image and not shutil.which(program):
+        print(
+            f"--run {given.run}: no {program!r} on the path; install it, or give what starts a container",
+            file=sys.stderr,
+        )
+        return 2
     with tempfile.TemporaryDirectory() as place:
         wheel = build(Path(place) / "wheel") if given.image or given.python else None
         for kind, name in [*(("image", x) for x in given.image), *(("python", x) for x in given.python)]:
