@@ -1,6 +1,6 @@
 """A cart on a belt whose makers name friction by direction and place: do the recordings say so?
 
-Seven runs of one test are fitted, one of another is held out. Recordings: N. Skov, masterThesisMatlab (commit
+Every second run of one test is fitted, one of another is held out. Recordings: N. Skov, masterThesisMatlab (commit
 0e2c7253), looked for in ``$SNARELAB_RECORDINGS``, beside the project, and at their publisher.
 """
 
@@ -16,7 +16,7 @@ from .outcome import Quantity, interval
 from .page import Section
 
 HERE = Path(__file__).parent
-RUNS = tuple(f"0m{k}5.csv" for k in range(7))
+RUNS = tuple(f"0m{k}5.csv" for k in (0, 2, 4, 6))
 HELD = "cartTest3/0m25.csv"
 MASS = 6.28
 """[kg] The makers'."""

@@ -153,11 +153,9 @@ def test_programs_of_the_proof_preload_and_push_off():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("effect", ["docking_friction", "clean"])
-def test_an_effect_concealed_in_mujoco_is_named_alone(tmp_path, effect):
-    row = run_case(effect, 1, tmp_path)
-    assert effect in EFFECTS
+def test_an_effect_concealed_in_mujoco_is_named_alone(tmp_path):
+    row = run_case("docking_friction", 1, tmp_path)
+    assert "docking_friction" in EFFECTS
     assert row["right"], row
-    if effect != "clean":
-        # It came out 22 % high: balls that slide in are the engines' poorest match (docs/docking-recordings.md).
-        assert row["found"]["coefficient"] == pytest.approx(row["truth"]["coefficient"], rel=0.25)
+    # It came out 14 % low: balls that slide in are the engines' poorest match (docs/docking-recordings.md).
+    assert row["found"]["coefficient"] == pytest.approx(row["truth"]["coefficient"], rel=0.25)
