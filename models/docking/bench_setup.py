@@ -37,15 +37,16 @@ TOLERANCES = {
     "cable_stiffness": 6e3,
     "stiffness": 5e5,
     "bumper_stiffness": 5e4,
+    "damping": 100.0,
+    "bumper_damping": 150.0,
     "latch_stiffness": 5e6,
     "latch_preload": 50.0,
 }
 """How far numbers of the set-up may be from what they are said to be: one standard deviation, in their units; chosen as
-a workshop measures them, and for stiffness of contacts as laws of contact differ."""
-FACTORS = {"breakaway": 1.0, "damping": 1.0, "bumper_damping": 1.0}
+a workshop measures them, and for stiffness and damping of contacts as laws of contact differ."""
+FACTORS = {"breakaway": 1.0}
 """Tolerances of numbers that are known to a factor: one standard deviation of the logarithm; chosen, three times either
-way. How far a contact gives way before it slides, and what it loses, is nobody's drawing; a sum could go below 0, and
-such a contact feeds its bounces."""
+way. How far a contact gives way before it slides is nobody's drawing."""
 MACHINED = {f"groove_misalignment.{at}.offset": 2e-5 for at in GROOVES}
 """What a workshop's tolerance leaves of an effect: one standard deviation, in the parameter's unit; chosen. More than
 that is a misalignment."""
