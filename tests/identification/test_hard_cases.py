@@ -85,6 +85,7 @@ def test_a_cable_that_hardens_is_a_harness_and_more(tmp_path):
     assert last.holdout < before.holdout
 
 
+@pytest.mark.slow
 def test_bursts_are_an_effect_without_a_name(tmp_path):
     """Four times the disturbance's RMS, at times that no state of the arm goes with."""
     answer, found = diagnosed(9, tmp_path / "case")

@@ -23,6 +23,8 @@ from snarelab.models.rigid_body import RigidBody
 from snarelab.studies.kuka import CHECK, STIFFNESS, spring_alone, springs_of_measured_torque
 from snarelab.studies.kuka_figures import MDEG, pattern
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).resolve().parents[2]
 
 

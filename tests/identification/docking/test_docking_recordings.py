@@ -157,5 +157,5 @@ def test_an_effect_concealed_in_mujoco_is_named_alone(tmp_path):
     row = run_case("docking_friction", 1, tmp_path)
     assert "docking_friction" in EFFECTS
     assert row["right"], row
-    # It came out 22 % high: balls that slide in are the engines' poorest match (docs/docking-recordings.md).
+    # It came out 16 % low: balls that slide in are the engines' poorest match (docs/docking-recordings.md).
     assert row["found"]["coefficient"] == pytest.approx(row["truth"]["coefficient"], rel=0.25)

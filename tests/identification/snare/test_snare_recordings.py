@@ -226,6 +226,7 @@ def test_simulate_writes_a_recording_that_is_read_back(tmp_path, capsys):
     assert capture.sensors == {"effector": "ring", "target": "target"}
 
 
+@pytest.mark.slow
 def test_an_umbilical_on_a_pendulum_is_named_and_told_by_its_stiffness(tmp_path):
     model = load_model(written(tmp_path, PLAIN + '[capture]\ntarget = "pendulum"\nline_length = 2.0\n'))
     train = swinging(tmp_path, "train.csv", umbilical=80.0, seconds=2.0)

@@ -61,6 +61,7 @@ def test_far_below_its_frequency_only_mass_over_frequency_squared_shows(tmp_path
     assert min(x["std"] / x["value"] for x in (mass, frequency)) > 0.03  # neither is known to 1 % any more
 
 
+@pytest.mark.slow
 def test_driven_wheel_is_named(tmp_path):
     wheel = Wheel(2, inertia=0.1, viscous=2e-3, coulomb=0.01, torque=0.2)
     got, _ = named(tmp_path, "wheel_friction", wheel=wheel)

@@ -120,6 +120,7 @@ def test_identify_gives_friction_curves_and_flags_parameters_that_nothing_carrie
     assert all(p["std"] <= abs(p["value"]) for p in answer["parameters"] if p["identifiable"])
 
 
+@pytest.mark.slow
 def test_diagnose_names_a_slide_and_a_sling(tmp_path):
     concealed = {"joint4": dry(30.0, 0.0)}, {"sling6": 18.0}
     for k in range(2):
