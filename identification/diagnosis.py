@@ -38,12 +38,10 @@ class Rival:
 class Finding:
     """An effect that the model left out, in the field's words.
 
-    ``margin`` of torques is what the held-out recordings gain by it, in standard errors over blocks of time; ``gain``
+    ``margin`` is what the held-out recordings gain by it, in standard errors over blocks of time; ``gain``
     its log Bayes factor on the training recordings; ``explained`` the share of the held-out residual's energy that goes
     with it, on the channel where it is largest; ``probability`` is how often a name with these three was right on
-    simulated arms, shared with what the recordings cannot tell from it. ``margin`` of encoders and captures is how
-    often it, or one that cannot be told from it, beat the others in a bootstrap over blocks of time; these have no
-    Bayes factor, and ``gain`` and ``explained`` are None.
+    simulated arms, shared with what the recordings cannot tell from it.
     """
 
     name: str

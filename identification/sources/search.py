@@ -170,7 +170,7 @@ def _started(made: Search, slot: MemberOdds, beside: Sequence[MemberOdds]) -> tu
     values = dict(variant.values)
     bounds = {f"{variant.placed.key}.{x.name}": (x.low, x.high) for x in variant.placed.effect.parameters}
     for key, value in zip(variant.amplitudes, amplitude, strict=False):
-        values[key] = float(np.clip(value, *bounds[key]))
+        values[key] = float(np.clip(variant.origin.get(key, 0.0) + value, *bounds[key]))
     return variant.placed, values
 
 
@@ -212,7 +212,7 @@ def _smallest(made: Search, h: int) -> dict[str, float]:
         gain = log_bayes(many, h_of_one[0] * t[:, None], np.tile(item.positive[k : k + 1], (len(t), 1))).max(axis=1)
         enough = np.flatnonzero(gain + x.prior > 0)
         if len(enough):
-            size = float(t[enough[0]] * spread[k])
+            size = v.origin.get(key, 0.0) + float(t[enough[0]] * spread[k])
             if item.whole:
                 size = v.values[key] * size if first.zero == 0 else v.values[key] / size
             found[key.rpartition(".")[2]] = size

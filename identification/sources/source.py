@@ -5,7 +5,7 @@ samples of a recording, c channels, P free parameters of effects, S shifts.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -71,12 +71,14 @@ class ModelPoint:
 class GridPoint:
     """An effect at one point of its grid: values by key, and the parameters that each column is in proportion to; none
     where the one column is all that the law does. ``size``: a usual one of the column's amplitude, where the channels
-    do not tell it; of a whole law, its RMS as a share of its channel's."""
+    do not tell it; of a whole law, its RMS as a share of its channel's. ``origin``: where amplitudes are counted from,
+    by key; else from zero."""
 
     placed: PlacedEffect
     values: Mapping[str, float]
     amplitudes: tuple[str, ...]
     size: float = 0.0
+    origin: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -164,7 +164,7 @@ def _item(
     if not v.amplitudes:
         return Item(index, np.ones(1), np.ones(1, bool), True, replace(v, size=float(size[0])))
     named = {x.name: x for x in v.placed.effect.parameters}
-    positive = np.array([named[k.rpartition(".")[2]].low >= 0 for k in v.amplitudes])
+    positive = np.array([named[k.rpartition(".")[2]].low >= v.origin.get(k, 0.0) for k in v.amplitudes])
     return Item(index, np.full(len(size), v.size) if v.size else 1 / size, positive, label=v)
 
 
