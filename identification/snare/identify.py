@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from ...models.model import Model
+from ..deciding import ROUNDS
 from ..evidence.arm import WeighedRecordings
 from ..parameter_list import parameter_list
 from ..sources.answer import estimates, rms
-from ..sources.fit import deviations, fit, linearised, shift_columns
+from ..sources.fit import STILL, deviations, fit, linearised, shift_columns, sizes_of
 from ..sources.source import Linearisation, ModelPoint
 from ..sources.weigh import covariances, weigh
 from .answer import with_found
@@ -65,10 +66,31 @@ def identify_captures(
     """Fit every parameter of a capture's effects; arguments and errors as `diagnose_captures`."""
     progress("reading the recordings")
     with captures_of(model, recordings, holdout, jobs) as source:
-        given = start(model)
         progress("fitting the effects' parameters with the simulation in the loop")
-        here = linearised(source, source.train, given)
-        weighed = weigh(source, source.train, given, here, search=False)
-        found = fit(source, given, here.at, covariances(weighed), shift_columns(here), STEPS)
+        weighed, found = fitted(source)
         held = linearised(source, source.held, found.at) if holdout else None
-        return CaptureIdentification(with_found(model, found.at), given, source, weighed, found, held)
+        return CaptureIdentification(with_found(model, found.at), given(model), source, weighed, found, held)
+
+
+def given(model: Model) -> ModelPoint:
+    """What the model file has a value of; of the rest there is no prior."""
+    unknown = {p.key for p in model.effects for x in p.effect.parameters if f"{p.key}.{x.name}" not in model.values}
+    return start(model).without(*unknown)
+
+
+def fitted(source: Captures) -> tuple[WeighedRecordings, Linearisation]:
+    """The model's own parameters, fitted to the training recordings, and these as they were weighed.
+
+    Far from the truth a misfit is taken for noise: where a fit ends the noise is learnt anew, until that moves nothing.
+    """
+    known = given(source.model)
+    here = linearised(source, source.train, start(source.model))
+    weighed = weigh(source, source.train, known, here, search=False)
+    for _ in range(ROUNDS):
+        found = fit(source, known, here.at, covariances(weighed), shift_columns(here), STEPS)
+        moved = np.abs(found.at.values - here.at.values) / sizes_of(source, found.at)
+        here = found
+        if np.all(moved < STILL):
+            break
+        weighed = weigh(source, source.train, known, here, search=False)
+    return weighed, here

@@ -59,9 +59,13 @@ class Captures:
 
     def _values(self, at: ModelPoint) -> dict[str, float]:
         """Effects' values, and numbers within their tolerances where no effect has them; none is negative."""
-        own = at.all_values
-        shifted = zip(TOLERANCES.items(), at.shifts, strict=True)
-        return {k: max(self.setup.usual(k.partition(".")[0]) + float(x * s), 0.0) for (k, x), s in shifted if s} | own
+        moved = {k: x for k, x in self._shifted(at).items() if x}
+        return {k: max(self.setup.usual(k.partition(".")[0]) + x, 0.0) for k, x in moved.items()} | at.all_values
+
+    @staticmethod
+    def _shifted(at: ModelPoint) -> dict[str, float]:
+        """How far numbers are from what they are said to be."""
+        return {k: float(x * s) for (k, x), s in zip(TOLERANCES.items(), at.shifts, strict=True)}
 
     def _seen(self, i: int, many: Sequence[ModelPoint]) -> list[Array | None]:
         found = [None if t is None else seen(self.records[i], t) for t in self.tracks(i, many)]
@@ -142,15 +146,19 @@ class Captures:
 
     def columns(self, i: int, at: ModelPoint, v: GridPoint) -> Array:
         """What the simulation changes by, for a unit of an amplitude."""
-        ((key, value),) = v.values.items()
-        there = at.with_effects([v.placed], v.values)
         # All that will be asked for of this recording, so that the processes share them.
         every = [x for p in self.library(at.placed) for x in self.variants(p)]
-        self.tracks(i, [at, *(at.with_effects([x.placed], x.values) for x in every)])
-        none, own = self._seen(i, [at, there])
+        self.tracks(i, [at, *(self._with(at, x) for x in every)])
+        none, own = self._seen(i, [at, self._with(at, v)])
         assert none is not None
         change = np.full_like(none, np.nan) if own is None else own - none
+        ((key, value),) = v.values.items()
         return (change / (value - v.origin[key]) if v.amplitudes else change)[:, :, None]
+
+    def _with(self, at: ModelPoint, v: GridPoint) -> ModelPoint:
+        """With an effect at a point of its grid; on top of a number's shift, where it stands for that number."""
+        moved = self._shifted(at)
+        return at.with_effects([v.placed], {k: x + moved.get(k, 0.0) for k, x in v.values.items()})
 
     def curves(self, numbers: Sequence[int]) -> Mapping[tuple[int, str], list[Array]]:
         """Over time, since the ring closes by the clock, and over the target's place along the channel's axis, as the
@@ -224,4 +232,8 @@ def captures_of(
         tracks = runs([(i, at.all_values) for i in range(len(records))])
         records = [sensed_by(r, track) for r, track in zip(records, tracks, strict=True)]
         check_sensors(records)
-        yield Captures(model, records, n, runs)
+        source = Captures(model, records, n, runs)
+        for i, track in enumerate(tracks):
+            if track is None:
+                raise source.refused(i)
+        yield source

@@ -92,6 +92,14 @@ def test_an_amplitude_is_counted_from_what_is_there_without_the_effect():
         np.testing.assert_allclose(source.columns(0, NOTHING, v)[:, 0, 0], COURSE[::5, 0], atol=1e-9)
 
 
+def test_an_effect_of_a_number_that_is_shifted_counts_from_there():
+    """At 3 ms, two deviations more than is said, a column is still what a unit of damping changes."""
+    _, source = source_of(key=key_of(DAMPING), law=lambda x: x - 1e-3)
+    shifted = ModelPoint((), {}, np.zeros(0), np.array([2.0]))
+    for v in source.variants(DAMPING):
+        np.testing.assert_allclose(source.columns(0, shifted, v)[:, 0, 0], COURSE[::5, 0], atol=1e-9)
+
+
 def test_a_contact_that_gives_way_is_a_whole_law_at_each_stiffness():
     """Hertz: 1 N sinks in by k^(-2/3)."""
     _, source = source_of(key=key_of(STIFFNESS), law=lambda k: k ** (-2 / 3))
