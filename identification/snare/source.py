@@ -81,7 +81,8 @@ class Captures:
         )
 
     def slopes(self, i: int, at: ModelPoint, here: Array) -> Array:
-        sizes = [abs(v - self.origin(p)) for v, (p, _) in zip(at.values, at.free, strict=True)]
+        pairs = zip(at.values, at.free, strict=True)
+        sizes = [abs(v if self.inverse(p) else v - self.origin(p)) for v, (p, _) in pairs]
         usual = [self.size(p, x) for p, x in at.free]
         highs = [self.bounds(p, x)[1] for p, x in at.free]
         steps = WIDE * np.maximum(sizes, usual)
@@ -118,8 +119,13 @@ class Captures:
         """Value of an effect's parameter that stands for its absence."""
         return self.setup.usual(p.effect.name)
 
+    @staticmethod
+    def inverse(p: PlacedEffect) -> bool:
+        """Does an effect do the less, the larger its parameter is?"""
+        return (APPLIED | NUMBERS)[p.effect.name].inverse
+
     def size(self, p: PlacedEffect, x: Parameter) -> float:
-        if x.zero:
+        if self.inverse(p):
             return min(x.grid)
         return min(abs(g - self.origin(p)) for g in x.grid)
 
@@ -137,11 +143,11 @@ class Captures:
         return [p for p in every if p.key not in have]
 
     def variants(self, p: PlacedEffect) -> list[GridPoint]:
-        """A parameter that is zero where there is no effect is an amplitude, counted from what the set-up has."""
+        """A parameter is an amplitude, counted from what the set-up has; an inverse one is a shape of a whole law."""
         (x,) = p.effect.parameters
         key = f"{p.key}.{x.name}"
-        if x.zero:
-            return [GridPoint(p, {key: g}, ()) for g in x.grid]
+        if self.inverse(p):
+            return [GridPoint(p, {key: g}, (), inverse=True) for g in x.grid]
         return [GridPoint(p, {key: g}, (key,), origin={key: self.origin(p)}) for g in x.grid]
 
     def columns(self, i: int, at: ModelPoint, v: GridPoint) -> Array:

@@ -214,6 +214,6 @@ def _smallest(made: Search, h: int) -> dict[str, float]:
         if len(enough):
             size = v.origin.get(key, 0.0) + float(t[enough[0]] * spread[k])
             if item.whole:
-                size = v.values[key] * size if first.zero == 0 else v.values[key] / size
+                size = v.values[key] / size if first.zero or v.inverse else v.values[key] * size
             found[key.rpartition(".")[2]] = size
     return found

@@ -72,13 +72,14 @@ class GridPoint:
     """An effect at one point of its grid: values by key, and the parameters that each column is in proportion to; none
     where the one column is all that the law does. ``size``: a usual one of the column's amplitude, where the channels
     do not tell it; of a whole law, its RMS as a share of its channel's. ``origin``: where amplitudes are counted from,
-    by key; else from zero."""
+    by key; else from zero. ``inverse``: a whole law does the less, the larger its parameter is."""
 
     placed: PlacedEffect
     values: Mapping[str, float]
     amplitudes: tuple[str, ...]
     size: float = 0.0
     origin: Mapping[str, float] = field(default_factory=dict)
+    inverse: bool = False
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,6 @@ EFFECT = Effect(
             "stiffness",
             "N/m^1.5",
             "force per overlap to the power of 1.5",
-            zero=1.66e9,
             low=0.0,
             grid=(1e7, 2e6, 3e5),
         ),

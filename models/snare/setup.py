@@ -34,12 +34,14 @@ class SetupField:
     """The field's value in a model without the effect; None: the set-up's own."""
     grid: tuple[float, ...] = ()
     """Where a number of the set-up is tried, in shares of what it is said to be."""
+    inverse: bool = False
+    """Whether it does the less, the larger its parameter is."""
 
 
 APPLIED = {
     "contact_friction": SetupField("pin", "coefficient", "friction", False, 0.0),
     "contact_damping": SetupField("pin", "coefficient", "contact_damping", False, 0.0),
-    "contact_stiffness": SetupField("pin", "stiffness", "hertz_stiffness", False, None),
+    "contact_stiffness": SetupField("pin", "stiffness", "hertz_stiffness", False, None, inverse=True),
     "cable_damping": SetupField("cables", "time", "bending_damping", False, None),
     "cable_pretension": SetupField("cables", "tension", "cable_pretension", False, 0.0),
     "umbilical_stiffness": SetupField("target", "stiffness", "umbilical", True, 0.0),

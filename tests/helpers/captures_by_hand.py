@@ -66,7 +66,7 @@ class Straight:
     def count(self):
         return len(self.asked)
 
-    def one(self, values):
+    def one(self, values) -> Any:
         self.asked.append(dict(values))
         if self.fails(values):
             return None
@@ -75,7 +75,7 @@ class Straight:
         return track(sum(moved, start=self.motion), target=force, effector=-force)
 
 
-def model_of(given=("ring_radius", "pin_radius", "mass"), effects=(), values=None, support="free") -> Model:
+def model_of(given=("ring_radius", "pin_radius", "mass"), effects=(), values=None, support: Any = "free") -> Model:
     """A capture whose file gives these numbers of the set-up."""
     setup = CaptureSetup(SnareParameters(friction=0.0, contact_damping=0.0), Target(support), dict.fromkeys(given, 1.0))
     tree = SnareTree("capture", (), (), np.array([-9.81, 0.0, 0.0]), setup)

@@ -1,12 +1,15 @@
 """Whole decisions and answers on simulations that are straight lines over the effects' values, with noise."""
 
+from typing import Any
+
 import numpy as np
 import pytest
-from captures_by_hand import DAMPING, FRICTION, PRETENSION, Straight, along, captures_of, key_of, model_of
+from captures_by_hand import DAMPING, FRICTION, PRETENSION, STIFFNESS, Straight, along, captures_of, key_of, model_of
 
 from snarelab.identification.snare.answer import report_on, with_found
 from snarelab.identification.snare.source import start
 from snarelab.identification.sources.decide import decide
+from snarelab.models.snare.setup import SnareTree
 
 N = 40
 T = 0.25 * np.arange(N)
@@ -24,14 +27,25 @@ COURSES = {
     key_of(FRICTION): course(0.05 * np.sin(2.0 * T)),
     key_of(PRETENSION): course(1e-5 * np.exp(-T / 3) * np.cos(3.0 * T)),
     key_of(DAMPING): course(2.0 * np.cos(1.1 * T)),
+    key_of(STIFFNESS): course(100.0 * np.sin(1.7 * T)),
 }
-FACTOR = {key_of(DAMPING): lambda x: x - 1e-3}
+FACTOR = {key_of(DAMPING): lambda x: x - 1e-3, key_of(STIFFNESS): lambda k: k ** (-2 / 3)}
 
 
-def decided(values, *, model=None, more=0.0, seed=0, law=None):
+def setup_of(model):
+    assert isinstance(model.tree, SnareTree)
+    return model.tree.setup
+
+
+def no_contact(values):
+    """Without stiffness there is none, which cannot be simulated."""
+    return values.get(key_of(STIFFNESS), 1.0) <= 0
+
+
+def decided(values, *, model=None, more: Any = 0.0, seed=0, law=None):
     """What two captures say whose truth has these values, and some motion beside that no simulation has."""
     rng = np.random.default_rng(seed)
-    runs = Straight(PATH, COURSES, law or FACTOR, touch=TOUCH)
+    runs = Straight(PATH, COURSES, law or FACTOR, no_contact, touch=TOUCH)
     truth = runs.one(values).position + more
     own = [truth + 1e-4 * rng.normal(size=truth.shape) for _ in range(2)]
     source = captures_of(runs, *own, model=model)
@@ -69,12 +83,21 @@ def test_a_model_that_misses_nothing_is_adequate_and_says_what_would_have_shown(
     limits = {x.name: x.value for x in said.limits}
     assert 0 < limits["contact_friction"] < 0.15
     assert len(said.steps) == 1
+    # A contact that would have shown is softer than steel.
+    assert limits["contact_stiffness"] < 1e9
 
 
 def test_damping_of_a_rope_within_what_is_known_of_it_is_no_name():
     """Twice the set-up's, which is known to its own size; ten times is told."""
     assert [n.placed.key for n in decided({key_of(DAMPING): 2e-3})[1].best.names] == []
     assert [n.placed.key for n in decided({key_of(DAMPING): 1e-2})[1].best.names] == [DAMPING.key]
+
+
+def test_a_contact_that_gives_way_is_named_with_its_stiffness():
+    """Between the points where it is tried, 2e6 and 3e5."""
+    _, found = decided({key_of(STIFFNESS): 7e5})
+    assert [n.placed.key for n in found.best.names] == [STIFFNESS.key]
+    assert found.best.train.at.all_values[key_of(STIFFNESS)] == pytest.approx(7e5, rel=0.05)
 
 
 def test_two_effects_are_both_named():
@@ -95,9 +118,9 @@ def test_motion_that_no_effect_explains_is_told_as_such():
 
 def test_a_number_that_the_file_does_not_give_is_corrected_and_is_no_missing_physics():
     mass = "mass.capture.value"
-    said_mass = model_of(()).tree.setup.target.mass
-    runs = Straight(PATH, {**COURSES, mass: course(1e-3 * np.sin(1.4 * T))}, {**FACTOR, mass: lambda x: x - said_mass},
-                    touch=TOUCH)  # fmt: skip
+    said_mass = setup_of(model_of(())).target.mass
+    courses, laws = {**COURSES, mass: course(1e-3 * np.sin(1.4 * T))}, {**FACTOR, mass: lambda x: x - said_mass}
+    runs = Straight(PATH, courses, laws, no_contact, touch=TOUCH)
     rng = np.random.default_rng(1)
     truth = runs.one({mass: said_mass + 5.0}).position
     own = [truth + 1e-4 * rng.normal(size=truth.shape) for _ in range(2)]
@@ -112,8 +135,8 @@ def test_a_number_that_the_file_does_not_give_is_corrected_and_is_no_missing_phy
     assert "Numbers of the set-up that the model file does not give are better taken as mass = " in said.sentence
     after = with_found(source.model, found.best.train.at)
     assert after.effects == ()
-    assert after.tree.setup.target.mass == moved.after
-    assert after.tree.setup.given["mass"] == moved.after
+    assert setup_of(after).target.mass == moved.after
+    assert setup_of(after).given["mass"] == moved.after
 
 
 def test_values_that_the_model_had_are_told_before_and_after():

@@ -64,6 +64,13 @@ def test_a_step_is_a_quarter_of_the_way_from_what_the_rope_has():
         assert [x[key_of(DAMPING)] for x in runs.asked] == pytest.approx([end])
 
 
+def test_a_step_of_a_stiffness_is_a_quarter_of_itself():
+    """How far it is from steel's 1.66e9 is no matter."""
+    runs, source = source_of(key=key_of(STIFFNESS))
+    source.slopes(0, ModelPoint.of([STIFFNESS], {key_of(STIFFNESS): 4e6}, 1), np.zeros_like(source.measured(0)))
+    assert [x[key_of(STIFFNESS)] for x in runs.asked] == pytest.approx([5e6])
+
+
 def test_a_slope_is_nothing_where_its_end_cannot_be_simulated():
     _, source = source_of(fails=lambda x: x.get(key_of(FRICTION), 0.0) > 0.2)
     at = with_friction(0.2)
@@ -180,7 +187,7 @@ def test_nameless_curves_run_over_time_and_where_the_simulated_target_is():
     assert set(curves) == {(0, "time"), (1, "time"), (2, "time"), (0, "position")}
     for own in curves.values():
         assert [len(x) for x in own] == [8, 8]
-        np.testing.assert_array_equal(*own)
+        np.testing.assert_array_equal(own[0], own[1])
         assert np.ptp(own[0], axis=0).min() > 0.0
 
 
