@@ -83,9 +83,9 @@ HEAVY = pytest.mark.xfail(
     ids=lambda mistake: mistake.__name__,
 )
 def test_a_mend_gives_the_verdict_of_the_sound_recording(tmp_path, mistake):
-    """Where the mend is an estimate, or leaves samples or recordings out. Two joints and no physics missing: a mend that
-    is not quite right would be told as some. The first arm on which the mistake is found: on the last joint a wrong zero
-    is the same as a link whose mass is turned."""
+    """Where the mend is an estimate, or leaves samples or recordings out. Two joints and no physics missing: a mend
+    that is not quite right would be told as some. The first arm on which the mistake is found: on the last joint a
+    wrong zero is the same as a link whose mass is turned."""
     for seed in range(23, 33):
         made = bank.machine(seed, n_joints=2, missing=False)
         runs, name, _ = mistake(made, seed)
