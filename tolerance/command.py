@@ -8,10 +8,10 @@ from ..arguments import positive
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
     """Add the command to the command line."""
-    p = commands.add_parser("tolerance", help="find over which misalignments a capture succeeds")
+    p = commands.add_parser("tolerance", help="find the misalignments with which a capture succeeds")
     p.add_argument("study", metavar="STUDY.toml")
     p.add_argument(
-        "--out", required=True, metavar="RESULTS", help="folder of the results; a run that was killed goes on"
+        "--out", required=True, metavar="RESULTS", help="folder of the results; a killed run is resumed from it"
     )
     p.add_argument(
         "--scheduler", metavar="ADDRESS", help="a running Dask scheduler; without it, processes of this machine"
