@@ -146,7 +146,7 @@ def write_page(
         content += "".join(figure(p.svg, p.alternative, p.caption, zoom=_zoom(p)) for p in section.pictures)
         parts.append((f"part{number}", section.heading, content))
     origin = provenance(f"make study-{study}", files, (*PACKAGES, "exudyn", "numba", "scikit-learn"))
-    parts.append(("origin", "What this stands on", origin.markup()))
+    parts.append(("origin", "Files and versions", origin.markup()))
     header = f'<p class="quiet">{escape(title)}</p>\n{headline(found)}'
     document = page(title, header, parts, f"Written by snarelab: make study-{study}.")
     folder = FOLDER / study

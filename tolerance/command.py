@@ -35,7 +35,7 @@ def run(given: argparse.Namespace) -> None:
     try:
         with Progress() as progress:
             run_study(study, results, jobs=given.jobs, scheduler=given.scheduler, say=progress)
-            progress("summing up")
+            progress("writing the results")
             content = summarise(study, results)
     except KeyboardInterrupt:
         print(f"snarelab: interrupted; {len(results)} cases are kept, the same command goes on", file=sys.stderr)

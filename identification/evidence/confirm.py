@@ -113,7 +113,9 @@ def confirm(
             model = _without(model, weakest)
             whole = forecast(model, final, found, train, held, scales)
             stale = set(left)
-            progress(f"confirming on the held-out recordings: {out.placed.key} is not missed, {len(left)} left")
+            progress(
+                f"confirming on the held-out recordings: {out.placed.key} is not confirmed, {len(left)} names left"
+            )
     names = tuple(sorted(left.values(), key=lambda n: -missed[n.placed.key].size))
     return ArmConfirmation(found, names, tuple(rejected), weak, missed, model, final, whole)
 

@@ -60,7 +60,7 @@ def decide(
     for _ in range(SECOND_CHOICES):
         if not last.rejected:
             break
-        progress("looking for what else could explain what the held-out recordings did not confirm")
+        progress("searching another explanation for what the held-out recordings did not confirm")
         again = search(
             model, base, scales, train, held, before=last.found, barred=rejected, progress=progress, seed=seed
         )

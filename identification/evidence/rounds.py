@@ -72,7 +72,7 @@ def search(
     tuned = _tuned(model, base, scales, train, first, seed) if before is None else before.tuned
     channels = None if before is None else _reached_by(before.opening, barred)
     for number in range(1, ROUNDS + 1):
-        progress(f"round {number}: weighing each effect at each place")
+        progress(f"round {number}: comparing each effect at each place")
         if number == 1 and before is not None:
             weighed = before.opening
         else:

@@ -53,9 +53,9 @@ def _finding(one: EncoderComparison, n: Naming, values: dict[str, Estimate]) -> 
         values = {name: replace(estimate, std=spread / np.sqrt(len(own)))}
         without, within = (float(np.sqrt(within**2 + np.mean((zeros + x) ** 2))) for x in (estimate.value, 0.0))
         text += (
-            f"in every recording the link encoder's zero stands off the motor's by the same "
-            f"{length(estimate.value, unit)}; without it the held-out recording is missed by {length(without, unit)}, "
-            f"with it by {length(within, unit)}. It explains nothing that moves."
+            f"in every recording the link encoder's zero differs from the motor encoder's by "
+            f"{length(estimate.value, unit)}. Without it, the difference on the held-out recording is "
+            f"{length(without, unit)}, with it {length(within, unit)}. It explains no motion."
         )
     else:
         share = max(0.0, 1 - (within / max(without, 1e-300)) ** 2)
@@ -102,7 +102,7 @@ def nameless(one: EncoderComparison) -> str:
     after = rms(one.decided.best.train)
     return "; ".join(
         f"on {one.links.channels[r.channel]}, a smooth curve over {r.over} still explains {percent(r.explained)} of "
-        f"what is left between the encoders "
+        f"the remaining difference between the encoders "
         f"({length(float(np.sqrt(r.explained) * after[r.channel]), unit_of(one.links, r.channel))})"
         for r in one.decided.left
     )

@@ -38,7 +38,7 @@ def decide(source: Source, given: ModelPoint, progress: Callable[[str], None] = 
     for _ in range(SECOND_CHOICES):
         if not last.rejected:
             break
-        progress("looking for what else could explain what the held-out recordings did not confirm")
+        progress("searching another explanation for what the held-out recordings did not confirm")
         again = search(source, given, barred=rejected, progress=progress)
         last = confirm(source, given, again, progress)
         rejected |= {n.placed.key: n for n in last.rejected}

@@ -76,7 +76,7 @@ def search(
     trials: tuple[Trial, ...] = ()
     weighed: WeighedRecordings | None = None
     for number in range(1, ROUNDS + 1):
-        progress(f"round {number}: weighing each effect at each place")
+        progress(f"round {number}: comparing each effect at each place")
         weighed = opened(source, train, given, here)
         weighed, made, slots, _ = searched(weighed, range(len(train)), barred, range(len(weighed.noises)))
         trials = trials or _trials(made)

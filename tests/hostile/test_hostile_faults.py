@@ -126,7 +126,7 @@ def test_an_interrupted_diagnosis_says_so_and_leaves_nothing(folder):
     process = start(folder, [*DIAGNOSE, "-v"])
     assert process.stderr is not None
     line = ""
-    while "weighing each effect" not in line:
+    while "comparing each effect" not in line:
         line = process.stderr.readline()
         assert line
     time.sleep(0.3)

@@ -9,9 +9,8 @@ from snarelab.studies import free_floating
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory) -> Path:
+def folder(tmp_path_factory, own_cache) -> Path:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
         patch.chdir(tmp_path_factory.mktemp("study"))
         assert free_floating.main() == 0
         return Path.cwd() / "build" / "studies" / "free-floating"

@@ -41,4 +41,4 @@ def test_an_adequate_model_is_told_by_its_worst_motion_on_the_capture_held_out()
 
 def test_numbers_that_are_better_taken_otherwise_are_listed():
     assert _corrected([]) == ""
-    assert _corrected(["mass = 12 kg", "line = 2 m"]).endswith("are better taken as mass = 12 kg, line = 2 m.")
+    assert _corrected(["mass = 12 kg", "line = 2 m"]).endswith("fit better as mass = 12 kg, line = 2 m.")
