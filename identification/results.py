@@ -101,7 +101,7 @@ class DiagnosisResult:
         return self.diagnosis.fit
 
     def to_frame(self) -> pd.DataFrame:
-        """The findings as a table: a row for each parameter, with value, deviation, unit and its effect's probability."""
+        """The findings as a table, a row for each parameter: value, deviation, unit and its effect's probability."""
         rows = [
             (f.name, f.at, f.probability, name, e.value, e.std, e.unit, e.at_bound)
             for f in self.effects
