@@ -1,4 +1,4 @@
-"""What a decision says of dockings, in words and numbers: the `Diagnosis` that JSON, report and tests share."""
+"""The decision on dockings in words and numbers: the `Diagnosis` that JSON, report and tests share."""
 
 from collections.abc import Sequence
 from pathlib import Path

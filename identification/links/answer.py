@@ -1,4 +1,4 @@
-"""What the link-side encoders say, in words and numbers, and one answer out of that and what the torques say."""
+"""The diagnosis of link encoders in words and numbers, and one answer with the diagnosis of the torques."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -31,7 +31,7 @@ def unit_of(links: Links, c: int) -> str:
 
 
 def findings_of(one: EncoderComparison) -> tuple[Finding, ...]:
-    """What the held-out recordings miss most goes first; what adds the same at all times goes last."""
+    """Findings in order of held-out loss, the largest first; a constant difference comes last."""
     links, best = one.links, one.decided.best
     values = estimates(links, one.decided.given, best.train, covariances(one.decided.found.weighed))
     order = sorted(best.names, key=lambda n: (links.still(n.placed), -best.missed[n.placed.key].gain))
@@ -98,7 +98,7 @@ def noise_floor(links: Links, c: int) -> float:
 
 
 def nameless(one: EncoderComparison) -> str:
-    """What has no name, in words; empty where there is nothing."""
+    """Nameless curves in words; empty if there are none."""
     after = rms(one.decided.best.train)
     return "; ".join(
         f"on {one.links.channels[r.channel]}, a smooth curve over {r.over} still explains {percent(r.explained)} of "
@@ -109,7 +109,7 @@ def nameless(one: EncoderComparison) -> str:
 
 
 def traces_of(one: EncoderComparison) -> list[Trace]:
-    """How the encoders differ over time, measured, as given and after: for pictures."""
+    """Difference of the encoders over time, measured, by the model as given and by the final one: for pictures."""
     links, decided = one.links, one.decided
     sets: tuple[tuple[Literal["train", "holdout"], Sequence[int], Linearisation, Linearisation], ...] = (
         ("train", links.train, decided.found.first, decided.best.train),

@@ -1,4 +1,4 @@
-"""What a search found in captures, in words and numbers: the `Diagnosis` that JSON, report and tests share."""
+"""The search's findings in captures, in words and numbers: the `Diagnosis` that JSON, report and tests share."""
 
 from collections.abc import Sequence
 from dataclasses import replace

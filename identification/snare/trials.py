@@ -31,7 +31,7 @@ FORESIGHT = 4.0
 
 @dataclass(frozen=True)
 class CaptureTrial:
-    """A candidate beside what was there: its fit, and the share of the weighted residual energy that it explains.
+    """A candidate on top of a model: its fit, and the share of the weighted residual energy that it explains.
 
     ``score`` is the likelihood gained less the price of a parameter.
     """
