@@ -1,4 +1,4 @@
-"""What takes part in a co-simulation, in FMI's words: variables, initialise, set, step, get, save, restore.
+"""A participant of a co-simulation, in FMI's terms: variables, initialise, set, step, get, save, restore.
 
 A participant is one file in ``cosim/participants`` with a subclass of `Participant`. Inputs are one vector and
 outputs another, in the order of `Participant.variables`, so that the master's loop is a few array copies. Parameters

@@ -1,4 +1,4 @@
-"""Participants and what connects them, checked before anything runs."""
+"""Participants and their connections, checked before the first step."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
