@@ -17,12 +17,12 @@ from ..report.zoom import zoomable
 from .outcome import FOLDER, Quantity
 
 _KINDS = {
-    "predicted": "Comes out of the model; nothing was set to meet the paper's number.",
+    "predicted": "A result of the model; nothing was set to meet the paper's number.",
     "calibrated": "A free parameter of the model was set to meet the paper's number: agreement here proves nothing.",
-    "reference": "Ours, to know; no agreement is claimed, and the paper has no number for it.",
+    "reference": "Our number; no agreement is claimed, and the paper has no number for it.",
 }
 _BESIDE = (
-    "Ours, to know; no agreement is claimed. Where the paper has a number, it is shown for its size: it measures "
+    "Our number; no agreement is claimed. Where the paper has a number, it is shown for its size: it measures "
     "something else."
 )
 """Of ``reference``, where the paper's number stands beside one."""

@@ -38,6 +38,6 @@ def run(given: argparse.Namespace) -> None:
             progress("writing the results")
             content = summarise(study, results)
     except KeyboardInterrupt:
-        print(f"snarelab: interrupted; {len(results)} cases are kept, the same command goes on", file=sys.stderr)
+        print(f"snarelab: interrupted; {len(results)} cases are kept, the same command resumes it", file=sys.stderr)
         sys.exit(130)
     print(f"{content['sentence']}\nReport: {results.folder / 'report.html'}")

@@ -152,7 +152,7 @@ def test_an_interrupted_tolerance_study_keeps_its_cases_and_goes_on(folder):
     assert process.returncode == 130, error
     last = error.splitlines()[-1]
     assert last.startswith("snarelab: interrupted; ")
-    assert last.endswith(" cases are kept, the same command goes on")
+    assert last.endswith(" cases are kept, the same command resumes it")
     assert "Traceback" not in error
     again = start(folder, words("tolerance", "."), env=os.environ | paths)
     _, error = again.communicate(timeout=100)
