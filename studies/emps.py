@@ -82,7 +82,7 @@ def _say(text: str) -> None:
 
 
 def _diagnose(model: Path, train: Path, holdout: Path) -> Answer:
-    _say(f"Diagnosing {model.stem} against {train.name}, with {holdout.name} locked away ...")
+    _say(f"Diagnosing {model.stem} against {train.name}, with {holdout.name} as the held-out recording ...")
     return diagnose(load_model(model), [train], holdout, progress=stages(_say))
 
 
