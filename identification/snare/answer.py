@@ -41,7 +41,7 @@ def report_on(source: Captures, decided: Decision, seconds: float) -> Diagnosis:
     notes = [f"{Path(r.path).name}: {note}" for r in source.records for note in r.notes] + not_confirmed(decided)
     notes += [
         "positions and forces are compared as means over 0.25 s, and the force's chatter by its size: "
-        "how cables chatter on the pin depends on everything",
+        "how cables chatter on the pin depends on every detail",
         f"{source.runs.count} captures were simulated in {seconds:.0f} s",
     ]
     foremost_fit = _foremost(findings, fits)
@@ -104,7 +104,7 @@ def _left(source: Captures, decided: Decision) -> str:
         size = f"a share of e^{left[r.channel]:.2g}" if unit == "1" else _size(left[r.channel], unit)
         return f"{size} of {name}, over {r.over}"
 
-    return f"{listed([told(r) for r in decided.left])} are left that no effect of a capture explains: check the " \
+    return f"{listed([told(r) for r in decided.left])} remain that no effect of a capture explains: check the " \
         "set-up's sizes and masses"  # fmt: skip
 
 
@@ -125,7 +125,7 @@ def _sentence(findings: Sequence[Finding], worst: ChannelFit, description: str) 
     if description:
         return f"Something is missing that no effect of the vocabulary explains: {description}."
     return (
-        "The model is adequate: nothing is left out that these captures can show. On the held-out capture, "
+        "The model is adequate: these captures show nothing that it leaves out. On the held-out capture, "
         f"the error of {worst.channel} is {before}."
     )
 
@@ -136,7 +136,7 @@ def _corrected(moved: Sequence[ParameterShift]) -> str:
     ]
     if not own:
         return ""
-    return f" Numbers of the set-up that the model file does not give are better taken as {', '.join(own)}."
+    return f" Numbers of the set-up that the model file does not give fit better as {', '.join(own)}."
 
 
 def _steps(source: Captures, decided: Decision) -> tuple[Step, ...]:

@@ -37,7 +37,7 @@ def test_numbers_that_are_better_taken_otherwise_are_listed():
     assert _corrected([]) == ""
     assert _corrected([ParameterShift("umbilical_stiffness.target.stiffness", "N/m", 1.0, 2.0, 0.1)]) == ""
     moved = [ParameterShift("capture.mass", "kg", 25.0, 12.0, 0.1), ParameterShift("capture.line", "m", 1.0, 2.0, 0.1)]
-    assert _corrected(moved).endswith("are better taken as mass = 12 kg, line = 2 m.")
+    assert _corrected(moved).endswith("fit better as mass = 12 kg, line = 2 m.")
 
 
 def test_metres_are_told_in_millimetres_and_other_units_as_they_are():

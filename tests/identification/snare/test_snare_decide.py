@@ -132,7 +132,7 @@ def test_a_number_that_the_file_does_not_give_is_corrected_and_is_no_missing_phy
     (moved,) = said.moved
     assert (moved.name, moved.unit, moved.before) == ("capture.mass", "kg", said_mass)
     assert moved.after == pytest.approx(said_mass + 5.0, abs=3 * moved.std + 0.1)
-    assert "Numbers of the set-up that the model file does not give are better taken as mass = " in said.sentence
+    assert "Numbers of the set-up that the model file does not give fit better as mass = " in said.sentence
     after = with_found(source.model, found.best.train.at)
     assert after.effects == ()
     assert setup_of(after).target.mass == moved.after
