@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 class Dockings(DockingRuns):
     """Docking tests of a model, the training recordings first."""
 
-    n_shifts, anew, steps = len(SHIFTS), False, 4
+    n_shifts, anew, bent, steps = len(SHIFTS), False, False, 4
 
     def __init__(self, model: Model, train: Sequence[str | Path], held: Sequence[str | Path] = ()) -> None:
         """Read the recordings; raises InputError for whatever is wrong with one."""

@@ -46,7 +46,7 @@ class Links:
     n_train : int
     """
 
-    anew, steps = True, 12
+    anew, bent, steps = True, False, 12
 
     def __init__(
         self,

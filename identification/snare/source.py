@@ -40,7 +40,7 @@ FEWEST_BLOCKS = 4
 class Captures:
     """Captures of a model, the training recordings first, while their processes run."""
 
-    n_shifts, anew, steps = len(TOLERANCES), False, 4
+    n_shifts, anew, bent, steps = len(TOLERANCES), False, True, 4
 
     def __init__(self, model: Model, records: Sequence[CaptureRecording], n_train: int, runs: CaptureRuns) -> None:
         """Simulate nothing yet."""

@@ -95,6 +95,10 @@ def search(
             values |= start
         progress("fitting " + ", ".join(f"{p.effect.name} at {p.at}" for p in added))
         here = fit(source, given, here.at.with_effects(added, values), covariances(weighed), shifted)
+        if source.bent:
+            # Beside old columns an effect of the same number would explain what only their change leaves.
+            here = linearised(source, train, here.at)
+            shifted = shift_columns(here)
     assert weighed is not None
     if not names:
         here = fit(source, given, here.at, covariances(weighed), shifted)

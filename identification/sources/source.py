@@ -123,6 +123,11 @@ class Source(Protocol):
         ...
 
     @property
+    def bent(self) -> bool:
+        """Whether the derivatives by the shifts are computed again after each fit, since they change over it."""
+        ...
+
+    @property
     def steps(self) -> int:
         """Largest number of steps of a fit."""
         ...

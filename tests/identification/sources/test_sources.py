@@ -27,6 +27,7 @@ class Slide:
     channels: tuple[str, ...] = ("tau.joint1",)
     n_shifts: int = 1
     anew: bool = False
+    bent: bool = False
     steps: int = 4
     train: range = field(default_factory=lambda: range(2))
     held: range = field(default_factory=lambda: range(2, 3))
