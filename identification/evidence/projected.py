@@ -127,6 +127,19 @@ class ProjectedEvidence:
         item = self.evidence.items[other]
         return self.cross(one)[:, item.index] * item.spread
 
+    def curvatures(self, numbers: Sequence[int]) -> Array:
+        """C' S⁻¹ C of several items side by side, in units of their spreads.
+
+        Of many a set only the value is asked for, so that what the last has in common with every column, which is
+        dear, is not worked out.
+        """
+        blocks = [[self.own(x) if x == y else np.zeros((0, 0)) for y in numbers] for x in numbers]
+        for k, x in enumerate(numbers):
+            for later, y in enumerate(numbers[k + 1 :], k + 1):
+                blocks[k][later] = self.curvature(x, y)
+                blocks[later][k] = blocks[k][later].T
+        return np.block(blocks)
+
     def posterior(self, m: int) -> tuple[Array, Array]:
         """Mean (m,) and covariance (m, m) of the first m parameters beside, with no hypothesis."""
         half = solve_triangular(self._low, np.eye(len(self._low))[:, :m] * self._weight[:m], lower=True)

@@ -9,7 +9,7 @@ x (all processes and e, sample by sample) K = D + H Q⁻¹ H' with a banded prec
 12). By Woodbury's identity K⁻¹ and log det K then cost O(n), not O(n³).
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -151,18 +151,26 @@ class Covariance:
         What each sample has that those before it do not predict, in units of its deviation (a Kalman filter's
         innovations; Durbin and Koopman 2012, chapter 4). All columns go through one pass.
         """
-        if not self._width:
-            return x / np.sqrt(self._variance)[:, None]
-        steps = self._steps
-        d = steps.shape[1] - 1
-        found = np.empty_like(x, dtype=float)
-        now, then = np.zeros((2, d + 1, x.shape[1]))
-        for t, step in enumerate(steps):
-            now[d] = x[t]
-            np.matmul(step, now, out=then)
-            found[t] = then[d]
-            now, then = then, now
-        return found
+        return np.concatenate(list(self.white_by_rows([x])))
+
+    def white_by_rows(self, parts: Iterable[Array]) -> Iterator[Array]:
+        """`white` of columns that come some rows at a time (n_i, k): all of them at once may not fit in memory."""
+        deviation, row = np.sqrt(self._variance), 0
+        for x in parts:
+            rows = slice(row, row + len(x))
+            if not self._width:
+                yield x / deviation[rows, None]
+            else:
+                if not row:
+                    now, then = np.zeros((2, self._steps.shape[1], x.shape[1]))
+                found = np.empty_like(x, dtype=float)
+                for step, sample, innovation in zip(self._steps[rows], x, found, strict=True):
+                    now[-1] = sample
+                    np.matmul(step, now, out=then)
+                    innovation[:] = then[-1]
+                    now, then = then, now
+                yield found
+            row = rows.stop
 
     @cached_property
     def _steps(self) -> Array:
