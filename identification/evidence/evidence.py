@@ -129,7 +129,7 @@ class Evidence:
                     some = columns[at]
                     total += some @ some.transpose(0, 2, 1)
         else:  # few columns are divided sooner than made white
-            gram = always.T @ own.covariance.solve(always)
+            gram = own.covariance.gram(always)
         known = {x.tobytes(): own for at, total in each for x, own in zip(at, total, strict=True)}
         return Products(
             gram[1:, 1:], gram[1:, 0], own.covariance.log_det, float(gram[0, 0]), beside[1:], beside[0], known
@@ -201,6 +201,23 @@ class Evidence:
         other._made = {(i, 0): x for (i, k), x in self._made.items() if k == c}
         other._arrange()
         return other, own, always
+
+    def of_items(self, numbers: Sequence[int]) -> "Evidence":
+        """The evidence of some items by themselves, without the columns of the others."""
+        columns = np.unique(np.concatenate([self.items[x].index for x in numbers]))
+        other = copy(self)
+        other.items = tuple(
+            replace(self.items[x], index=np.searchsorted(columns, self.items[x].index)) for x in numbers
+        )
+        there = [x[columns] >= 0 for x in self.where]
+        at = [x[columns[own]] for x, own in zip(self.where, there, strict=True)]
+        other._pools = [[pool[:, x] for pool, x in zip(row, at, strict=True)] for row in self._pools]
+        other.numbers = [np.flatnonzero(own) for own in there]
+        other.n_columns = len(columns)
+        other.where = [_inverse(x, other.n_columns) for x in other.numbers]
+        other._made = {}
+        other._arrange()
+        return other
 
     def with_channel(self, c: int, alone: "Evidence") -> "Evidence":
         """This evidence with one channel's covariance and products taken from ``alone``."""

@@ -206,3 +206,16 @@ def test_a_set_is_worth_the_same_whichever_of_its_members_comes_last(case, monke
     with monkeypatch.context() as patch:
         patch.setattr(alone, "cross", lambda number: pytest.fail("the value of one member needs no other column"))
         assert Members(alone, [(1, 0.3)]).value == pytest.approx(Members(on, [(1, 0.3)]).value, rel=1e-12)
+
+
+def test_items_by_themselves_keep_their_evidence(case):
+    """The second reaches both channels, the third the last alone."""
+    _, evidence = case
+    chosen = [2, 1]
+    on = ProjectedEvidence(evidence, (0, 1), WEIGHT)
+    alone = ProjectedEvidence(evidence.of_items(chosen), (0, 1), WEIGHT)
+    assert alone.null == pytest.approx(on.null, rel=1e-12)
+    assert len(alone.score_all) == len({int(k) for x in chosen for k in evidence.items[x].index})
+    wanted, found = Members(on, [(2, 0.3), (1, 0.1)]), Members(alone, [(0, 0.3), (1, 0.1)])
+    assert found.value == pytest.approx(wanted.value, rel=1e-9)
+    np.testing.assert_allclose(found.amplitudes, wanted.amplitudes, rtol=1e-9)
