@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
 
-ROOM = 256
-"""Columns that a channel of a recording has room for at first."""
+ROOM = 2048
+"""Columns that a channel of a recording has room for at first: more than most have, as a copy leaves a hole behind."""
 
 
 @dataclass(frozen=True)
