@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from .models.model import Model
     from .report.provenance import Provenance
 
-JOBS = "processes in which captures are simulated (default: one a core, at most 4); other systems refuse it"
+JOBS = "processes in which captures are simulated (default: one for each core, at most 4); other systems refuse it"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -97,7 +97,7 @@ def _parser() -> argparse.ArgumentParser:
         "--holdout",
         action="append",
         metavar="RECORDING",
-        help="held-out recording, only evaluated; may be repeated",
+        help="held-out recording: the fit is evaluated on it; may be repeated",
     )
     p.add_argument("--json", metavar="OUT.json", help="where to write the result; - for standard output")
     p.add_argument("--save-model", metavar="NEW.toml", help="where to write the model with its values")
@@ -112,21 +112,21 @@ def _parser() -> argparse.ArgumentParser:
         required=True,
         action="append",
         metavar="RECORDING",
-        help="held out, for the proof; may be repeated",
+        help="held-out recording: it confirms names; may be repeated",
     )
     p.add_argument("--json", metavar="OUT.json", help="where to write the result; - for standard output")
     p.add_argument("--report", metavar="OUT.html", help="where to write the report, one self-contained page")
-    p.add_argument("--save-model", metavar="NEW.toml", help="where to write the model with what was found")
+    p.add_argument("--save-model", metavar="NEW.toml", help="where to write the improved model")
     p.add_argument(
         "--next-experiment",
         metavar="MOTION",
-        help="where to write the motion that best parts the rivals left (system = 'arm')",
+        help="where to write the motion that best separates the remaining rivals (system = 'arm')",
     )
     p.add_argument("--jobs", type=positive, metavar="N", help=JOBS)
-    p.add_argument("--anyway", action="store_true", help="name physics even where recordings and model contradict")
+    p.add_argument("--anyway", action="store_true", help="name physics even if recordings contradict the model")
     p.set_defaults(run=_diagnose)
 
-    p = commands.add_parser("simulate", help="what a model would read along a recorded motion")
+    p = commands.add_parser("simulate", help="simulate a model along a recorded motion")
     p.add_argument("model", metavar="MODEL.toml")
     p.add_argument("--motion", metavar="RECORDING", help="recording whose motion is followed; a capture needs none")
     p.add_argument("--out", required=True, metavar="RECORDING", help="where to write it (.csv or .parquet)")
@@ -138,12 +138,12 @@ def _parser() -> argparse.ArgumentParser:
     add_tolerance(commands)
     for command in commands.choices.values():
         command.add_argument(
-            "-v", "--verbose", action="count", default=0, help="log what is under way to standard error; -vv: all of it"
+            "-v", "--verbose", action="count", default=0, help="log steps to standard error; -vv: in detail"
         )
         command.add_argument(
             "-q", "--quiet", action="store_true", help="no progress; check, identify and diagnose: no summary"
         )
-    p = commands.add_parser("completion", help="print what makes a shell complete these commands")
+    p = commands.add_parser("completion", help="print the script with which a shell completes these commands")
     p.add_argument("shell", choices=("bash", "zsh", "tcsh"))
     p.set_defaults(run=lambda given: _complete(parser, given.shell), verbose=0)
     return parser

@@ -15,13 +15,13 @@ def add_parser(commands: Any) -> None:
     p = commands.add_parser("cosim", help="run a system of FMUs and other participants together")
     p.add_argument("system", metavar="SYSTEM.ssp|SYSTEM.toml")
     p.add_argument("--out", required=True, metavar="RECORDING", help="where to write the outputs (.csv or .parquet)")
-    p.add_argument("--until", type=float, metavar="SECONDS", help="end here, not where the system file says")
+    p.add_argument("--until", type=float, metavar="SECONDS", help="end of the run, in place of the system file's")
     p.add_argument("--step", type=float, metavar="SECONDS", help="macro step, in place of the system file's")
     p.add_argument("--timeout", type=float, default=60.0, metavar="SECONDS", help="longest wait for one step (60)")
     p.add_argument(
         "--same-process",
         action="store_true",
-        help="run participants in this process: faster, but one that hangs or crashes takes the run's data with it",
+        help="run participants in this process: faster, but if one hangs or crashes, the run's data are lost",
     )
     p.set_defaults(run=run)
 

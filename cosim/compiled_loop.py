@@ -133,7 +133,7 @@ def _rows(weights: Sequence[tuple[float, ...]]) -> np.ndarray:
 
 
 def compiled_loop(system: System, sweep: Sweep, size: float) -> CompiledLoop | None:
-    """The loop, or None where not all are FMUs that it can drive; also, with a notice, where there is no compiler."""
+    """The loop; None if a participant is no FMU that it can drive, or (with a notice) if there is no compiler."""
     calls = [participant.compiled_calls() for participant in system.participants.values()]
     plan = sweep.plan(size)
     if plan is None or any(c is None for c in calls):

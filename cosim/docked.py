@@ -1,4 +1,4 @@
-"""A whole run read: frames, forces, and whether it latched as an engineer means it."""
+"""A run of the whole end effector: frames, forces, and whether it latched by the limits that count."""
 
 from dataclasses import dataclass
 
@@ -84,7 +84,7 @@ def docked_of(whole: WholeRun) -> DockingRun:
 
 
 def residual(d: DockingRun) -> tuple[float, float]:
-    """How far target and end effector are from seated at the end: radial [m], and the angle between them [rad]."""
+    """Remaining misalignment of target and end effector at the end: radial [m], and the angle between them [rad]."""
     seat, pin = d.seat[-1], d.capture.pin[-1]
     relative = seat[3:].T @ (pin[0] - seat[0])
     turn = Rotation.from_matrix(seat[3:].T @ pin[3:]).magnitude()
@@ -97,7 +97,9 @@ def ball_shares(d: DockingRun, p: DockingParameters, preload: float) -> Array:
 
 
 def is_latched(d: DockingRun, p: DockingParameters) -> tuple[bool, str]:
-    """Whether it latched as an engineer means it, and if not, why: the state that it ended in, or the bar missed."""
+    """Whether it latched within all limits; if not, the reason: the state in which it ended, or the limit that it
+    missed.
+    """
     if d.whole.fault:
         return False, f"{d.whole.final}: not computed to the end"
     if d.whole.final != "LATCHED":
@@ -147,7 +149,7 @@ def mean_wrist(d: DockingRun, window: float = 0.01) -> tuple[Array, Array]:
 
 
 def momentum_drift(d: DockingRun) -> float:
-    """Largest change of the linear momentum of all together over the largest impulse on the carriage."""
+    """Largest change of the total linear momentum over the largest impulse on the carriage."""
     table = d.whole.run.recording
     total = sum(
         columns(table, f"{who}.linear") for who in ("effector.momentum", "effector.momentum.target", "snare.momentum")
@@ -157,7 +159,7 @@ def momentum_drift(d: DockingRun) -> float:
 
 
 def energies(d: DockingRun) -> dict[str, Array]:
-    """Energies (n,) since the start [J]: what both motors have put in, and where it is; ``residual`` is the rest."""
+    """Energies (n,) since the start [J]: the work of both motors and its parts; ``residual`` is the difference."""
     table = d.whole.run.recording
 
     def own(name: str) -> Array:

@@ -1,4 +1,4 @@
-"""Energy that the coupling makes or loses: what two participants say of one exchange, compared.
+"""Energy that the coupling makes or loses: the powers of two participants over one bond, compared.
 
 Over a bond, one participant gives an effort e and reads a flow; the other gives the flow f and reads the effort. As
 held inputs ẽ and f̃ differ from the outputs e and f, the two disagree about the power that crossed,

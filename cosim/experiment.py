@@ -1,4 +1,4 @@
-"""A system together with how it is to be run: what a system file says."""
+"""A system and its run: the content of a system file."""
 
 from dataclasses import dataclass
 

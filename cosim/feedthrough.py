@@ -1,4 +1,4 @@
-"""Outputs that follow inputs at once: who must be asked in which order, and loops that close on themselves.
+"""Direct feedthrough: the order in which participants are evaluated, and algebraic loops.
 
 After a step, an output with direct feed-through is only right when the inputs that it depends on are. The order
 follows from the graph of outputs; outputs that depend on each other in a circle form an algebraic loop, which is
@@ -84,7 +84,7 @@ class FeedThrough:
                 self.ask(visit, outputs)
 
     def ask(self, participant: int, outputs: np.ndarray) -> None:
-        """Give one participant its inputs as the outputs say they are now, and take its outputs."""
+        """Set one participant's inputs from the present outputs, and take its outputs."""
         source, factor, offset, shown = self._reading[participant]
         try:
             self._participants[participant].set_inputs(factor * outputs[source] + offset)

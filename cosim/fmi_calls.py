@@ -1,4 +1,4 @@
-"""FMI 2.0 and 3.0 behind one face, with every argument made once: what a call costs is then little more than the call.
+"""FMI 2.0 and 3.0 behind one interface. Every argument is made once, so that a call costs little more than itself.
 
 FMPy loads the library and starts the instance. The calls of the loop go to the library's functions directly, with
 argument objects that are kept and only filled anew.
@@ -70,7 +70,7 @@ class CompiledCalls:
 
 
 class Instance:
-    """A co-simulation instance, up to where stepping begins.
+    """A co-simulation instance.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ class Instance:
         self.check("SetFMUstate", self._set_state(self.component, pointer))
 
     def free_state(self, pointer: ctypes.c_void_p) -> None:
-        """Give a state's memory back."""
+        """Free a state's memory."""
         if not self.dead:
             self._free_state(self.component, ctypes.byref(pointer))
 
@@ -172,7 +172,7 @@ class Instance:
         )
 
     def function(self, name: str) -> Any:
-        """A function of the library with an object of its own: arguments go in as they are."""
+        """A function of the library as its own object, without argument types: arguments are passed unchanged."""
         pointer = self._fmu.dll[f"fmi{self.major}{name}"]
         pointer.restype = ctypes.c_int
         return pointer
@@ -183,7 +183,7 @@ class Instance:
             self.failed(name, status, "")
 
     def failed(self, name: str, status: int, when: str) -> None:
-        """Raise StepError with what the FMU said last."""
+        """Raise StepError with the FMU's last message."""
         if status < 0:
             raise StepError(f"{self.name}: the FMU asks to end the simulation{when}")
         label = _STATUS[status] if status < len(_STATUS) else str(status)
@@ -216,7 +216,7 @@ class Instance:
         self._fmu.instantiate(callbacks=callbacks)
 
     def hear(self, status: int, message: bytes) -> None:
-        """Keep what the FMU says of a call that was not right."""
+        """Keep the FMU's message on a call that failed."""
         if status > 0 and message:
             self.messages.append(" ".join(message.decode(errors="replace").split()))
 
@@ -253,7 +253,7 @@ fmi2.addLoggerProxy(ctypes.byref(_LOGGER))
 
 
 class Vector:
-    """Variables of one type, and the memory through which they are set or got."""
+    """Variables of one type, with the memory for setting and getting them."""
 
     def __init__(self, instance: Instance, action: str, type_: str, slots: Sequence[FmiVariable]) -> None:
         """Make every argument."""

@@ -1,4 +1,4 @@
-"""An FMU's variables as the participant's: names, causality, units that pint reads, direct feed-through."""
+"""An FMU's variables as a participant's: names, causality, units in pint's spelling, direct feedthrough."""
 
 import math
 import re
@@ -29,7 +29,7 @@ class FmiVariable:
 
 @dataclass(frozen=True)
 class Interface:
-    """All scalars in the order of the model description, and where each is found in the FMU.
+    """All scalars in the order of the model description, and the position of each in the FMU.
 
     ``unread`` are the inputs that hold no number, by name, with their type: nothing can be connected to them, and they
     keep the start values that the FMU gives them.

@@ -25,7 +25,7 @@ PROGRAM = Path(__file__).parent / "programs" / "ground.toml"
 
 
 def stand() -> FloatingArm:
-    """What carries the end effector: its tip is the world's origin."""
+    """The stand of the end effector: its tip is the world's origin."""
     phi = from_central(STAND, np.zeros(3), STAND * np.eye(3))
     joint = Joint("stand", "revolute", np.array([1.0, 0, 0]), -1, np.eye(3), np.zeros(3), speed=1.0)
     return FloatingArm(Tree("stand", (joint,), (Link("stand", phi),), np.zeros(3)), phi, 0)
@@ -37,7 +37,7 @@ def ground(
     speed: float = 0.0,
     mass: float = 25.0,
 ) -> Setting:
-    """Where everything stands at the start.
+    """Positions of all bodies at the start.
 
     Parameters
     ----------

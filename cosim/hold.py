@@ -1,4 +1,4 @@
-"""What a participant's input is during a macro step: a polynomial through the newest values at communication points.
+"""A participant's input during a macro step: a polynomial through the newest values at communication points.
 
 The values are known up to the start of the step (extrapolation), or at its end too (interpolation: an earlier
 participant of a sequential sweep has been there already, or an iteration assumes where it will be). One rule gives
@@ -65,7 +65,7 @@ def hold_named(name: str) -> Hold:
 
 @functools.lru_cache(maxsize=1024)  # equal steps ask for the same weights again and again
 def weights(hold: Hold, nodes: tuple[float, ...], size: float, order: int) -> tuple[tuple[float, ...], ...]:
-    """Weights of the known values in what a participant is given.
+    """Weights of the known values in a participant's input.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How a participant is started: in a process of its own, or in this one."""
+"""Where a participant runs: in its own process, or in this one."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Interface quasi-Newton iteration: solve y = S(y) where each evaluation of S is dear.
+"""Interface quasi-Newton iteration: solve y = S(y) where each evaluation of S is expensive.
 
 For an implicit macro step, y is what the outputs are assumed to be at the end of the step and S(y) what they turn out
 to be; every evaluation puts the participants back to the start of the step. From the pairs seen so far, differences of
@@ -23,7 +23,7 @@ _CUTOFF = 1e-9  # directions of smaller relative size are noise
 
 @dataclass(frozen=True)
 class Iteration:
-    """When an implicit step is solved, and when it is given up.
+    """Tolerance and limit of an implicit step's iteration.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A run on disk while it goes: what was reported is there, whatever becomes of the process.
+"""A run on disk while it runs: reported rows are there, whatever happens to the process.
 
 Rows go into ``unfinished-NAME.csv`` beside the recording that the run is to become, which itself appears whole or not
 at all. After a kill that file holds every row up to the last report, and can be read as any recording. Rows are added
@@ -28,7 +28,7 @@ except ImportError:  # Windows: two runs of one name are then not kept apart
 
 
 def unfinished(path: str | Path) -> Path:
-    """Where the rows of a run lie that is to become ``path``."""
+    """The file with the rows of a run whose recording will be ``path``."""
     path = Path(path)
     return path.with_name(f"unfinished-{path.name}{'' if path.suffix.lower() == '.csv' else '.csv'}")
 
@@ -62,7 +62,7 @@ class Journal:
         self._add(line.getvalue())
 
     def report(self, say: Callable[[float], None]) -> Callable[[float], None]:
-        """A `Master.run` progress: now and then writes the rows, then says the time that they reach [s]."""
+        """A progress for `Master.run`: once a second it writes the rows, then reports the time that they reach [s]."""
 
         def told(now: float) -> None:
             if time.monotonic() - self._last >= self._often:
@@ -73,13 +73,13 @@ class Journal:
         return told
 
     def write(self) -> None:
-        """Put all rows there are on the disk."""
+        """Write all rows so far to disk."""
         rows = self._record.rows(self._count)
         self._add("".join(map(_line, rows.tolist())))
         self._count += len(rows)
 
     def finish(self) -> None:
-        """Make the recording of what there is, whole, and remove the unfinished one."""
+        """Write the recording of all rows, whole, and remove the unfinished file."""
         if self.path.suffix.lower() == ".csv":
             self.write()
             try:
@@ -92,7 +92,7 @@ class Journal:
             self.discard()
 
     def discard(self) -> None:
-        """Leave nothing."""
+        """Remove the unfinished file."""
         self._file.close()
         self.rows.unlink(missing_ok=True)
 

@@ -1,4 +1,4 @@
-"""One macro step, tried until it is good enough: by iteration, by smaller steps, or as it comes.
+"""One macro step: explicit, iterated, or repeated with smaller sizes until its error is accepted.
 
 Explicit, it is one sweep over all participants. Iterated, participants go back to the start of the step until the
 outputs that were assumed at its end are those that come out. Under step control they go back where the step was too
@@ -26,7 +26,7 @@ from .system import System
 
 
 class AcceptedStep(NamedTuple):
-    """A step that is good enough.
+    """An accepted step.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class AcceptedStep(NamedTuple):
 
 
 class MacroStep:
-    """Takes macro steps, and remembers of the last ones what the hold reads.
+    """Takes macro steps, and keeps the last values that the hold reads.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ class MacroStep:
         self._largest = np.abs(outputs)
 
     def take(self, time: float, size: float, usual: float | None = None) -> AcceptedStep:
-        """One macro step from a time [s], of at most this size [s], which is good enough.
+        """One accepted macro step from a time [s], of at most this size [s].
 
         ``usual`` is the size [s] that this one was cut from, if it was: the next step is at least that.
         Raises StepError. Where steps are repeated participants are then back at the start.
@@ -123,7 +123,7 @@ class MacroStep:
             size, usual = wanted, None
 
     def remember(self, taken: AcceptedStep) -> None:
-        """The step is the last one from now on."""
+        """Keep this step as the last one."""
         self.past.insert(0, taken.outputs)
         self.sizes.insert(0, taken.size)
         del self.past[self._hold.degree + 1 :], self.sizes[self._hold.degree :]

@@ -1,7 +1,7 @@
-"""The co-simulation master: one macro step after another to a time, and the record of them.
+"""The co-simulation master: macro steps up to a time, and their record.
 
-``jacobi`` steps all participants side by side on what was known at the start of the macro step. ``gauss_seidel`` steps
-them one after another, each on what the earlier ones have just found (`snarelab.cosim.sweep`). Either is explicit, or
+``jacobi`` steps all participants at once, on the outputs at the start of the macro step. ``gauss_seidel`` steps them
+one after another, each on the newest outputs of the earlier ones (`snarelab.cosim.sweep`). Either is explicit, or
 is iterated, or is repeated smaller (`snarelab.cosim.macro_step`).
 """
 
@@ -45,7 +45,7 @@ class Master:
     hold : "midpoint", "constant", "linear" or "quadratic"
         What an input is during the step, see `snarelab.cosim.hold`.
     iterate : bool or Iteration
-        Repeat each step until the outputs assumed at its end come out.
+        Repeat each step until the outputs at its end are those that were assumed.
     control : StepControl, optional
         Choose the macro step by its error.
     solve_loops : bool
@@ -142,7 +142,7 @@ class Master:
                 progress(self.time)
 
     def result(self) -> Run:
-        """What there is so far."""
+        """The run so far."""
         return Run(
             self.record.dataset(),
             self.steps,
@@ -156,7 +156,7 @@ class Master:
 
     @property
     def rejected(self) -> int:
-        """Steps that were repeated smaller."""
+        """Number of steps that were repeated with a smaller size."""
         return self._step.rejected
 
     @property

@@ -1,4 +1,4 @@
-"""A snare on a passive arm of a 40 t base, co-simulated: catching a pin on that base, or a target that floats.
+"""A snare on a passive arm of a 40 t base, co-simulated: it captures a pin on that base, or a floating target.
 
 Li et al. (soft capture by the end effector of a space manipulator, 3-D ANCF cables), last section: case 1, inspection,
 catches a pin on the arm's own base; case 2, hover, a target of 10 t that floats by itself. From the moment of arrival
@@ -48,7 +48,7 @@ ALONG_TIP = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
 
 @dataclass(frozen=True)
 class JointResistance:
-    """What resists in each joint while the motors are off.
+    """Resistance of each joint while the motors are off.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ class JointResistance:
 
 @dataclass(frozen=True)
 class Setting:
-    """Where everything stands on arrival.
+    """Positions of all bodies on arrival.
 
     Parameters
     ----------
@@ -126,14 +126,14 @@ def arrival(case: CaseName, foot: ArrayLike, turn: Rotation, speed: float = 0.0)
 
 
 def resistance(level: float, stiffness: float = 0.0) -> JointResistance:
-    """Joints whose whole friction is as many times the usual one as ``level`` [N·m] is the usual Coulomb level."""
+    """Joints whose whole friction curve is scaled to the Coulomb level ``level`` [N·m]."""
     factor = level / FRICTION["coulomb_level"]
     scaled = ("coulomb_level", "stribeck_level", "viscous_coefficient")
     return JointResistance({k: v * factor if k in scaled else v for k, v in FRICTION.items()}, stiffness)
 
 
 def step_control(start: Setting, tolerance: float = 3e-3, largest: float = 4e-3) -> StepControl:
-    """What the error-controlled master is told: sizes of what counts here, and the longest step [s].
+    """Step control of this capture: magnitudes of its outputs, and the longest step [s].
 
     10 mm and 10 mm/s of motion, 20 mrad and 20 mrad/s, and the impulse of 10 N over 2 ms.
     """
@@ -211,7 +211,7 @@ def co_simulate(
 
 @dataclass(frozen=True)
 class OrbitCapture:
-    """What a capture shows, at n times, in the world frame unless said otherwise.
+    """Signals of a capture at n times, in the world frame unless stated otherwise.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""What takes part in a co-simulation, in FMI's words: variables, initialise, set, step, get, save, restore.
+"""A participant of a co-simulation, in FMI's terms: variables, initialise, set, step, get, save, restore.
 
-A participant is one file in ``cosim/participants`` with a subclass of `Participant`. Inputs and outputs cross as one
-vector each, in the order of `Participant.variables`, so that the master's loop is a few array copies; parameters are
-given once, by name, at initialisation.
+A participant is one file in ``cosim/participants`` with a subclass of `Participant`. Inputs are one vector and
+outputs another, in the order of `Participant.variables`, so that the master's loop is a few array copies. Parameters
+are given once, by name, at initialisation.
 """
 
 import math
@@ -21,12 +21,12 @@ Causality = Literal["input", "output", "parameter"]
 
 @dataclass(frozen=True)
 class Variable:
-    """One scalar that a participant shows.
+    """One scalar variable of a participant.
 
     Parameters
     ----------
     name : str
-        Unique in the participant; recordings' column names where one fits (``q.joint1``, ``pos.pin.x``).
+        Unique in the participant; a recording's column name where one fits (``q.joint1``, ``pos.pin.x``).
     causality : "input", "output" or "parameter"
     unit : str
         pint's spelling (``N*m``, ``rad/s``); ``1`` for a plain number, empty where it is not stated.
@@ -37,11 +37,11 @@ class Variable:
     minimum, maximum : float
         Bounds [unit].
     depends : tuple of str or None
-        For an output: the inputs that change it at once, without a step (direct feed-through). Empty: none.
+        For an output: the inputs that change it without a step (direct feedthrough). Empty: none.
         None: unknown; the master then moves each input at the start and looks.
     discrete : bool
-        For an output: it holds its value between sudden changes, as a command does. Whatever reads it is given the
-        value at the start of each step, never a line or parabola through changes.
+        For an output: it is constant between jumps, as a command is. An input that reads it gets the value at the
+        start of each step, never a line or parabola through the jumps.
     """
 
     name: str
@@ -60,11 +60,11 @@ class Participant(ABC):
 
     Life: construct, `initialize` once, then `set_inputs`, `step`, `outputs` again and again, then `close`.
     ``state = save()`` and ``restore(state)`` give exactly the same future, bit for bit, also in another instance of the
-    same participant; `can_restore` says whether they exist. A step that fails raises `StepError` and leaves the
-    participant so that `restore` still works. `input_order` is how many derivatives of the inputs a step follows,
-    `can_halve` whether it takes other inputs for the second half of a step, `can_vary_step` whether steps may differ
-    in size, `start_limit` how long `initialize` may take at least [s] however little a step is given, and `unread`
-    which inputs hold no number, with their type: they keep their start values.
+    same participant; `can_restore` says whether the two methods exist. A step that fails raises `StepError` and leaves
+    the participant so that `restore` still works. `input_order` is how many derivatives of the inputs a step follows,
+    `can_halve` whether it takes other inputs for the second half of a step, `can_vary_step` whether steps may differ in
+    size. `start_limit` is the time [s] that `initialize` has at least, however short a step's timeout is. `unread` has
+    the inputs that are no numbers, with their type: they keep their start values.
     """
 
     name: str
@@ -112,7 +112,7 @@ class Participant(ABC):
         """Every output now, shape (n_outputs,), in the order of ``variables``."""
 
     def save(self) -> Any:
-        """Everything that decides the future; to be treated as opaque."""
+        """The complete state; to be treated as opaque."""
         raise NotImplementedError(f"{self.name}: cannot save its state")  # optional: asked only if `can_restore`
 
     def restore(self, state: Any) -> None:
@@ -120,19 +120,19 @@ class Participant(ABC):
         raise NotImplementedError(f"{self.name}: cannot restore a state")  # optional: asked only if `can_restore`
 
     def next_event(self, time: float) -> float:
-        """When it next does something sudden after a time [s]; no macro step goes past it. Infinity: never."""
+        """Time [s] of the next jump after a time [s]; no macro step goes past it. Infinity: none."""
         return math.inf
 
     def events(self) -> tuple[str, ...]:
-        """What it did during the last step that belongs in the log, a line each; asked once after each good step."""
+        """Events of the last step for the log, a line each; called once after each accepted step."""
         return ()
 
     def compiled_calls(self) -> Any:
-        """What `snarelab.cosim.compiled_loop` needs to drive it from C; None where only Python can."""
+        """What `snarelab.cosim.compiled_loop` needs to call the participant from C; None if only Python can call it."""
         return None
 
     def close(self) -> None:  # noqa: B027  most participants hold nothing to give back
-        """Give back processes, files and memory; no call follows."""
+        """Release processes, files and memory; no call follows."""
 
     def start_parameters(self, given: Mapping[str, float] | None) -> dict[str, float]:
         """Every parameter's start value, or the one given; InputError for one that it does not have."""

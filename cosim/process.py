@@ -1,4 +1,4 @@
-"""A participant in a process of its own: it runs beside the others, and when it hangs or dies only the run ends.
+"""A participant in its own process: it runs beside the others, and if it hangs or dies, only the run ends.
 
 One message a step goes each way. What needs no answer (saving, restoring, forgetting a state) travels with the next
 step, and saved states stay in the process, so that a repeated step costs no further messages. A warden stands between

@@ -1,4 +1,4 @@
-"""What a co-simulation leaves behind: outputs at every communication point, as a recording."""
+"""The recording of a co-simulation: outputs at every communication point."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ from .units import conversion
 
 @dataclass(frozen=True)
 class Event:
-    """Something worth a line in the log: a step rejected, accepted in spite of its error, or not started well."""
+    """An event for the log: a step that was rejected, accepted in spite of its error, or started badly."""
 
     time: float
     size: float
@@ -28,7 +28,7 @@ class Event:
 
 @dataclass(frozen=True)
 class Run:
-    """What a run was.
+    """A finished run.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class Run:
 
 
 class Record:
-    """Rows of time and all outputs, growing.
+    """The growing rows of time and all outputs.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How a file becomes a system that can be run.
+"""Reading a system file, of either kind.
 
 Each reader makes an `experiment.Setup` of a file, and starts its participants through a `hosting.Hosting`; neither of
 those knows of files.
@@ -18,7 +18,7 @@ _READERS = {".ssp": read_ssp, ".toml": read_toml}
 
 
 def load_setup(path: str | Path, hosting: Hosting | None = None) -> Setup:
-    """Read a system file, ``.ssp`` or ``.toml``; raises InputError for another kind, and for what is wrong in it."""
+    """Read a system file, ``.ssp`` or ``.toml``; raises InputError for another kind, and for a mistake in it."""
     path = Path(path)
     if path.suffix.lower() not in _READERS:
         raise InputError(f"{path}: a system file is .ssp or .toml, not {path.suffix!r}; give one of these")

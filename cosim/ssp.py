@@ -54,7 +54,7 @@ class _Flat:
 
 
 def read_ssp(path: Path, hosting: Hosting) -> Setup:
-    """Read a system and build its participants; raises InputError with the file's name for whatever is wrong in it."""
+    """Read a system and build its participants; raises InputError with the file's name for a mistake in it."""
     folder = Path(scratch_folder("ssp-"))
     built: dict[str, Participant] = {}
     try:

@@ -1,4 +1,4 @@
-"""A control program as a table of states, read from TOML: what each commands, and when it is left for which other."""
+"""A control program as a table of states, read from TOML: each state's commands and transitions."""
 
 import re
 import tomllib
@@ -24,20 +24,20 @@ _COMPARE = {"<": lt, ">": gt, "<=": le, ">=": ge, "=": eq}
 
 @dataclass(frozen=True)
 class Condition:
-    """A sensor against a number."""
+    """A comparison of a sensor with a number."""
 
     sensor: str
     relation: str
     value: float
 
     def holds(self, sensors: Mapping[str, float]) -> bool:
-        """Whether it does."""
+        """Whether the condition holds."""
         return _COMPARE[self.relation](sensors[self.sensor], self.value)
 
 
 @dataclass(frozen=True)
 class Transition:
-    """Where to go when all conditions have held for ``during`` [s]; taken ``at_most`` so often."""
+    """The next state when all conditions have held for ``during`` [s]; taken ``at_most`` this often."""
 
     when: tuple[Condition, ...]
     to: str

@@ -1,4 +1,4 @@
-"""The macro step chosen so that no participant was given an input that was off by more than a tolerance.
+"""Step control: the macro step is chosen so that no participant's input is off by more than a tolerance.
 
 At the end of a step it is known where each connected output has got to. The distance from where the hold's polynomial
 had put it is the error of the inputs, of order H to the degree + 1. It is measured against a tolerance times the
@@ -24,7 +24,7 @@ _SAFETY, _SLOWER, _FASTER = 0.9, 0.2, 2.0
 
 @dataclass(frozen=True)
 class StepControl:
-    """How exact a step is to be, and how large it may get.
+    """Tolerance and bounds of the macro step.
 
     Parameters
     ----------

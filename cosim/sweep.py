@@ -1,4 +1,4 @@
-"""One pass over all participants: each is given its inputs for the macro step and takes it."""
+"""One pass over all participants: each gets its inputs for the macro step and takes the step."""
 
 from dataclasses import dataclass
 
@@ -121,7 +121,7 @@ class Sweep:
         return outputs
 
     def plan(self, size: float) -> SweepPlan | None:
-        """What a compiled loop needs; None where it could not do the same."""
+        """The data of a compiled loop; None where such a loop would give other results."""
         if any(order > 0 for order in self._orders) or self._feed.loops or any(len(jumps) for jumps in self._jumps):
             return None
         back, ahead = (tuple(start - k for k in range(self._hold.degree + 1)) for start in (0.0, 1.0))
@@ -134,7 +134,7 @@ class Sweep:
         return SweepPlan(visits, tuple(self._follow), halves, before, end_weights(back), after, self._sequential)
 
     def failure(self, i: int, time: float, error: Exception) -> StepError:
-        """What participant ``i`` did not manage in the step from a time [s]."""
+        """The failure of participant ``i`` in the step from a time [s]."""
         return self._feed.failure(i, error, f"the step from {time:.9g} s")
 
     def check(self, time: float, outputs: np.ndarray) -> None:

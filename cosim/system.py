@@ -1,4 +1,4 @@
-"""Participants and what connects them, checked before anything runs."""
+"""Participants and their connections, checked before the first step."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -63,25 +63,25 @@ class Layout:
 
 
 class System:
-    """Participants under the names they have here, and the connections between them.
+    """Participants by name, and the connections between them.
 
     Parameters
     ----------
     participants : mapping of str to Participant
-        Names without dots. The order is the one in which a sequential master steps them.
+        Names without dots. Their order is the order in which a sequential master steps them.
     connections : sequence of Connection or pairs of str
         ``("left.force", "right.force")``: from an output to an input.
     parameters : mapping of str to float
         Values of parameters, and of inputs that nothing is connected to, as ``participant.variable`` [its unit].
     bonds : sequence of PowerBond
-        Whose energy residual is watched.
+        The bonds whose energy residual is recorded.
     name : str
 
     Raises
     ------
     InputError
         With every problem found: unknown names (and the nearest known), inputs unconnected or connected twice, units
-        that do not fit, values out of bounds.
+        of different dimensions, values out of bounds.
     """
 
     def __init__(

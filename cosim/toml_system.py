@@ -44,7 +44,7 @@ _PARTICIPANT = ("fmu", "python", "options", "parameters", "own_process", "timeou
 
 
 def read_toml(path: Path, hosting: Hosting) -> Setup:
-    """Read a system and build its participants; raises InputError with the file's name for whatever is wrong in it."""
+    """Read a system and build its participants; raises InputError with the file's name for a mistake in it."""
     content = toml_table(path)
     built: dict[str, Participant] = {}
     try:

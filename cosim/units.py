@@ -1,4 +1,4 @@
-"""Units at a connection: what must be multiplied and added so that the receiver reads its own unit."""
+"""Units at a connection: the factor and offset with which the receiver reads its own unit."""
 
 from typing import Any
 

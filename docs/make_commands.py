@@ -7,9 +7,9 @@ from snarelab.cli import _parser
 HEAD = """\
 # Commands
 
-This page is written from the program by `python docs/make_pages.py`; `snarelab COMMAND --help` says the same.
+`python docs/make_pages.py` writes this page from the program: it has the text of `snarelab COMMAND --help`.
 
-Progress is shown on a terminal only. In a pipe the commands are quiet. The same calls from Python: [Python](python.md).
+Progress is shown on a terminal only; in a pipe the commands are quiet. The commands are also [Python](python.md) calls.
 
 """
 
@@ -19,19 +19,19 @@ Fits every parameter of the model to all recordings jointly, and prints the para
 and the misfit of every channel: [results](results.md#identification-json).""",
     "diagnose": """\
 Finds, names and adds the physics that the model leaves out, and confirms it on the held-out recording, which may not be
-one of the others. It prints the verdict and the table of steps: [results](results.md#diagnosis-json). How to start with
-a robot of your own: [guide](own-robot.md).""",
+one of the training recordings. It prints the verdict and the table of steps: [results](results.md#diagnosis-json). How
+to start with a robot of your own: [guide](own-robot.md).""",
     "simulate": """\
-Writes what the model gives: along the motion of a recording the torque of every joint, on a floating base the base's
-own motion too; of a capture the target's motion, the forces and the ring's angle. The model file must hold the values
-of all parameters: use one that `identify` or `diagnose` saved.""",
+Writes the model's prediction. For an arm it is the torque of every joint along the motion of a recording, on a floating
+base the base's own motion too. For a capture it is the target's motion, the forces and the ring's angle. The model file
+must have the values of all parameters: use a file that `identify` or `diagnose` saved.""",
     "export": "Writes an FMU for co-simulation: [FMUs](fmu.md).",
     "cosim": """\
 Runs a system of FMUs and other participants: [co-simulation](cosimulation.md). A run that fails (status 2) or is
 interrupted (130) keeps its recording up to the last good step.""",
     "tolerance": """\
-Finds over which misalignments a capture succeeds: [tolerances](tolerance.md). An interrupted or killed run keeps every
-finished case; the same command goes on.""",
+Finds the misalignments with which a capture succeeds: [tolerances](tolerance.md). An interrupted or killed run keeps
+every finished case; the same command resumes it.""",
 }
 """What a command does beyond the line that its help gives."""
 
@@ -46,8 +46,7 @@ TAIL = """\
 | 130 | Interrupted: Ctrl-C, or SIGTERM. |
 
 For unusable input, one line on standard error names the file, the column or row, what is wrong, and the mend. Whatever
-the status, a file that is there is whole. `cosim` keeps its recording up to the last good step; run again, it begins
-anew. `tolerance` keeps every finished case; run again, it goes on.
+the status, an output file that exists is whole. A second run of `cosim` starts again from the beginning.
 """
 
 

@@ -17,32 +17,33 @@ results and in reports. This page is written from the code by `python docs/make_
   channel, such as `tau.joint1`.
 - A joint effect gives the torque that the drive must supply on top of the rigid body's. A link effect changes the
   link's ten inertial parameters `phi`. A sensor effect turns the true value into what the channel reads.
-- On a suspension rig (`system = "zero_g_rig"`): a *sling* is named in the model file, and its effect is a force and
-  moment on the arm at the hang point, z up. A *slide* goes by the name of the joint that moves it, and its effect is a
-  friction force at the contacts. A *boom* is a link with slings beyond it, by the link's name. The rig's geometry takes
-  each to the torque of every joint that it can turn.
-- On a free-floating arm (`system = "free_floating_arm"`): an effect at the *base* is a force and moment on it, in its
-  own axes, about the origin of its frame.
-- In a capture (`system = "snare_capture"`): what the cables meet acts at the *pin*, what they are made of at the
-  *cables*, what holds the target back at the *target*. All are simulated with the snare itself.
-- In a docking test (`system = "docking"`): at the *carriage*, at all *grooves*, at one *groove* (`groove1` to
-  `groove3`) or at the *latches*. All are simulated with the docking itself; a grid is where an amplitude is tried.
+- On a suspension rig (`system = "zero_g_rig"`) there are three more places. A *sling* has the name that the model file
+  gives it; its effect is a force and moment on the arm at the hang point, z up. A *slide* has the name of the joint
+  that moves it; its effect is a friction force at the contacts. A *boom* is a link with slings beyond it, and has the
+  link's name. The rig's geometry gives the torque of each effect at every joint that it can turn.
+- On a free-floating arm (`system = "free_floating_arm"`) an effect at the *base* is a force and moment on the base, in
+  the base's axes, about the origin of its frame.
+- In a capture (`system = "snare_capture"`) effects of the contact act at the *pin*, effects of the cables themselves at
+  the *cables*, and effects that hold the target back at the *target*. All are simulated with the snare.
+- In a docking test (`system = "docking"`) effects act at the *carriage*, at all *grooves*, at one *groove* (`groove1`
+  to `groove3`) or at the *latches*. All are simulated with the docking. There the values at which an amplitude is tried
+  are its grid.
 - Units are those of a rotary joint. For a sliding joint read N for N·m, and m for rad. U is the channel's own unit.
 - `q`, `qd` and `qdd` are the joint's position, speed and acceleration. `load` is the rigid-body torque at the joint,
   from the model. `sgn` is the direction of motion, smoothed over 0.1 % of the joint's peak speed.
 - *Shape* marks a parameter in which the law is nonlinear. Its starting values come from a grid.
-- An effect *contains* those that are special cases of it. They are named first, and it only for what is then left.
+- An effect *contains* its special cases. They are named first; the containing effect is named only for what they leave.
 
-How to add one: [adding-an-effect.md](adding-an-effect.md).
+How to add an effect: [adding-an-effect.md](adding-an-effect.md).
 """
 
 CONFUSIONS = """\
 ## What each is confused with
 
-Share of an effect's torque that another one makes as well, at the same joint, once viscous and Coulomb friction have
-taken what they can; from 80 %. Measured along the bundled recording by `python docs/make_confusions.py`: another motion
-parts, or joins, other pairs, and a diagnosis judges its own recordings and names the rivals that it cannot part.
-Effects of suspension rigs, floating bases, snares and dockings are not measured here.
+The share of an effect's torque that another effect at the same joint can reproduce, after a refit of viscous and
+Coulomb friction. Shares of 80 % and more are listed. `python docs/make_confusions.py` computes them along the bundled
+recording. Other motions separate other pairs: a diagnosis uses its own recordings, and names the rivals that are not
+separable there. Effects of suspension rigs, floating bases, snares and dockings are not in the table.
 
 | effect | looks like |
 | --- | --- |
@@ -51,8 +52,8 @@ Effects of suspension rigs, floating bases, snares and dockings are not measured
 EXPERIMENTS = """\
 ## An experiment for each
 
-The motion or measurement that shows the effect apart from others. Reports propose it where two effects cannot be told
-apart. *X* stands for the effect's place.
+The motion or measurement that separates the effect from others. Reports propose it where two effects are not separable.
+*X* stands for the effect's place.
 
 | effect | experiment |
 | --- | --- |

@@ -1,4 +1,4 @@
-"""Open an FMU from anywhere: what could harm or cannot run is refused, all problems at once, before its code runs."""
+"""Open any FMU: one that could do harm or cannot run is refused, with all its problems, before its code runs."""
 
 import re
 import shutil
@@ -76,8 +76,8 @@ def open_fmu(path: str | Path, folder: str | Path) -> FmuArchive:
         With all problems in one line: entries that lead outside the folder, links, encryption, absurd sizes, FMI's own
         XML with a document type (entity bombs), no or a broken model description, or two, no co-simulation, an FMI
         version other than 2.0 and 3.0, no binary for this platform, or a binary without functions that the description
-        promises. That binary and description are of one build, by GUID or token, only the binary can say, when it is
-        instantiated.
+        promises. Whether binary and description are of one build, the binary alone can check, by GUID or token,
+        when it is instantiated.
     """
     path, folder = Path(path), Path(folder)
     if not path.is_file():

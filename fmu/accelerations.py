@@ -1,4 +1,4 @@
-"""Accelerations of an arm whose joints feel drives, friction, springs and a rig: Newton's method, written out."""
+"""Accelerations of an arm under drives, friction, springs and a rig: Newton's method, written out."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ _NEWTON = 6  # friction in proportion to |load| is piecewise linear: it is met a
 
 @dataclass(frozen=True)
 class JointForces:
-    """What acts at the J joints.
+    """Forces at the J joints.
 
     Parameters
     ----------

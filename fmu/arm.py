@@ -1,4 +1,4 @@
-"""An arm that moves as its drives push it: forward dynamics with every effect of a model file.
+"""Forward dynamics of an arm with every effect of a model file.
 
 Accelerations a (of a floating base, then of the J links) solve, with M the inertia, c the velocity and gravity terms
 less what acts from outside, ``load = M a + c`` the rigid-body torque, w the wrench that effects give the base, and

@@ -1,4 +1,4 @@
-"""The base of an arm as an FMU has it: still, or floating, with wrenches, reaction wheels and effects of its own.
+"""The base of an arm in an FMU: fixed, or floating with wrenches, reaction wheels and its own effects.
 
 Everything is in the base's own axes unless said otherwise. What wheels are told to give the base, they keep: the
 impulse's direction turns with the base, which gives ``spin x impulse`` beside the torque itself (Wertz 1978, 7.9).
@@ -68,7 +68,7 @@ class Base:
         return by_base(point).T @ ca.vertcat(self.turn.T @ force, self.turn.T @ moment)
 
     def wrench(self, acceleration: ca.SX) -> ca.SX:
-        """What effects give the base (size,), at an acceleration (size,) of it as an observer at rest sees it."""
+        """Wrench of the effects on the base (size,), at an inertial acceleration (size,) of the base."""
         total = ca.SX(self.size, 1)
         for p in self._placed:
             total += self._laws.law(p, self._signals(acceleration) | self._hidden[p.key])

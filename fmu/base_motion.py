@@ -1,4 +1,4 @@
-"""A floating base whose motion is given: its inputs, the carriers' motion that stands for it, what laws there read.
+"""A floating base with given motion: its inputs, the motion of its carriers, and the signals of laws at the base.
 
 The motion is given in the world frame, as recordings have it, and turned into the base's own axes.
 """
@@ -63,7 +63,7 @@ class BaseMotion:
         return ca.vertcat(memory[:3], memory[3:] + size / 2 * (self._split(before)[4] + self._split(now)[4]))
 
     def signals(self, u: ca.SX, memory: ca.SX) -> dict[str, ca.SX]:
-        """What a law at the base reads."""
+        """Signals of a law at the base."""
         _, w, a, alpha, _ = self._split(u)
         gained, impulse = w - memory[:3], memory[3:]
         return {"spin": w, "spin_rate": alpha, "acceleration": a, "spin_gained": gained, "impulse": impulse}

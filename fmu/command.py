@@ -10,12 +10,12 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     p.add_argument("model", metavar="MODEL.toml|PARTICIPANT", help="a model file, or the name of a participant")
     p.add_argument("--fmi", required=True, type=int, choices=(2, 3), help="version of FMI")
     p.add_argument("--out", required=True, metavar="X.fmu", help="where to write it")
-    p.add_argument("--inverse", action="store_true", help="motion in, torque out, as snarelab simulate has it")
+    p.add_argument("--inverse", action="store_true", help="motion in, torque out, as in snarelab simulate")
     p.add_argument(
         "--integrator",
         choices=("auto", "rk4", "rosenbrock"),
         default="auto",
-        help="rk4: explicit, fixed steps; rosenbrock: for sharp friction and fast springs; auto: by the model's rates",
+        help="rk4: explicit, fixed steps; rosenbrock: for sharp friction and stiff springs; auto: by the model's rates",
     )
     p.set_defaults(run=_export)
 

@@ -1,4 +1,4 @@
-"""Models that come with the package: a joint's friction, the target on its suspension, and two arms."""
+"""Built-in models: a joint's friction, the target on its suspension, and two arms."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A model as an FMU carries it: variables, and CasADi functions of elapsed time, states, inputs and parameters.
+"""A model in an FMU: variables, and CasADi functions of elapsed time, states, inputs and parameters.
 
 Letters: t time since the start [s], x states, u inputs, p parameters, y outputs. A model is one of two kinds:
 
@@ -96,7 +96,7 @@ class Equations:
 
 @dataclass
 class Ledger:
-    """Collects a model's variables and states while its equations are written down."""
+    """Collects a model's variables and states while its equations are built."""
 
     time: ca.SX = field(default_factory=lambda: ca.SX.sym("t"))
     _inputs: list[tuple[ModelVariable, ca.SX]] = field(default_factory=list)

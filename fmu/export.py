@@ -1,4 +1,4 @@
-"""What ``snarelab export`` writes: an arm or a capture from a model file, a model of our own, or a participant."""
+"""``snarelab export``: FMUs of an arm or a capture from a model file, of a built-in model, or of a participant."""
 
 import os
 from dataclasses import asdict
@@ -29,7 +29,7 @@ def export(what: str, version: int, out: str | Path, inverse: bool = False, stif
     Parameters
     ----------
     what : str
-        A model file (``.toml``), or the name of an element or a participant.
+        A model file (``.toml``), or the name of a built-in model or a participant.
     version : 2 or 3
         Of FMI.
     out : path

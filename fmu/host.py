@@ -20,7 +20,7 @@ _HEAD = struct.Struct("=II")
 
 
 class Host:
-    """One participant and the numbers that came for it."""
+    """One participant and the values set for it."""
 
     def __init__(self, config: dict[str, Any]) -> None:
         """Import and construct; nothing is initialised."""

@@ -27,7 +27,7 @@ _HEADINGS = {"input": "Inputs", "parameter": "Parameters", "output": "Outputs"}
 
 
 def page(about: "ModelInfo", variables: tuple[ModelVariable, ...], version: int) -> str:
-    """HTML: what the model is, what it can do, and every variable."""
+    """HTML: the model, its capabilities, and every variable."""
     abilities = {
         "saves, restores and serialises its state, exactly": about.saves,
         "gives directional derivatives of outputs by inputs and parameters, states held": about.derivatives,

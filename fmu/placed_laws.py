@@ -102,12 +102,12 @@ class PlacedLaws:
         return found
 
     def of_others(self, p: PlacedEffect, q: ca.SX, qd: ca.SX) -> dict[str, ca.SX]:
-        """What an effect reads of other joints, of the arm's positions and rates (J,)."""
+        """Signals of other joints that an effect reads, from the arm's positions and rates (J,)."""
         at = [[joint.name for joint in self._joints].index(name) for name in p.effect.others]
         return {f"{name}_of_{k}": x[j] for k, j in enumerate(at, 1) for name, x in (("q", q), ("qd", qd))}
 
     def tell_held(self, at: str, outside: ca.SX) -> None:
-        """Enter the output that says where an empirical law is read outside its data."""
+        """Add the output that says where an empirical law is outside its data."""
         words = f"1 while a coordinate of the empirical law at {at} lies outside its data: its end value is held"
         self._ledger.output(f"held.{at}", "1", outside, words)
 
@@ -164,7 +164,7 @@ class PlacedLaws:
 
 
 def summed(weights: np.ndarray, x: ca.SX) -> ca.SX:
-    """Weights (J,) times x (J,): one number, without what counts for nothing."""
+    """Weights (J,) times x (J,): one number, without the terms of zero weight."""
     return sum(
         (x[int(j)] if weights[j] == 1 else float(weights[j]) * x[int(j)] for j in np.flatnonzero(weights)), ca.SX(0)
     )

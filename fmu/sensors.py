@@ -1,4 +1,4 @@
-"""What a model's sensors read, beside the truth: outputs ``sensor.<channel>``."""
+"""Readings of a model's sensors beside the true values: outputs ``sensor.<channel>``."""
 
 from collections.abc import Mapping, Sequence
 

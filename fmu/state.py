@@ -1,4 +1,4 @@
-"""A participant's state as bytes that hold data only: reading them runs no code, whoever wrote them.
+"""A participant's state as bytes that contain data only: reading them runs no code.
 
 A value is a letter and its content; numbers are little-endian, lengths have 64 bits:
 
@@ -30,7 +30,7 @@ _KINDS = "biufc"  # numpy's letters for truth and numbers
 
 
 class StateError(ValueError):
-    """What cannot be a state, or is none."""
+    """A value that cannot be a state, or bytes that are none."""
 
 
 def dumps(state: Any) -> bytes:

@@ -1,4 +1,5 @@
-"""A suspension rig's slings, slides and booms as expressions: what their laws read, and how that reaches the joints.
+"""A suspension rig's slings, slides and booms as expressions: the signals of their laws, and their torques at the
+joints.
 
 The same geometry, over recorded samples, is `snarelab.models.rig.kinematics`; letters as there.
 """
@@ -17,7 +18,7 @@ PLACES = ("sling", "slide", "boom")
 
 
 def rig_signals(rig: Rig, p: PlacedEffect, q: ca.SX, qd: ca.SX) -> dict[str, ca.SX]:
-    """What a law at a sling or a boom reads of the arm at q, qd (J,); one at a slide reads its joint's signals."""
+    """Signals of a law at a sling or a boom, at q, qd (J,); a law at a slide reads its joint's signals."""
     if p.effect.at == "sling":
         sling = sling_of(rig, p.at)
         velocity = _point(rig, sling.link, sling.point, q)[0][:3, :] @ qd

@@ -30,7 +30,7 @@ from .fitting.fit import Fit, channel_rms
 from .fitting.floating_terms import momentum_floor
 from .reliability import of_name
 from .search.locate import locate
-from .wording import evidence_sentence, experiment_sentence, foremost, listed, noise_words, verdict_sentence
+from .wording import evidence_sentence, experiment_sentence, foremost, listed, noise_words, rejection, verdict_sentence
 
 Array = NDArray[np.float64]
 
@@ -89,14 +89,9 @@ def report_on(
     }
     named = {n.placed.key for n in best.names}
     notes = [f"{Path(e.motion.path).name}: {note}" for e in (*train, *held) for note in e.motion.notes]
+    notes += [rejection(n.placed) for n in decided.rejected if n.placed.key not in named]
     notes += [
-        f"{n.placed.effect.name} at {n.placed.at} passed on the training recordings, but the held-out ones are "
-        f"predicted no better with it: not named"
-        for n in decided.rejected
-        if n.placed.key not in named
-    ]
-    notes += [
-        f"on {channels[c]}, {percent(b.share)} of the residual stands in one window and has not come again: a knock, "
+        f"on {channels[c]}, {percent(b.share)} of the residual lies in one window and does not recur: a knock, "
         "or an outlier"
         for c, b in left.bursts.items()
         if not b.again

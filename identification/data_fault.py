@@ -11,7 +11,7 @@ from .fitting.experiment import Experiment
 from .verdict import verdict
 from .wording import listed
 
-_MEND = "Mend that first, with the lines under checks, or go on with --anyway."
+_MEND = "Correct this first, with the lines under checks, or go on with --anyway."
 
 
 def contradict(checks: Sequence[CheckFinding]) -> bool:

@@ -112,7 +112,7 @@ def diagnose(
     diagnosis = report_on(model, decided, final, steps, train, locked)
     told, laws = empirical_laws(decided, final, train, locked)
     if laws:
-        progress("modelling what has no name")
+        progress("fitting tables to nameless curves")
         told, inertia = physical(told, fitted(told.assembly, train))
         diagnosis = with_laws(diagnosis, model, decided, final, told, laws, train, locked)
         final = told

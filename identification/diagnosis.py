@@ -25,7 +25,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Rival:
-    """Another explanation: how likely, whether these recordings can tell it apart, and the experiment that would."""
+    """Another explanation: its probability, whether it is separable, and the experiment that would separate the two."""
 
     name: str
     at: str
@@ -38,12 +38,12 @@ class Rival:
 class Finding:
     """An effect that the model left out, in the field's words.
 
-    ``margin`` of torques is what the held-out recordings gain by it, in standard errors over blocks of time; ``gain``
-    its log Bayes factor on the training recordings; ``explained`` the share of the held-out residual's energy that goes
-    with it, on the channel where it is largest; ``probability`` is how often a name with these three was right on
-    simulated arms, shared with what the recordings cannot tell from it. ``margin`` of encoders and captures is how
-    often it, or one that cannot be told from it, beat the others in a bootstrap over blocks of time; these have no
-    Bayes factor, and ``gain`` and ``explained`` are None.
+    Of torques, ``margin`` is what the held-out recordings gain by the effect, in standard errors over blocks of time.
+    ``gain`` is its log Bayes factor on the training recordings. ``explained`` is the share of the held-out residual's
+    energy that it explains, on the channel where this is largest. ``probability`` is how often a name with these three
+    was right on simulated arms, shared with the rivals that are not separable. Of encoders and captures, ``margin`` is
+    how often the effect, or one that is not separable from it, beat the others in a bootstrap over blocks of time;
+    ``gain`` and ``explained`` are None.
     """
 
     name: str
@@ -60,7 +60,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Location:
-    """Where in a recording the misfit stands: its share of all, when, and in which state."""
+    """Where in a recording the misfit lies: its share of all, when, and in which condition of motion."""
 
     channel: str
     share: float
@@ -80,7 +80,7 @@ class Misfit:
 
 @dataclass(frozen=True)
 class ChannelFit:
-    """A channel's misfit on the recordings fitted and on the one locked away, and the noise floor."""
+    """A channel's misfit on the training recordings and on the held-out ones, and its noise floor."""
 
     channel: str
     unit: str
@@ -91,7 +91,7 @@ class ChannelFit:
 
 @dataclass(frozen=True)
 class Step:
-    """One line of the table: model so far, and relative RMS misfit over all channels on both sets (0 to 1)."""
+    """One line of the table: the model so far, and its relative RMS misfit over all channels on both sets (0 to 1)."""
 
     label: str
     train: float
@@ -100,7 +100,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Candidate:
-    """What one effect at one place explains by itself on top of the baseline: share of the residual energy, 0 to 1."""
+    """One effect at one place on top of the baseline: the share of the residual energy that it explains, 0 to 1."""
 
     name: str
     at: str
@@ -162,7 +162,7 @@ class FrictionCurve:
     speed : array (n,)
         [rad/s or m/s]
     value, std : array (n,)
-        Friction and its standard deviation [unit]; the band is two of them either side.
+        Friction and its standard deviation [unit]; the band is two deviations either side.
     unit : str
     """
 
@@ -182,7 +182,7 @@ class FrictionCurve:
 
 @dataclass(frozen=True, eq=False)
 class EmpiricalTable:
-    """A table at a joint for physics without a name.
+    """A table at a joint for nameless physics.
 
     Parameters
     ----------
@@ -191,7 +191,7 @@ class EmpiricalTable:
     over : tuple of str
         One or two coordinates.
     times : str
-        What its value is multiplied by; empty: nothing.
+        Factor of the value; empty: none.
     knots : tuple of array
         Along each coordinate, in its unit.
     value, std : array
@@ -233,33 +233,33 @@ class Diagnosis:
     sentence : str
         The verdict in one or two sentences, with names, places and numbers.
     description : str
-        For what has no name: all that the data supports. Empty otherwise.
+        Of nameless physics, all that the data support. Empty otherwise.
     model : str
         Model's name.
     effects : tuple of Finding
-        In the order in which the search took them: what explained most of what was left, first.
+        Of torques in order of what the held-out recordings lose without each; otherwise in the search's order.
     location : tuple of Location
     fit : tuple of ChannelFit
     steps : tuple of Step
-        Baseline first, then one line an effect added.
+        Baseline first, then one line for each effect added.
     candidates : tuple of Candidate
         Each effect at each place by itself on top of the model as given, best first.
     moved : tuple of ParameterShift
     traces : tuple of Trace
     limits : tuple of Limit
-        What would have been seen, had it been there.
+        Smallest effects that would have been seen.
     notes : tuple of str
         Conditioning and excitation, in words.
     band : float
         Analysis band's edge [Hz].
     checks : tuple of CheckFinding
-        What of the recordings and the model is not as it should be; a ``data_fault`` where they contradict each other.
+        Findings of the check of recordings and model; a contradiction makes the verdict ``data_fault``.
     curves : tuple of FrictionCurve
-        Friction of each joint over its speed, of the laws that depend on speed alone, with its deviation.
+        Friction of each joint over its speed, by the laws that depend on speed alone, with its deviation.
     foremost : str
-        Channel whose error the sentence tells, and which pictures show first. Empty where nothing was fitted.
+        Channel whose error the sentence gives, and which pictures show first. Empty where nothing was fitted.
     empirical : tuple of EmpiricalTable
-        What stands for physics without a name; in the model beside all that has one.
+        Tables for nameless physics; part of the model beside the named laws.
     """
 
     verdict: Verdict

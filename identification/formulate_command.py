@@ -8,9 +8,9 @@ from ..errors import InputError
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
     """Add ``formulate`` to the command line's commands."""
-    p = subparsers.add_parser("formulate", help="find a formula for the tables of physics without a name")
+    p = subparsers.add_parser("formulate", help="find a formula for the tables of nameless physics")
     p.add_argument("model", metavar="MODEL.toml", help="a model file with [[empirical]], as diagnose saves it")
-    p.add_argument("--at", metavar="JOINT", help="the tables of this joint alone")
+    p.add_argument("--at", metavar="JOINT", help="use the tables of this joint alone")
     p.add_argument("--json", metavar="OUT.json", help="where to write the result; - for standard output")
     p.add_argument("--out", metavar="EFFECT.py", help="where to write the formula as an effect's file")
     p.set_defaults(run=_formulate)

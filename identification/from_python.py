@@ -33,24 +33,24 @@ def diagnose(
     jobs: int | None = None,
     anyway: bool = False,
 ) -> DiagnosisResult:
-    """Find, name and add the physics that a model leaves out; confirm it on a recording that the fit never sees.
+    """Find, name and add the physics that a model leaves out; confirm it on a held-out recording.
 
     Parameters
     ----------
     model : path or Model
-        What is believed.
+        What is believed of the hardware.
     recordings : path, xarray.Dataset or pandas.DataFrame, or a sequence of them
         Fitted and searched. A table in memory has the columns of a file: ``time``, ``q.<joint>``, ``tau.<joint>``.
-    holdout : the same
-        Locked away for the proof; may not be one of the others.
+    holdout : path, xarray.Dataset or pandas.DataFrame, or a sequence of them
+        Held out: they confirm names, and no fit sees them. None may be one of ``recordings``.
     progress : callable
-        Told in a few words what is under way, for example ``print``.
+        Called with a few words on what is under way, for example ``print``.
     seed : int
         Of random starts, and of bootstraps over link encoders and captures.
     jobs : int, optional
-        Processes in which captures are simulated, by default one a core, at most four; other systems refuse it.
+        Processes in which captures are simulated, by default one for each core, at most four; other systems refuse it.
     anyway : bool
-        Go on where recordings and model contradict each other; the verdict is else ``data_fault``.
+        Go on where recordings and model contradict each other; otherwise the verdict is ``data_fault``.
 
     Returns
     -------
@@ -60,11 +60,11 @@ def diagnose(
     Raises
     ------
     InputError
-        Whatever is wrong with the model or a recording, in one line.
+        The model or a recording cannot be used; one line says why.
 
     Examples
     --------
-    An arm that another simulator moved, with more physics than its model knows:
+    An arm that another engine simulated, with more physics than its model has:
 
     >>> import snarelab
     >>> from importlib.resources import files

@@ -87,7 +87,7 @@ class DiagnosisResult:
 
     @property
     def checks(self) -> tuple[CheckFinding, ...]:
-        """What of the recordings and the model is not as it should be, each with the line that mends it."""
+        """Findings of the check of recordings and model, each with the line that mends it."""
         return self.diagnosis.checks
 
     @property
@@ -101,7 +101,7 @@ class DiagnosisResult:
         return self.diagnosis.fit
 
     def to_frame(self) -> pd.DataFrame:
-        """What was found as a table: a row a parameter, with value, deviation, unit and the effect's probability."""
+        """The findings as a table, a row for each parameter: value, deviation, unit and its effect's probability."""
         rows = [
             (f.name, f.at, f.probability, name, e.value, e.std, e.unit, e.at_bound)
             for f in self.effects
@@ -111,7 +111,7 @@ class DiagnosisResult:
         return pd.DataFrame(rows, columns=heads)
 
     def plot(self, channel: str | None = None) -> Drawing:
-        """Measurement and model before and after on a channel, held-out; by default on the one that changed most.
+        """Measurement and model before and after, on a held-out channel; by default on the one that changed most.
 
         Shows itself in a notebook; its ``svg`` are the bytes of the picture. Raises InputError for another channel.
         """
@@ -131,7 +131,7 @@ class DiagnosisResult:
         write_report(self.diagnosis, path)
 
     def save_model(self, path: str | Path) -> None:
-        """Write the model file with what was found; raises InputError where it cannot be written."""
+        """Write the improved model as a model file; raises InputError where it cannot be written."""
         save_model(self.model, path, f"{self.sentence}\nsnarelab diagnose {__version__}")
 
     def __str__(self) -> str:
@@ -184,8 +184,8 @@ class CheckResult:
 class ParameterEstimate:
     """One identified number.
 
-    ``std`` is None where the recordings say nothing of it, ``identifiable`` False where they do not carry it: its value
-    is then not to be quoted. ``at_bound`` says that it ended at a physical bound. Units are SI.
+    ``std`` is None if the recordings say nothing of the parameter. ``identifiable`` is False if they do not determine
+    it: do not quote its value then. ``at_bound`` is True if it ended at a physical bound. Units are SI.
     """
 
     effect: str

@@ -91,6 +91,6 @@ def _alike(findings: Sequence[Finding]) -> list[str]:
         return []
     lines = ["", "  what these recordings cannot tell apart"]
     for finding, rival, experiment in pairs:
-        mend = f"; to part them: {experiment}" if experiment else ""
+        mend = f"; to separate them: {experiment}" if experiment else ""
         lines.append(f"  {words(finding.name)} at {finding.at}, or {rival}{mend}")
     return lines

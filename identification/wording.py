@@ -48,6 +48,14 @@ def experiment_sentence(placed: PlacedEffect, rival: PlacedEffect) -> str:
     return own.format(at=placed.at.removeprefix("tau.").removeprefix("q."))
 
 
+def rejection(placed: PlacedEffect) -> str:
+    """The note on an effect that the training recordings asked for and the held-out ones did not confirm."""
+    return (
+        f"{placed.effect.name} at {placed.at} passed on the training recordings, but the held-out ones are predicted "
+        "no better with it: not named"
+    )
+
+
 def noise_words(unit: str, noise: Noise, encoders: Sequence[NDArray[np.float64]]) -> str:
     """What a channel's noise is made of, with sizes and times."""
     u = unit.replace("*", "·")

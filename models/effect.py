@@ -9,12 +9,12 @@ place (a joint, a link, a sling, a sensor channel) and one instant, in CasADi sy
 - On a suspension rig: ``at="sling"``, the wrench (6,) on the arm at the sling's hang point, force [N] and moment [N·m]
   in the world frame; ``at="slide"``, the friction force [N] at the slides that a joint moves; ``at="boom"``, for
   torsion and for bending of a link (2,), the upward force per lever [N/m] on the slings beyond it. The rig's geometry
-  takes each to the torque of every joint.
+  gives the torque of each at every joint.
 - On a free-floating arm: ``at="base"``, the wrench (6,) on the base, force [N] and moment [N·m] about the origin of its
   frame, in its own axes.
 - In a docking: ``at="carriage"``, the friction force [N] on the carriage; ``at="grooves"``, the friction force (2,) on
   a flank along both tangents [N], which opposes the slip; ``at="groove"``, the lateral shift of one groove [m];
-  ``at="latches"``, a force (3,) on each ball beside what its latch does without the effect, in the target's axes [N].
+  ``at="latches"``, a force (3,) on each ball in addition to its latch's without the effect, in the target's axes [N].
 - In a snare: ``at="pin"``, a force [N] at each contact of a cable with the pin; ``at="cables"``, a force [N] or moment
   [N·m] inside all cables; ``at="target"``, the force (3,) on the target [N]. The snare's engine has the same laws
   compiled (``models/snare``), at places that no recording shows.
@@ -48,15 +48,15 @@ class Parameter:
     low, high : float
         Physical bounds. ``-inf`` and ``inf`` where there are none.
     meaning : str
-        What it is, in a few words.
+        Meaning of the number, in a few words.
     grid : tuple of float
-        Empty for an amplitude. For a shape parameter (nonlinear in the law): starting values that span what
-        hardware shows; relative to the scale named by ``relative_to`` if that is set.
+        Empty for an amplitude. For a shape parameter (in which the law is nonlinear): starting values over the range
+        of real hardware, relative to the scale named by ``relative_to`` if that is set.
     relative_to : "", "speed", "travel", "torque", "rate" or "per_torque"
-        What the bounds' finite ends and the grid are multiples of: the joint's peak speed, its travel, its peak torque,
+        Unit of the bounds' finite ends and of the grid: the joint's peak speed, its travel, its peak torque,
         peak torque per travel, or one over its peak torque; "" for absolute numbers in SI units.
     alone : bool
-        False where the parameter without the effect's others would be another effect: a spring's rest torque is a bias.
+        False where this parameter alone would be another effect: a spring's rest torque alone is a bias.
     """
 
     name: str
@@ -132,26 +132,26 @@ class Effect:
         Joint effects only: the law gives a torque at the joint, or a displacement of the link behind the joint
         (a vector: displacement, its rate, its second rate), which changes the torque of every joint.
     neighbours : "", "too" or "only"
-        Joint effects only: whether the effect is tried, unasked, along the sum and the difference of two joints of
-        which one carries the other, beside every joint or instead of it.
+        Joint effects only: whether a search tries the effect along the sum and the difference of two joints of
+        which one carries the other; "too": also at every joint, "only": at no joint.
     others : tuple of str
         Joint effects only: other joints that the law reads; position and rate of the first are ``s["q_of_1"]`` and
         ``s["qd_of_1"]``.
     dissipates : bool
-        True where the law's power ``qd * torque`` can never be negative; the contract test holds it to that.
+        True where the law's power ``qd * torque`` can never be negative; a test checks this.
     contains : tuple of str
         Simpler effects that are special cases of this one. A search names the simpler one first, and this one only for
-        what is then left (the principle of marginality: Nelder 1977).
+        what the simpler one leaves (the principle of marginality: Nelder 1977).
     at_rest : bool
-        True where the effect shows near rest above all. It must pass in motion like any other, but the share of the
-        residual that makes it worth a name counts near rest, too, and its columns come from the motion as measured, not
-        from a low-passed one.
+        True where the effect shows mainly near rest. It must pass in motion like any other. But the share of the
+        residual that makes it worth a name includes samples near rest, and its columns come from the measured motion,
+        not from the instrument motion.
     remembers : bool
         True where friction near rest depends on where the joint turned. Samples near rest count for such an effect if
-        it explains most of what is left.
+        it explains most of the remaining residual.
     exceeds_at_rest : bool
         True where the effect raises friction near rest above its level in motion. Samples near rest count for such an
-        effect: a joint that sticks stays below the level. All others are judged in motion only.
+        effect: a joint that sticks stays below the level. All other effects are compared in motion only.
     experiment : str
         The motion or measurement that shows this effect apart from others, as an instruction: "move {at} slowly ...".
     """

@@ -24,7 +24,7 @@ from .tree import Tree
 class PlacedEffect:
     """An effect and the one place it acts at: a joint, an axis, a link, a sling, or a channel such as ``tau.joint1``.
 
-    Parameters named in ``hold`` are not identified: the recordings did not ask for them, or another effect carries
+    Parameters named in ``hold`` are not identified: the recordings do not determine them, or another effect has
     them.
     """
 
@@ -57,17 +57,17 @@ class Model:
     effects : tuple of PlacedEffect
         Physics that the model has, one entry a place.
     signals : mapping of str to Signal
-        Where a recording with columns of its own has each signal.
+        Where a recording with other column names has each signal.
     bandwidth : float or None
         Edge of the analysis band [Hz]; None: chosen from the recordings.
     values : mapping of str to float
         Parameters known so far, by ``effect.at.parameter`` (``inertia.<link>.<parameter>`` for inertial parameters).
     holding : Holding
-        Joints of the robot's file that are held here, and what is done about inertias that no body can have.
+        Joints of the robot's file that are held, and what is done about physically impossible inertias.
     cuts : Cuts
         Samples of the recordings that are left out.
     servo : mapping of str to Servo
-        Joints whose torque is worked out from what their servo was asked for.
+        Joints whose torque is computed from their servo's commanded position.
     transmission : Transmission or None
         Motors that move several joints.
     """
@@ -93,7 +93,7 @@ class Model:
         return tuple(j.name for j in self.tree.joints)
 
     def with_effects(self, added: Sequence[PlacedEffect], values: Mapping[str, float]) -> "Model":
-        """The model with more effects, and with parameters that a fit found."""
+        """The model with more effects, and with a fit's parameters."""
         return replace(self, effects=(*self.effects, *added), values={**self.values, **values})
 
     def demand_values(self, *more: str) -> None:
@@ -131,7 +131,7 @@ def places(effect: Effect, tree: Tree) -> tuple[str, ...]:
 
 
 def all_places(effect: Effect, tree: Tree) -> tuple[str, ...]:
-    """`places`, and axes of several joints, where an effect acts only if the model file names them."""
+    """`places`, and axes of several joints: there an effect acts only if the model file names the axis."""
     own = places(effect, tree)
     if effect.at != "joint" or effect.acts_on != "torque" or isinstance(tree, SnareTree | DockingTree):
         return own

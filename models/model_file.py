@@ -66,7 +66,7 @@ _KEYS = (
 
 
 def load_model(path: str | Path, fix: Fix = "") -> Model:
-    """Read a model file; ``fix`` mends a moving body that no body can be, where the file does not say so itself.
+    """Read a model file; ``fix`` replaces impossible inertias of moving bodies, unless the file says how itself.
 
     Raises
     ------

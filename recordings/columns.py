@@ -1,4 +1,4 @@
-"""What every file format is turned into: names, arrays, single numbers, and what could not be read.
+"""The common form of every file format: names, arrays, single numbers, and what could not be read.
 
 Readers know their file format and nothing of signals or units; the rest of the package knows ``Columns`` and nothing of
 file formats.
@@ -25,7 +25,7 @@ _HEADER = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\[\]]*)\]")
 
 
 def check_size(path: Path, size: int) -> None:
-    """Raise InputError where a recording says that it unpacks to more than `LARGEST` bytes; before it does."""
+    """Raise InputError, before unpacking, where a recording unpacks to more than `LARGEST` bytes."""
     if size > LARGEST:
         raise InputError(
             f"{path}: unpacks to {size / 2**30:.1f} GiB of numbers and at most {LARGEST >> 30} are read; "
@@ -49,7 +49,7 @@ def split_header(header: str) -> tuple[str, str | None]:
 
 @dataclass(frozen=True)
 class Columns:
-    """The content of one recording's file, before it has meaning.
+    """The content of one recording's file, without units and signals.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ NEAR = 0.999
 
 @dataclass(frozen=True)
 class Cuts:
-    """Times [s] at which every recording is cut in two, and what a channel's readings stay below (its default unit)."""
+    """Times [s] at which every recording is cut in two, and each channel's level of saturation (its default unit)."""
 
     breaks: tuple[float, ...] = ()
     limits: Mapping[str, float] = field(default_factory=dict)

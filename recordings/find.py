@@ -1,4 +1,4 @@
-"""Finding the public recordings that the examples and benchmarks use.
+"""Paths of the public recordings that examples and benchmarks use.
 
 EMPS, the Electro-Mechanical Positioning System, one prismatic axis, 1 kHz: A. Janot, M. Gautier, M. Brunot, "Data Set
 and Reference Models of EMPS", Nonlinear System Identification Benchmarks, 2019. The files are published in the GitHub

@@ -1,4 +1,4 @@
-"""Reads an HDF5 file in a process of its own, as a script: ``python hdf5_process.py FILE MOST [matlab]``.
+"""Reads an HDF5 file in a separate process, as a script: ``python hdf5_process.py FILE MOST [matlab]``.
 
 The HDF5 library never returns from some damaged files and crashes on others (seen with HDF5 2.0); a process can be
 ended. Pickled on standard output: the datasets by name, or the text of a refusal. Nothing of snarelab is imported, so
@@ -16,7 +16,7 @@ _DEEPEST = 32
 
 
 class Refusal(Exception):
-    """What a user can mend."""
+    """An error that a user can correct."""
 
 
 def collect(path: str, most: int, matlab: bool) -> dict[str, np.ndarray]:

@@ -1,4 +1,4 @@
-"""Recordings in several files: signals whose column stands in another file of the same folder, row by row."""
+"""Recordings in several files: signals whose column is in another file of the folder, row by row."""
 
 import re
 from collections.abc import Callable, Mapping

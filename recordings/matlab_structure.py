@@ -1,4 +1,4 @@
-"""Whether the elements of a MATLAB 5 file fit into one another.
+"""A check of the nesting of a MATLAB 5 file's elements.
 
 SciPy trusts an element's type and size: a few wrong bytes in a file crash the interpreter (seen with SciPy 1.17).
 Compressed variables are unpacked to be checked, one at a time and no further than a recording may go.
@@ -25,7 +25,7 @@ _Element = tuple[int, bytes]
 
 
 def check_structure(path: Path, data: bytes) -> None:
-    """Raise ValueError where an element of a version 5 file cannot be what it says it is; other versions pass.
+    """Raise ValueError for an impossible element of a version 5 file; other versions pass.
 
     Raises InputError where its variables unpack to more than is read of a recording.
     """

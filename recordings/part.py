@@ -1,4 +1,4 @@
-"""A part of a recording, as ``run.csv@2.5:10``: samples from 2.5 s to before 10 s of its own clock, ends optional.
+"""A part of a recording, as ``run.csv@2.5:10``: samples from 2.5 s to just before 10 s of its clock, ends optional.
 
 Rows that a fit sees and rows that it does not may so come from one file.
 """
@@ -26,7 +26,7 @@ class Part:
     stop: float = np.inf
 
     def overlaps(self, other: "Part") -> bool:
-        """Whether both have time of one file in common."""
+        """Whether two parts of one file overlap."""
         return self.file.resolve() == other.file.resolve() and self.start < other.stop and other.start < self.stop
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
@@ -44,7 +44,7 @@ class Part:
 
 
 def part_of(path: str | Path) -> Part:
-    """What a recording's path means: the file of that name, where there is one, else a part of it."""
+    """The file and part that a recording's path names: a whole file of that name, if there is one, else a part."""
     plain, match = Path(path), _PART.fullmatch(str(path))
     if match is None or plain.exists():
         return Part(plain)

@@ -55,18 +55,19 @@ def read_recording(
     path : str or Path
         The file, or a bag's folder; a part of it as ``run.csv@2.5:10`` [s].
     signals : mapping of str to Signal
-        A model's [signals]: where each signal is found. A mapped signal wins over a column of its own name.
+        A model's [signals]: where each signal is found. A mapped signal takes precedence over a column of the
+        signal's own name.
     joint_kinds : mapping of str to "revolute" or "prismatic"
-        Kind of each joint of a model. An unknown kind is taken from the dimension of a unit that the file gives for
-        that joint; where it gives none, the joint is revolute. What no fit needs is then left out where it cannot be
-        read, with a note: velocity, acceleration, temperature, and joints that are not among these.
+        Kind of each joint of a model. An unknown kind follows from the dimension of a unit that the file gives for
+        that joint; without such a unit, the joint is revolute. A signal that no fit needs (velocity, acceleration,
+        temperature, joints that are not in this mapping) is left out with a note if it cannot be read.
 
     Returns
     -------
     xarray.Dataset
         One float64 variable of shape (n_samples,) per recognised signal over ``time`` [s], in its SI default unit.
         ``attrs["unit"]`` and ``attrs["column"]`` of a variable: its unit as pint reads it, and the column it came from.
-        ``attrs["path"]`` and ``attrs["notes"]`` of the dataset: the file, and what the reader saw, one sentence each
+        ``attrs["path"]`` and ``attrs["notes"]`` of the dataset: the file, and the reader's remarks, one sentence each
         (gaps, missing samples, uneven sampling, columns left out). Missing samples are NaN; nothing is interpolated.
 
     Raises

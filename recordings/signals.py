@@ -1,4 +1,4 @@
-"""The names a recording's columns can have, and their SI default units.
+"""The names that a recording's columns can have, and their SI default units.
 
 ``time``; of a joint ``q qd qdd q_link tau command temp``; ``tension.<sling>``; of a body ``pos quat vel omega``; of a
 wrench sensor ``force torque``; ``angle.ring``; ``closed.latches``.
@@ -58,7 +58,7 @@ def pose_texts(body: str, text: str) -> list[tuple[str, str, str]]:
 
 @dataclass(frozen=True)
 class Signal:
-    """Where a model's signal is found in a recording that has names of its own.
+    """The source of a model's signal in a recording with other column names.
 
     Parameters
     ----------

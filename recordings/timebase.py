@@ -1,4 +1,4 @@
-"""How evenly a recording is sampled, and where it has gaps."""
+"""Evenness and gaps of a recording's sampling."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""A recording on a uniform clock: runs between gaps, put there by splines where stamps jitter, thinned where fast."""
+"""A recording on a uniform clock: runs between gaps, by splines where time stamps jitter, thinned where fast."""
 
 from collections.abc import Sequence
 
@@ -24,8 +24,7 @@ ABOUT = 31
 """Steps whose median a step is held against: a recording may change its rate."""
 
 FAST, ENOUGH = 1500.0, 300.0
-"""[Hz] Rate from which on a recording is thinned before anything else, and the least it is thinned to: three times what
-the widest band needs."""
+"""[Hz] Rate from which on a recording is thinned before anything else, and the lowest rate that is left."""
 
 
 def uniform(time: Array, q: Array, tau: Array, temperature: Array) -> tuple[list[Piece], list[str], float, float]:

@@ -32,7 +32,7 @@ def registry() -> "pint.UnitRegistry":
 
 
 def check_unit(text: str) -> None:
-    """Raise ValueError for a unit that pint could take forever to work out.
+    """Raise ValueError for a unit on which pint could take forever.
 
     pint computes with the numbers in a unit, whatever their powers: ``9**9**9**9`` has 10^369693100 digits. Allowed are
     a factor in front, exponents of two digits on units, and ``1/``.

@@ -11,7 +11,7 @@ from ..files import written_whole
 
 
 def demand_suffix(path: str | Path) -> None:
-    """Refuse a name that no recording is written under (InputError), before there is anything to write."""
+    """Raise InputError for a suffix under which no recording is written, before any work."""
     suffix = Path(path).suffix
     if suffix.lower() not in (".csv", ".parquet"):
         raise InputError(f"{path}: a recording is written as .csv or .parquet, not {suffix!r}; change the suffix")

@@ -32,7 +32,7 @@ from .page import Picture, Section, write_page
 
 HERE = Path(__file__).parent
 HELD_OUT = 400.0
-"""Controller gain whose recordings are locked away, as the publishers do."""
+"""Controller gain whose recordings are held out, as in the publication."""
 
 PROVED = 0.05
 """A step is confirmed if without it the held-out recordings' squared error is so much higher."""
@@ -203,7 +203,7 @@ def sections(
         )
     if refused:
         words.append(
-            f"{refused.name.replace('_', ' ').capitalize()} passed next, and made the held-out gain no better."
+            f"{refused.name.replace('_', ' ').capitalize()} passed next, but the held-out gain's error did not fall."
         )
     by_run = [
         f"{run.trajectory.replace('_', ' ')}: {1e3 * position_error([run], base.values):.0f} to "

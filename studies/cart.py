@@ -49,7 +49,8 @@ def sections(answer: Answer) -> list[Section]:
         Section(
             "What the makers say",
             [
-                "A mass of 6.28 kg, Coulomb friction that differs by direction and by place, and no viscous friction. "
+                "The makers state a mass of 6.28 kg, Coulomb friction that differs by direction and position, and no "
+                "viscous friction. "
                 "Force is current times 0.0934 N·m/A over a pulley of 0.028 m."
             ],
         ),

@@ -68,6 +68,7 @@ def main() -> int:
         Quantity("second_verdict", "", again.verdict, "reference"),
     ]
     write_json(out / "diagnosis.json", found.to_json())
+    write_json(out / "again.json", again.to_json())
     more = {"recording": train.name, "steps": [vars(s) for s in found.steps]}
     write_result(name, quantities, time.monotonic() - begun, more)
     origin = provenance("make study-emps", [("Model", model), ("Training", train), ("Held-out", holdout)])
@@ -81,7 +82,7 @@ def _say(text: str) -> None:
 
 
 def _diagnose(model: Path, train: Path, holdout: Path) -> Answer:
-    _say(f"Diagnosing {model.stem} against {train.name}, with {holdout.name} locked away ...")
+    _say(f"Diagnosing {model.stem} against {train.name}, with {holdout.name} as the held-out recording ...")
     return diagnose(load_model(model), [train], holdout, progress=stages(_say))
 
 

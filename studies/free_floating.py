@@ -55,7 +55,7 @@ def main() -> int:
     begun = time.monotonic()
     arm = ets_vii()
     run = simulate(arm)
-    print(f"{', '.join(arm.unphysical())} of ETS-VII: inertias that no body can have, kept as published", flush=True)
+    print(f"{', '.join(arm.unphysical())} of ETS-VII: physically impossible inertias, kept as published", flush=True)
     quantities = measure(arm, run)
     n = {q.name: q.ours for q in quantities if isinstance(q.ours, float)}
     found = (
@@ -203,12 +203,12 @@ def _sections(arm: FloatingArm, run: PlantRun) -> list[Section]:
             [
                 "Base and arm float at rest; the servo moves all six joints at once. No force acts from outside, so "
                 "the momentum stays zero and the base moves against the arm.",
-                f"The paper's gains are lost. Stiffness is omega² and damping 2 omega times the joint's own "
+                f"The paper's gains are illegible. Stiffness is omega² and damping 2 omega times the joint's own "
                 f"generalised inertia, omega = {OMEGA:g} rad/s: the peak base rate is proportional to omega, and a "
                 f"paper that prints 3·10⁻³ rad/s needs omega = {PAPER_PEAK / peak_base_rate(arm, run) * OMEGA:.2f}. "
                 "It is therefore marked as calibrated.",
-                f"Parameters are kept as published, though {unphysical} have inertias that no body can have; the "
-                "nearest ones that bodies can have change the peak by the share in the table.",
+                f"Parameters are kept as published, though the inertias of {unphysical} are physically impossible; the "
+                "nearest possible ones change the peak by the share in the table.",
             ],
             pictures,
         ),

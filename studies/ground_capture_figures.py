@@ -55,9 +55,13 @@ def sections(cases: Sequence[GroundCase], dimensions: Sequence[Dimension]) -> li
             "What the paper leaves open",
             [
                 "The paper's text gives neither the target's mass nor friction and damping, and no force peaks. Each "
-                "is varied here by itself; read the spread as a range, not as a match.",
+                "is varied here by itself; the spread is a range and no agreement.",
             ],
-            [Picture(_sweeps(cases), "Final offset and peak force against what is varied", "Dots: one capture each.")],
+            [
+                Picture(
+                    _sweeps(cases), "Final offset and peak force over each varied parameter", "Dots: one capture each."
+                )
+            ],
         ),
         Section(
             "What was calibrated",

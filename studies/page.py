@@ -17,12 +17,12 @@ from ..report.zoom import zoomable
 from .outcome import FOLDER, Quantity
 
 _KINDS = {
-    "predicted": "Comes out of the model; nothing was set to meet the paper's number.",
+    "predicted": "A result of the model; nothing was set to meet the paper's number.",
     "calibrated": "A free parameter of the model was set to meet the paper's number: agreement here proves nothing.",
-    "reference": "Ours, to know; no agreement is claimed, and the paper has no number for it.",
+    "reference": "Our number; no agreement is claimed, and the paper has no number for it.",
 }
 _BESIDE = (
-    "Ours, to know; no agreement is claimed. Where the paper has a number, it is shown for its size: it measures "
+    "Our number; no agreement is claimed. Where the paper has a number, it is shown for its size: it measures "
     "something else."
 )
 """Of ``reference``, where the paper's number stands beside one."""
@@ -146,7 +146,7 @@ def write_page(
         content += "".join(figure(p.svg, p.alternative, p.caption, zoom=_zoom(p)) for p in section.pictures)
         parts.append((f"part{number}", section.heading, content))
     origin = provenance(f"make study-{study}", files, (*PACKAGES, "exudyn", "numba", "scikit-learn"))
-    parts.append(("origin", "What this stands on", origin.markup()))
+    parts.append(("origin", "Files and versions", origin.markup()))
     header = f'<p class="quiet">{escape(title)}</p>\n{headline(found)}'
     document = page(title, header, parts, f"Written by snarelab: make study-{study}.")
     folder = FOLDER / study

@@ -70,19 +70,23 @@ def compiler() -> None:
 
 @pytest.fixture(scope="session")
 def emps() -> Path:
-    """Folder of the EMPS recordings, which are never copied into the repository."""
-    given = os.environ.get("SNARELAB_RECORDINGS")
-    for folder in ([Path(given)] if given else []) + [ROOT.parent / "shared" / "recordings"]:
-        if (folder / "emps" / "DATA_EMPS.mat").is_file():
-            return folder / "emps"
-    pytest.skip("EMPS recordings not found: set SNARELAB_RECORDINGS to the folder that holds emps/DATA_EMPS.mat")
+    """Folder of the EMPS recordings."""
+    from real_recordings import real_recordings  # found by the paths above
+
+    return real_recordings("emps", "DATA_EMPS.mat")
+
+
+def _of_this_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder that all workers of a run share."""
+    base = tmp_path_factory.getbasetemp()
+    return base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
 
 
 @pytest.fixture(scope="module")
 def own_cache(tmp_path_factory):
-    """A cache of compiled models that no other test has filled."""
+    """A cache of compiled models that this run fills: what it compiles is compiled once."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        patch.setenv("XDG_CACHE_HOME", str(_of_this_run(tmp_path_factory) / "compiled"))
         yield
 
 
@@ -91,8 +95,7 @@ def each_diagnosis_once(tmp_path_factory):
     """What `once.remembered` says, over all workers of a run."""
     from once import remembered  # found by the paths above
 
-    base = tmp_path_factory.getbasetemp()
-    with remembered(base.parent if "PYTEST_XDIST_WORKER" in os.environ else base):
+    with remembered(_of_this_run(tmp_path_factory)):
         yield
 
 

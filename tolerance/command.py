@@ -8,10 +8,10 @@ from ..arguments import positive
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
     """Add the command to the command line."""
-    p = commands.add_parser("tolerance", help="find over which misalignments a capture succeeds")
+    p = commands.add_parser("tolerance", help="find the misalignments with which a capture succeeds")
     p.add_argument("study", metavar="STUDY.toml")
     p.add_argument(
-        "--out", required=True, metavar="RESULTS", help="folder of the results; a run that was killed goes on"
+        "--out", required=True, metavar="RESULTS", help="folder of the results; a killed run is resumed from it"
     )
     p.add_argument(
         "--scheduler", metavar="ADDRESS", help="a running Dask scheduler; without it, processes of this machine"
@@ -35,9 +35,9 @@ def run(given: argparse.Namespace) -> None:
     try:
         with Progress() as progress:
             run_study(study, results, jobs=given.jobs, scheduler=given.scheduler, say=progress)
-            progress("summing up")
+            progress("writing the results")
             content = summarise(study, results)
     except KeyboardInterrupt:
-        print(f"snarelab: interrupted; {len(results)} cases are kept, the same command goes on", file=sys.stderr)
+        print(f"snarelab: interrupted; {len(results)} cases are kept, the same command resumes it", file=sys.stderr)
         sys.exit(130)
     print(f"{content['sentence']}\nReport: {results.folder / 'report.html'}")

@@ -15,7 +15,7 @@ Case = dict[Any, Any]
 
 _KINDS = {
     "never touched": "no cable touched the pin, and the snare closed beside it",
-    "escaped": "the pin was touched, and is outside of the closed snare",
+    "escaped": "the pin was touched, but is outside the closed snare",
     "off the axis": "the pin is caught, but too far off the axis to be docked",
     "cable overloaded": "the pin is caught and in place, but a cable was over its strength",
 }

@@ -42,7 +42,7 @@ def number(path: Path, what: str, value: Any) -> float:
 def positive(path: Path, what: str, value: Any) -> float:
     """A number above zero."""
     if not number(path, what, value) > 0:
-        raise InputError(f"{path}: {what} = {value!r}; no case could ever meet it; give a number above zero")
+        raise InputError(f"{path}: {what} = {value!r}; no case can meet it; give a number above zero")
     return float(value)
 
 

@@ -18,7 +18,7 @@ from ..files import bounded_memory, json_value, written_whole
 from .capture import Outcome
 from .study import Study
 
-_SAFE = "finished cases are safe; make room and run again"
+_SAFE = "finished cases are kept; make room and run again"
 _OUTCOME = tuple(f.name for f in fields(Outcome))
 _ABSENT = {f.name: f.default for f in fields(Outcome) if f.default is not MISSING}
 """What a row that was written before a column was there has in it."""

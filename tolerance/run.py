@@ -121,18 +121,14 @@ class _Runner:
                 yield number, outcome or Outcome.failed("its worker was killed each time it was tried (out of memory?)")
 
     def _together(self, wanted: Mapping[int, Mapping[str, float]]) -> Iterator[tuple[int, Outcome | None]]:
-        from dask.distributed import KilledWorker, as_completed
+        from dask.distributed import as_completed
 
         futures = {self._client.submit(run_case, self._study.capture, v, pure=False): n for n, v in wanted.items()}
         while futures:
             try:
                 for future in as_completed(list(futures), timeout=WATCH):
-                    error = future.exception()
-                    if isinstance(error, InputError):
-                        raise error
-                    if error is not None and not isinstance(error, KilledWorker):
-                        raise InputError(f"a worker cannot run a case: {error}; has it the same snarelab installed?")
-                    yield futures.pop(future), future.result() if error is None else None
+                    outcome = _outcome_of(future)
+                    yield futures.pop(future), outcome
             except TimeoutError:
                 self._mend()
 
@@ -143,6 +139,24 @@ class _Runner:
             cluster.scale(len(cluster.worker_spec))  # Dask restarts a worker that was killed, but not when that fails
         if not self._client.scheduler_info()["workers"]:
             self._say("no worker at the scheduler; waiting for one")
+
+
+def _outcome_of(future: Any) -> Outcome | None:
+    """What came of a case; None where its worker was killed.
+
+    It is asked for once: an outcome lies with the worker that made it, and where that one dies first, Dask runs the
+    case again, which may then end otherwise than it had.
+    """
+    from dask.distributed import KilledWorker
+
+    try:
+        return future.result()
+    except KilledWorker:
+        return None
+    except InputError:
+        raise
+    except Exception as error:
+        raise InputError(f"a worker cannot run a case: {error}; has it the same snarelab installed?") from None
 
 
 def sobol_points(study: Study, count: int) -> np.ndarray:

@@ -1,1 +1,1 @@
-"""Participants, one a file: whatever can be stepped by the co-simulation master."""
+"""Participants, one file each: anything that the co-simulation master can step."""

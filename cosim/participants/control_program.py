@@ -1,4 +1,4 @@
-"""The end effector's control program as a participant: a table of states, looked at once a period."""
+"""The end effector's control program as a participant: a table of states, evaluated once a period."""
 
 from collections.abc import Mapping
 from math import degrees, pi
@@ -39,7 +39,7 @@ _OUTPUTS = {
 
 
 class ControlProgram(Participant):
-    """A `StateTable` at work: sensors in, commands and the number of its state out; all outputs are discrete.
+    """A running `StateTable`: sensors in, commands and the number of its state out; all outputs are discrete.
 
     Transitions are events: no macro step goes past a period's end, and each stands in the master's log.
 
@@ -149,7 +149,7 @@ class ControlProgram(Participant):
         return self._state
 
     def outputs(self) -> np.ndarray:
-        """What the last call commands."""
+        """Commands of the last call."""
         c = self._command
         return np.array(
             [c("ring") * pi / 180, self._speed, c("motor"), c("brake"), c("latch"), c("servo"),
@@ -157,7 +157,7 @@ class ControlProgram(Participant):
         )  # fmt: skip
 
     def save(self) -> Any:
-        """Everything that decides what comes."""
+        """The complete state."""
         return (
             self._calls, self._inputs.copy(), self._state, self._since, self._entry, self._peak, self._held,
             self._taken, self._news, self._speed, self._began,

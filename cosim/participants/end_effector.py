@@ -144,7 +144,7 @@ class EndEffectorParticipant(Participant):
         return np.concatenate([inputs.vector(), self._constants])
 
     def step(self, time: float, size: float) -> None:
-        """Advance; what is new of the impulses is applied evenly. A fault leaves the state as it was."""
+        """Advance; the impulses' increments are applied evenly. A fault leaves the state unchanged."""
         broken = ~np.isfinite(self._inputs)
         broken[:12] |= ~np.isfinite(self._rates).all(axis=0)
         if broken.any():
@@ -212,7 +212,7 @@ class EndEffectorParticipant(Participant):
         return shown
 
     def outputs(self) -> np.ndarray:
-        """Everything shown."""
+        """All outputs."""
         return self._read(self._time, self._state, self._held)
 
     def _read(self, time: float, state: np.ndarray, held: np.ndarray) -> np.ndarray:

@@ -101,7 +101,7 @@ class FloatingArmParticipant(Participant):
         self._rates, self._applied = np.zeros((2, len(self._first))), np.zeros(self._n_wrenches)
 
     def set_inputs(self, values: np.ndarray) -> None:
-        """Take wrench, targets and the servo's switch, held until told otherwise."""
+        """Take wrench, targets and the servo's switch; they are held until set again."""
         self._inputs = np.array(values, float)
         if self._inputs.shape != self._first.shape:
             raise InputError(f"{self.name}: {self._inputs.shape} inputs given; give ({len(self._first)},)")
@@ -112,7 +112,7 @@ class FloatingArmParticipant(Participant):
         self._rates = np.array([first, second], float)
 
     def step(self, time: float, size: float) -> None:
-        """Advance; a fault leaves the state as it was."""
+        """Advance; a fault leaves the state unchanged."""
         if not np.isfinite(self._inputs).all() or not np.isfinite(self._rates).all():
             broken = ~np.isfinite(self._inputs) | ~np.isfinite(self._rates).all(axis=0)
             what = self.names("input")[int(np.flatnonzero(broken)[0])]
@@ -138,11 +138,11 @@ class FloatingArmParticipant(Participant):
         self._state, self._time, self._size, self._applied = end.state, end.time, end.size, reached
 
     def outputs(self) -> np.ndarray:
-        """Everything shown, from the state alone."""
+        """All outputs, from the state alone."""
         return _shown(self._motion, self._state)
 
     def save(self) -> Any:
-        """State, inputs, parameters and the step to go on with."""
+        """State, inputs, parameters and the next internal step."""
         inputs = self._inputs.copy(), self._rates.copy(), self._applied.copy()
         return self._state.copy(), self._time, self._size, inputs, dict(self._values)
 

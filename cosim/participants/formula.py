@@ -1,4 +1,4 @@
-"""A participant without a state: its outputs follow its inputs at once."""
+"""A participant without a state: its outputs follow its inputs without a step."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any

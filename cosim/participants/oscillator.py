@@ -1,4 +1,4 @@
-"""Two halves of a chain of two masses: the smallest system that shows what a co-simulation does to coupling.
+"""Two halves of a chain of two masses: the smallest system that shows the coupling's error in a co-simulation.
 
 Each half is a mass on a spring and damper to the ground. A third spring and damper joins the masses; it belongs to the
 right half, which reads the left mass's position and speed and answers with the force between them::

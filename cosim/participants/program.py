@@ -71,7 +71,7 @@ class Program(Participant):
             self._calls += 1
 
     def outputs(self) -> np.ndarray:
-        """What the last call gave."""
+        """Outputs of the last call."""
         return self._outputs.copy()
 
     def save(self) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:

@@ -46,7 +46,7 @@ class CommandedSnareParticipant(ImpulseSnareParticipant):
         super().set_input_derivatives(first[:-1], second[:-1])
 
     def step(self, time: float, size: float) -> None:
-        """Step with the ring as it is told."""
+        """Step with the ring at its commanded rate."""
         self._built()  # which looks at where the ring stands
         self._ring.command(time, self._asked)
         super().step(time, size)

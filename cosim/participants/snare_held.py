@@ -55,7 +55,7 @@ class HeldSnareParticipant(ImpulseSnareParticipant):
         self._forget(time)
 
     def step(self, time: float, size: float) -> None:
-        """Follow the inputs' parabola for a step, and foresee what the next one will give."""
+        """Follow the inputs' parabola for a step, and predict the outputs of the next one."""
         moved = [(time, self._inputs.copy()), *self._moved][:_POINTS]
         if len(moved) > 1:
             nodes = tuple((t - time) / size for t, _ in moved)

@@ -1,4 +1,4 @@
-"""The snare with impulses at its ports, so that a coupling hands momentum over whole.
+"""The snare with impulses at its ports, so that a coupling conserves momentum.
 
 A force that is read at communication points says little about what passed between them: a contact rings a thousand
 times a second. What passed is known exactly, it is what the snare's own bodies gained: with P, L the momentum of cables
@@ -58,7 +58,7 @@ class ImpulseSnareParticipant(SnareParticipant):
         self._passed, self._momentum = np.zeros(6), np.zeros(6)
 
     def step(self, time: float, size: float) -> None:
-        """Step, and add up what passed."""
+        """Step, and sum the impulses."""
         model = self._built()
         before, pin, foot = self._momentum, model.pin_impulse(), model.assembly.pin[0].copy()
         effector = model.effector_pose().position

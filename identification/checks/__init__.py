@@ -1,1 +1,1 @@
-"""Whether recordings and a model can belong together: readings of the data that compete, and the findings."""
+"""Whether recordings and a model can belong together: competing readings of the data, and the findings."""

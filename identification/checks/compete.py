@@ -43,7 +43,7 @@ class ReadingScore:
 
 
 def compete(case: CheckCase, readings: Sequence[Reading]) -> list[ReadingScore]:
-    """Judge readings, best first; nothing where the reading as given is sound.
+    """Scores of all readings, best first; empty where the reading as given is sound.
 
     All are fitted without bounds first, and the `CLOSELY` best with them. Odds are evidence times prior odds. The
     readings of one kind share `ODDS`. Positions, speeds and torques far beyond the URDF's limits count against a
@@ -71,13 +71,13 @@ def compete(case: CheckCase, readings: Sequence[Reading]) -> list[ReadingScore]:
 
 
 def is_sound(case: CheckCase) -> bool:
-    """Whether the reading as given leaves so little that no other needs to be tried."""
+    """Whether the residual of the reading as given is so small that no other needs to be tried."""
     bar = SOUND if len(case.joints) <= ALL else SOUND_OF_MANY
     return bool(np.nanmax(case.given.relative) <= bar)
 
 
 def findings(case: CheckCase, judged: Sequence[ReadingScore]) -> list[CheckFinding]:
-    """What the best reading says, if it is sure and plain; each of its channels is a finding.
+    """Findings of the best reading, if it is sure and clear: one for each of its channels.
 
     The probability of a place is that of its reading among all, the reading as given included; readings that say the
     same of the torque (an encoder reversed, or its torque) share it, and the message names them.

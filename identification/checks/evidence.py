@@ -1,4 +1,4 @@
-"""How well a reading of the data goes with the model: evidence of a joint weighted least-squares fit.
+"""Evidence of a reading of the data under the model, by a joint weighted least-squares fit.
 
 Torque of channel c is the rigid body's, tau0, plus columns for all that a sound machine may have besides, each with a
 prior that says how much of it there can be: ``y = tau0 + X b + e``, b between bounds and N(0, width²). Masses, centres
@@ -57,7 +57,7 @@ class ReadingFit:
 
 
 class CheckBasis:
-    """Samples, rigid body and priors that all readings are compared on.
+    """Samples, rigid body and priors with which all readings are compared.
 
     Parameters
     ----------
@@ -83,8 +83,8 @@ class CheckBasis:
     ) -> ReadingFit:
         """Evidence of a reading.
 
-        ``columns`` (n, J, k), their widths and lower bounds (k,) come beside the usual; samples ``without`` (n, J) do
-        not count in the fit, but stand in its residual.
+        ``columns`` (n, J, k), with widths and lower bounds (k,), are added to the usual ones; samples ``without`` (n,
+        J) do not count in the fit, but are part of its residual.
         """
         samples = self.samples.under(reading)
         y, design, low = self._design(samples, reading.gravity, columns)

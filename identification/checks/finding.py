@@ -1,4 +1,4 @@
-"""What a check says: a frozen value for JSON, page and sentence."""
+"""Findings of the checks: frozen values for JSON, page and sentence."""
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class CheckFinding:
-    """One thing that is not as it should be.
+    """One finding of a check.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class CheckFinding:
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of check: other readings that it puts up to compete, or what it finds by itself.
+    """A kind of check: its competing readings, or its own findings.
 
     Parameters
     ----------

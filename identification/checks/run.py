@@ -23,10 +23,9 @@ from .kinds import ORDER, kinds
 def check(
     model: Model, recordings: Sequence[str | Path], *, progress: Callable[[str], None] = lambda _: None
 ) -> tuple[CheckFinding, ...]:
-    """Findings on recordings that were not read yet; raises InputError for whatever is wrong with a file.
+    """Findings on recordings that are yet to be read; raises InputError for a file that cannot be used.
 
-    A recording that cannot be conditioned is left to what can be said without.
-    """
+    For a recording that cannot be conditioned, only the checks before conditioning are made."""
     if not recordings:
         raise InputError("recordings: none is given; give one or more")
     if isinstance(model.tree, SnareTree | DockingTree):
@@ -52,10 +51,9 @@ def check_file(
 
 
 def early_checks(model: Model, datasets: Sequence[xr.Dataset]) -> tuple[CheckFinding, ...]:
-    """What is seen before any filter is applied: jumps, and clocks that are none.
+    """Checks before any filter: jumps and wrong clocks.
 
-    Where one is found, readings cannot be compared: what was recorded is no motion.
-    """
+    With such a finding readings cannot be compared: the recording is no continuous motion."""
     case = CheckCase(model, datasets, ())
     return _sorted([f for kind in kinds() if kind.early and kind.find is not None for f in kind.find(case)])
 

@@ -1,1 +1,1 @@
-"""Docking recordings: effects of carriage, grooves and latches by simulation in the loop, by the one evidence."""
+"""Docking tests as a source: effects of carriage, grooves and latches, with simulation in the loop."""

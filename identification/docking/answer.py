@@ -1,4 +1,4 @@
-"""What a decision says of dockings, in words and numbers: the `Diagnosis` that JSON, report and tests share."""
+"""The decision on dockings in words and numbers: the `Diagnosis` that JSON, report and tests share."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -52,10 +52,12 @@ def report_on(source: Dockings, name: str, decided: Decision, seconds: float) ->
             f"{_size(worst.holdout.rms_after, worst.unit)}."
         )
     else:
-        sentence = "The model is adequate: nothing is left out that has a name and that these dockings can show."
+        sentence = "The model is adequate: these dockings show no named effect that it leaves out."
     notes = [f"{Path(r.path).name}: {note}" for r in records for note in r.notes] + not_confirmed(decided)
     shifts = ", ".join(f"{k} {x:+.1f}" for k, x in zip(SHIFTS, best.train.at.shifts, strict=True) if abs(x) > 1)
-    notes.append(f"numbers of the set-up moved within their tolerances, in deviations: {shifts or 'none by one'}")
+    notes.append(
+        f"numbers of the set-up moved within their tolerances, in deviations: {shifts or 'none by one or more'}"
+    )
     notes.append(f"{source.count} dockings were simulated in {seconds:.0f} s")
     return Diagnosis(
         decided.verdict, sentence, "", name, tuple(findings),

@@ -1,4 +1,4 @@
-"""What the model of a docking leaves out, from recordings to the verdict."""
+"""Diagnosis of docking tests, from recordings to the verdict."""
 
 import time
 from collections.abc import Callable, Sequence

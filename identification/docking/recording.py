@@ -1,7 +1,7 @@
-"""A docking test as recorded, brought to what a simulation of it can be compared with: means over a tenth of a second.
+"""A docking test as means over a tenth of a second, which a simulation can be compared with.
 
-The carriage's travel and the latches' closing are what the test was told to do, everything else is what came of it.
-The end effector's pose is in the target's frame, and its turn counts from the start.
+The carriage's travel and the latches' closing are inputs of the simulation; every other channel is compared. The end
+effector's pose is in the target's frame, and its turn counts from the start.
 """
 
 from collections.abc import Sequence

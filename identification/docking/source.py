@@ -1,4 +1,4 @@
-"""Docking tests behind the one interface: a simulation that answers to values, with slopes by differences.
+"""Docking tests as a source: a simulation, with derivatives by finite differences.
 
 The shifts are numbers of the set-up, machining and the pose's registration (`SHIFTS`), the same in all recordings.
 """
@@ -96,7 +96,7 @@ class Dockings(DockingRuns):
         return found
 
     def columns(self, i: int, at: ModelPoint, v: GridPoint) -> Array:
-        """What the simulation changes by for each amplitude, from there being none of it."""
+        """Change of the simulation for each amplitude, from zero."""
         shape = {k: x for k, x in v.values.items() if k not in v.amplitudes}
         none, own = self.predicted(i, at), []
         assert none is not None

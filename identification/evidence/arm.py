@@ -48,7 +48,7 @@ class WeighedRecordings:
     """A channel's noise where nothing is missing."""
 
     def with_noise(self, c: int, noise: Noise, alone: Evidence) -> "WeighedRecordings":
-        """These recordings with another noise of one channel; ``alone`` is that channel's evidence under it."""
+        """These recordings with another noise of one channel; ``alone`` is the channel's evidence under that noise."""
         noises = tuple(noise if k == c else x for k, x in enumerate(self.noises))
         return replace(self, evidence=self.evidence.with_channel(c, alone), noises=noises)
 
@@ -217,7 +217,7 @@ def _noise(
 
 
 def principal(parts: Sequence[Array], most: int) -> list[Array]:
-    """The strongest directions of columns of unit RMS, of unit RMS themselves."""
+    """Principal directions of columns that are scaled to unit RMS; the directions have unit RMS too."""
     whole = np.concatenate(list(parts))
     size = np.sqrt(np.mean(whole**2, axis=0))
     use = size > 1e-9 * size.max(initial=1e-300)

@@ -1,10 +1,10 @@
-"""Confirm on the held-out recordings what a search named, by the same evidence.
+"""Confirm on the held-out recordings the names of a search, by the evidence of the search.
 
-With an effect and without it the rest is fitted again, and both models predict the held-out recordings: the log
-density of these given the training recordings (Dawid 1984), every nuisance integrated out anew. The nameless curves
-that the search ended with stand beside both, so that what only stands in for one of them is not missed.
-A name stays if that density falls without it by more than it scatters over blocks of time, and if what is missed is
-more than any model has wrong.
+With an effect and without it the rest is fitted again, and both models predict the held-out recordings: the log density
+of these given the training recordings (Dawid 1984), every nuisance integrated out anew. The nameless curves that the
+search ended with stand beside both, so that a name which only imitates one of them shows no loss. A name stays if that
+density falls without it by more than the scatter over blocks of time, and if the loss is larger than any model's own
+error.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -29,7 +29,7 @@ FEWEST_BLOCKS = 4
 
 @dataclass(frozen=True)
 class PredictiveDensity:
-    """Log density of the held-out recordings given the training ones, and what each block of time takes off it."""
+    """Log density of the held-out recordings given the training ones, and the part of each block of time."""
 
     density: float
     blocks: Array
@@ -37,9 +37,10 @@ class PredictiveDensity:
 
 @dataclass(frozen=True)
 class ArmLoss:
-    """What the held-out recordings lose without an effect: log density and its scatter; how far the two models' torques
-    are apart [RMS, share of the channel's]; relative errors with and without; the share of the residual's energy that
-    goes with it, 0 to 1; and the fit without."""
+    """What the held-out recordings lose without an effect: log density and its scatter; the difference of the two
+    models' torques [RMS, share of the channel's]; relative errors with and without it; the share of the residual's
+    energy that it explains, 0 to 1; and the fit without it.
+    """
 
     gain: float
     scatter: float
@@ -50,20 +51,21 @@ class ArmLoss:
 
     @property
     def sure(self) -> float:
-        """The gain in units of its scatter."""
+        """The loss in units of its scatter."""
         return self.gain / max(self.scatter, 1e-12)
 
     @property
     def told(self) -> bool:
-        """Whether it is missed beyond its scatter, and as more than any model has wrong."""
+        """Whether the loss is beyond its scatter, and larger than any model's own error."""
         return self.sure > GATE and self.size >= DISCREPANCY
 
 
 @dataclass(frozen=True)
 class ArmConfirmation:
-    """Names that the held-out recordings confirmed and did not, what they miss of each, and the fit of what is left.
+    """The names that the held-out recordings confirmed, the rejected ones, the loss of each, and the fit of the
+    confirmed model.
 
-    What is missed, but is less than any model has wrong, is neither."""
+    A name whose loss is beyond its scatter, but smaller than any model's own error, is neither."""
 
     found: ArmSelection
     names: tuple[ArmNaming, ...]
@@ -83,10 +85,11 @@ def confirm(
     scales: Mapping[str, Scales],
     progress: Callable[[str], None],
 ) -> ArmConfirmation:
-    """Take out the name that the held-out recordings miss least, all else fitted again, until they miss every one.
+    """Remove the name with the smallest held-out loss and fit all else again, until every name's loss is beyond its
+    scatter.
 
-    One at a time: of two that stand in for each other, one stays, and is missed more from then on. So the others are
-    tried again in the order of how much they were missed before, and only until one is to go.
+    Names are removed one at a time: of two that replace each other, one stays, and its loss is larger from then on. So
+    the others are tried again in the order of their last loss, and only until one is to be removed.
     """
     progress("confirming on the held-out recordings")
     model, final = found.model, found.fit
@@ -113,7 +116,9 @@ def confirm(
             model = _without(model, weakest)
             whole = forecast(model, final, found, train, held, scales)
             stale = set(left)
-            progress(f"confirming on the held-out recordings: {out.placed.key} is not missed, {len(left)} left")
+            progress(
+                f"confirming on the held-out recordings: {out.placed.key} is not confirmed, {len(left)} names left"
+            )
     names = tuple(sorted(left.values(), key=lambda n: -missed[n.placed.key].size))
     return ArmConfirmation(found, names, tuple(rejected), weak, missed, model, final, whole)
 

@@ -1,4 +1,6 @@
-"""The whole decision by one evidence: search, confirm, search again where something was not confirmed, what is left."""
+"""The whole decision: search, confirm, search again in place of names that were not confirmed, nameless curves and
+bursts.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,8 +18,9 @@ from .selection import ArmNaming
 
 @dataclass(frozen=True)
 class ArmDecision:
-    """What the recordings say: names confirmed on the held-out ones, what is left without a name, and names that the
-    held-out recordings did not confirm."""
+    """The decision: names that the held-out recordings confirmed, nameless curves and bursts, and the names that were
+    rejected.
+    """
 
     best: ArmConfirmation
     left: NamelessParts
@@ -25,7 +28,7 @@ class ArmDecision:
 
     @property
     def verdict(self) -> Verdict:
-        """By what is named, and by curves and bursts without a name; a burst that came once is no law."""
+        """The verdict by the names, and by nameless curves and bursts; a burst that occurs once does not count."""
         return verdict(self.best.names, [*self.left.curves, *(b for b in self.left.bursts.values() if b.again)])
 
 
@@ -60,7 +63,7 @@ def decide(
     for _ in range(SECOND_CHOICES):
         if not last.rejected:
             break
-        progress("looking for what else could explain what the held-out recordings did not confirm")
+        progress("searching another explanation for what the held-out recordings did not confirm")
         again = search(
             model, base, scales, train, held, before=last.found, barred=rejected, progress=progress, seed=seed
         )

@@ -2,9 +2,9 @@
 
     r = A b + C t + e,   b ~ N(0, 1),  t ~ N(0, κ² diag(spread²)),  e ~ N(0, K)
 
-A holds all that stands beside every hypothesis in units of its prior: the baseline's parameters, the tolerance of the
-masses, small curves. With S = K + A A' a hypothesis is H = C' S⁻¹ C and g = C' S⁻¹ r, and its log Bayes factor against
-nothing is ½ g' (H + κ⁻²)⁻¹ g - ½ log det(1 + κ² H). Letters: n samples, m columns, P parameters beside.
+A has the columns that stand beside every hypothesis, in units of their priors: the baseline's parameters, the tolerance
+of the masses, small curves. With S = K + A A' a hypothesis is H = C' S⁻¹ C and g = C' S⁻¹ r, and its log Bayes factor
+against nothing is ½ g' (H + κ⁻²)⁻¹ g - ½ log det(1 + κ² H). Letters: n samples, m columns, P parameters beside.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -26,8 +26,9 @@ ROWS = 256
 
 @dataclass(frozen=True)
 class ResidualChannel:
-    """One channel of one recording: residual (n,), its covariance, and what always stands beside it: positions (p,)
-    among all such parameters, and columns (n, p) in units of their prior deviation."""
+    """One channel of one recording: residual (n,), its covariance, and the nuisance columns that stand beside every
+    item: positions (p,) among all such parameters, and columns (n, p) in units of their prior deviation.
+    """
 
     residual: Array
     covariance: Covariance
@@ -107,7 +108,9 @@ class Evidence:
         self._rows: dict[tuple[int, int, int], Array] = {}
 
     def products(self, i: int, c: int) -> Products:
-        """Of channel c of recording i, worked out when they are asked for: a search needs the training recordings'."""
+        """Products of channel c of recording i, computed when first used: a search needs those of the training
+        recordings only.
+        """
         if (i, c) not in self._made:
             self._made[i, c] = self._products(i, c)
         return self._made[i, c]
@@ -145,7 +148,7 @@ class Evidence:
         return found
 
     def own(self, i: int, c: int) -> list[tuple[Index, Array]]:
-        """Of each of `alike`, on channel c of recording i: which items have columns there, and C'K⁻¹C (., k, k)."""
+        """For each of `alike`, on channel c of recording i: which items have columns there, and C'K⁻¹C (., k, k)."""
         if (i, c) not in self._own:
             each, found = self.products(i, c).each, []
             for group in self.alike:
@@ -185,8 +188,7 @@ class Evidence:
     def alone(self, c: int, pool: Sequence[Hypothesis]) -> "tuple[Evidence, list[Hypothesis], Index]":
         """One channel by itself: its evidence, the hypotheses that reach it, and which always stand beside it.
 
-        A hypothesis may reach a channel at some of its shapes only: of it those remain.
-        """
+        If a hypothesis reaches a channel at some of its shapes only, these shapes remain."""
         always = np.unique(np.concatenate([row[c].index for row in self.channels]))
         at = self.where[c]
         reach = [tuple(replace(x, index=at[x.index]) for x in h.items if at[x.index[0]] >= 0) for h in pool]
@@ -245,7 +247,9 @@ class Evidence:
         return self._pools[i][c][:, here] @ (item.spread * amplitudes)
 
     def left(self, i: int, always: Array, members: Sequence[tuple[Item, Array]]) -> Array:
-        """Each sample's part of e' K⁻¹ e, all channels of a recording (n,), e what is left at these amplitudes."""
+        """Each sample's part of e' K⁻¹ e over all channels of a recording (n,); e is the remaining residual at these
+        amplitudes.
+        """
         total = np.zeros(len(self.channels[i][0].residual))
         for c, own in enumerate(self.channels[i]):
             e = own.residual - own.columns @ always[own.index]

@@ -35,7 +35,7 @@ SMALL_STEP = 0.02
 
 @dataclass(frozen=True)
 class ColumnSource:
-    """What columns are taken from: instruments with the model's state along each, the training recordings first."""
+    """Where columns come from: instrument motions with the model's state along each, the training recordings first."""
 
     model: Model
     assembly: TorqueModel
@@ -101,8 +101,7 @@ def pool(
 ) -> list[Hypothesis]:
     """Hypotheses with their prior odds: shared by the effects, and by the places of each (Scott and Berger 2010).
 
-    What is ``there`` in the model counts as one of an effect's places that has it.
-    """
+    An effect that is ``there`` in the model counts as one of its places."""
     names = [p.effect.name for p, _ in named.values()]
     odds = ODDS_OF_NAMES / max(len(set(names)), 1)
     found = []
@@ -123,10 +122,10 @@ def pool(
 
 
 def log_share_of_places(k: int, n: int) -> float:
-    """Log probability that an effect which is there is at k certain ones of its n places.
+    """Log probability that an effect which is there acts at k given places of its n.
 
-    It is at one alone, each as likely; or every place has it at a rate of which nothing is known but that it is not
-    zero: ∫ρ^k (1 - ρ)^(n-k) dρ = k! (n - k)! / (n + 1)!.
+    It acts at one place alone, each as likely; or at every place with a probability ρ of which nothing is known but
+    that it is not zero: ∫ρ^k (1 - ρ)^(n-k) dρ = k! (n - k)! / (n + 1)!.
     """
     every = factorial(k) * factorial(n - k) / factorial(n + 1) * (n + 1) / n
     return float(np.log(ELSEWHERE * every + (1 - ELSEWHERE) * (k == 1) / n))
@@ -185,15 +184,14 @@ def _items(along: ColumnSource, p: PlacedEffect, by_words: Curves, columns: Cand
 
 
 def remembers(p: PlacedEffect) -> bool:
-    """Has a law a memory that is no joint's own: a sling's carriage, a tank, a late sensor?"""
+    """Whether a law has a memory that is no joint's own: a sling's carriage, a tank, a late sensor."""
     return bool(p.effect.states) and p.effect.at != "joint"
 
 
 def lagging(along: ColumnSource, parts: Mapping[int, Sequence[Array]], columns: CandidateColumns) -> Item:
-    """What a law adds if it comes sooner or later: the first two derivatives by time of each of its columns.
+    """What a law adds if it is early or late: the first two derivatives by time of each of its columns.
 
-    The item's spreads make each as large as the law where that is as large as its channel's torque.
-    """
+    The item's spreads scale each derivative to the law, where the law is scaled to its channel's torque."""
     own: dict[int, list[Array]] = {}
     for c, recordings in parts.items():
         own[c] = []
@@ -230,7 +228,7 @@ def _grid(assembly: TorqueModel, p: PlacedEffect) -> tuple[list[EffectVariant], 
 
 
 def rings(p: PlacedEffect) -> bool:
-    """Has a law a frequency of its own that no joint's motion tells: a tank, a boom on the base?"""
+    """Whether a law has a frequency of its own that no joint's motion gives: a tank, a boom on the base."""
     return bool(p.effect.states) and p.effect.at == "base"
 
 
@@ -280,7 +278,7 @@ def _size(along: ColumnSource, parts: Mapping[int, Sequence[Array]]) -> Array:
 
 
 def coordinate(effect: Effect) -> str | None:
-    """What a joint's law runs over, in words of the family of curves; told from the law itself."""
+    """Coordinate of a joint's law, in words of the family of curves; derived from the law itself."""
     if effect.at != "joint" or effect.acts_on != "torque" or effect.others:
         return None
     if effect.remembers:

@@ -1,4 +1,4 @@
-"""A set of hypotheses that are taken to be true, and what one more would add."""
+"""A set of hypotheses that are taken as true, and the gain of one more."""
 
 from collections.abc import Sequence
 
@@ -52,8 +52,9 @@ class Members:
         return self.amplitudes[self._slices[number]]
 
     def gains(self) -> Array:
-        """Log Bayes factor of every item on top of these, for each size (N, n_sizes); of a law without
-        amplitudes the first alone, the others -inf."""
+        """Log Bayes factor of every item on top of these members, for each size (N, n_sizes); a law without amplitudes
+        has the first only, the others are -inf.
+        """
         found = np.full((len(self.on.evidence.items), len(SIZES)), -np.inf)
         if self.taken:
             cross = np.concatenate([self.on.cross(x) for x, _ in self.taken])
@@ -75,8 +76,7 @@ class Members:
 def log_bayes(curvature: Array, score: Array, positive: NDArray[np.bool_]) -> Array:
     """½ g'(H + κ⁻²)⁻¹g - ½ log det(1 + κ²H) of N items (N, k, k), (N, k) for each size κ: (N, n_sizes).
 
-    What cannot be negative counts twice as far as it is positive: 2 Φ(mean / deviation).
-    """
+    An amplitude that cannot be negative has half the prior, doubled: a factor 2 Φ(mean / deviation)."""
     values, vectors = np.linalg.eigh(curvature)
     values, turned = np.maximum(values, 0.0)[:, None, :], np.einsum("akl,ak->al", vectors, score)[:, None, :]
     k2 = (SIZES**2)[None, :, None]
@@ -92,7 +92,7 @@ def log_bayes(curvature: Array, score: Array, positive: NDArray[np.bool_]) -> Ar
 
 
 def log_bayes_whole(curvature: Array, score: Array) -> Array:
-    """Log Bayes factors (N,) of columns that are a whole law each, with an amplitude about one."""
+    """Log Bayes factors (N,) of columns of which each is a whole law, with an amplitude about one."""
     h = np.maximum(curvature, 0.0)
     left = score - h
     k2 = WHOLE**2

@@ -1,4 +1,4 @@
-"""What the confirmed model leaves: nameless curves that the held-out recordings confirm, and bursts."""
+"""The nameless part of the remaining residual: curves that the held-out recordings confirm, and bursts."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -84,7 +84,7 @@ def left_over(
     held: Sequence[Experiment],
     barred: Collection[str],
 ) -> NamelessParts:
-    """What the confirmed model still leaves."""
+    """The nameless parts of the confirmed model's remaining residual."""
     if best.rejected:
         n = len(train)
         own = best.found

@@ -1,4 +1,4 @@
-"""What always stands beside an explanation: the baseline's parameters, the tolerance of the masses, small curves."""
+"""Columns that stand beside every explanation: the baseline's parameters, the tolerance of the masses, small curves."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -23,7 +23,9 @@ Part = tuple[NDArray[np.int_], Array]
 
 @dataclass(frozen=True)
 class NuisanceColumns:
-    """``parts[i][c]`` of recording i and channel c; ``tolerant``: where the masses' tolerance stands, one part each."""
+    """``parts[i][c]`` are those of recording i and channel c; ``tolerant`` is the position of the masses' tolerance in
+    them.
+    """
 
     parts: list[list[Part]]
     count: int
@@ -47,7 +49,7 @@ def beside(
     columns: CandidateColumns,
     nameless: Mapping[tuple[int, str], float],
 ) -> NuisanceColumns:
-    """All of it for some recordings under a fit; ``nameless`` curves have a size of their own."""
+    """All nuisance columns of some recordings under a fit; ``nameless`` curves have their own sizes."""
     assembly, n, n_channels = found.assembly, along.n_train, len(along.scale)
     blocks = [assembly.residual(e, found.theta)[1] for e in along.instruments]
     baseline = [

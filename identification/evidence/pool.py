@@ -19,8 +19,8 @@ class Item:
     """A hypothesis with its shape set: columns of the pool, and the prior of their amplitudes.
 
     ``spread`` (k,) is the prior standard deviation of each amplitude for an effect of relative size one; ``positive``
-    (k,) marks amplitudes that cannot be negative; ``whole``: the one column is all that the law does, with an amplitude
-    of one; ``label`` is the caller's own.
+    (k,) marks amplitudes that cannot be negative. ``whole``: the one column is the whole law, with an amplitude of one.
+    ``label`` is for the caller.
     """
 
     index: NDArray[np.int_]
@@ -45,7 +45,7 @@ class Hypothesis:
     more: tuple[float, ...] = ()
 
     def prior_beside(self, others: int) -> float:
-        """Prior log odds beside so many of its kind."""
+        """Prior log odds beside this number of others of its kind."""
         return (self.prior, *self.more)[min(others, len(self.more))]
 
 
@@ -53,8 +53,8 @@ class Hypothesis:
 class CandidateColumns:
     """Columns of all hypotheses, by recording and channel, numbered through.
 
-    They are kept in single precision, 6e-8 of each value, as they are most of the memory that a diagnosis takes; what
-    is worked out of them is in double.
+    They are stored in single precision, 6e-8 of each value, since they take most of a diagnosis's memory; products are
+    computed in double precision.
     """
 
     lengths: Sequence[int]
@@ -89,7 +89,7 @@ class CandidateColumns:
         return numbers, self.rows[recording, channel][: len(numbers)].T
 
     def has(self, channel: int, number: int) -> bool:
-        """Is a column one of a channel's?"""
+        """Whether a column belongs to a channel."""
         return any(index[0] <= number <= index[-1] for index in self.numbers.get(channel, ()))
 
     def some(self, recording: int, channel: int, wanted: NDArray[np.int_]) -> Array:

@@ -1,4 +1,4 @@
-"""The evidence of some recordings together, the baseline and every nuisance that stands beside projected out.
+"""The evidence of some recordings together, with the baseline and every nuisance projected out.
 
 With S = K + A A' as in `evidence`: H = C' S⁻¹ C and g = C' S⁻¹ r of every item, and what is left of the rest. Most of
 what stands beside belongs to one channel, so that cost grows with the channels and not with their square.
@@ -27,7 +27,7 @@ class ProjectedStack(ItemStack):
 
 
 class ProjectedEvidence:
-    """The evidence of some recordings together, what always stands beside projected out."""
+    """The evidence of some recordings together, with all nuisance columns projected out."""
 
     def __init__(
         self,
@@ -184,7 +184,7 @@ class ProjectedEvidence:
         return self.beside([])[:m], half.T @ half
 
     def beside(self, members: Sequence[tuple[int, Array]]) -> Array:
-        """Posterior mean of what always stands beside (P,) given items at amplitudes."""
+        """Posterior mean (P,) of the nuisance columns' amplitudes, given items at amplitudes."""
         seen = self._seen.copy()
         for number, amplitude in members:
             item = self.evidence.items[number]

@@ -38,7 +38,7 @@ def search(
     progress: Callable[[str], None] = lambda _: None,
     seed: int = 0,
 ) -> ArmSelection:
-    """Add effects to a model until nothing more that has a name raises the posterior.
+    """Add effects to a model until no further name raises the posterior.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def search(
     tuned = _tuned(model, base, scales, train, first, seed) if before is None else before.tuned
     channels = None if before is None else _reached_by(before.opening, barred)
     for number in range(1, ROUNDS + 1):
-        progress(f"round {number}: weighing each effect at each place")
+        progress(f"round {number}: comparing each effect at each place")
         if number == 1 and before is not None:
             weighed = before.opening
         else:
@@ -175,8 +175,10 @@ def _reached(weighed: WeighedRecordings, slot: MemberOdds) -> list[int]:
 
 
 def as_names(search: Search, slots: Sequence[MemberOdds]) -> list[MemberOdds]:
-    """Slots in which a curve that a name's law nearly is has become that name, and a law that is nearly a special case
-    of it that special case (the principle of marginality: Nelder 1977). What it is not is found afterwards."""
+    """The slots after replacement: a curve that a named law nearly reproduces becomes that name, and a law that nearly
+    equals one of its special cases becomes that special case (the principle of marginality: Nelder 1977). The
+    difference is found afterwards.
+    """
     taken = [s.taken for s in slots]
     for k, t in enumerate(taken):
         amplitudes = search.members(taken).of(t.item)
@@ -255,7 +257,8 @@ def _rivals(search: Search, slot: MemberOdds, amplitudes: Array) -> tuple[RivalO
 def likeness(search: Search, own: int, amplitudes: Array, energy: float, other: int) -> float:
     """Largest share of what an item adds that another hypothesis's law by itself can add as well [0 to 1].
 
-    Amplitudes that cannot be negative are not: friction that falls with heat is none that grows.
+    Amplitudes that cannot be negative stay positive: friction that falls with heat cannot reproduce friction that
+    grows.
     """
     best, on = 0.0, search.on
     start = sum(len(h.items) for h in search.pool[:other])
@@ -276,7 +279,7 @@ def likeness(search: Search, own: int, amplitudes: Array, energy: float, other: 
 
 
 def share_of_residual(search: Search, item: int, amplitudes: Array) -> float:
-    """Share that an item explains of what stands beside everything leaves of its channels, whitened [0 to 1]."""
+    """Share that an item explains of its channels' whitened residual beside all nuisances [0 to 1]."""
     on = search.on
     reached = on.evidence.reached(on.evidence.items[item])
     energy = sum(on.left(c) for c in reached)

@@ -1,8 +1,8 @@
 """One search over sets of explanations: forward, backward and exchange moves until none raises the posterior.
 
-A set's log posterior is the log Bayes factor of its members at their best shapes and sizes together, its prior log
-odds, and for each member what averaging over shapes and sizes took off when it was taken. Names and nameless curves
-are judged alike.
+A set's log posterior has three terms: the log Bayes factor of its members together, at their best shapes and sizes; its
+prior log odds; and for each member the (negative) effect of averaging over shapes and sizes, when it was added. Names
+and nameless curves are treated alike.
 """
 
 from collections.abc import Collection, Sequence
@@ -30,7 +30,7 @@ MOVED = 0.05
 
 @dataclass(frozen=True)
 class Member:
-    """A hypothesis in a set: with the number of its item, its size, and what averaging took, as a negative number."""
+    """A hypothesis in a set: the number of its item, its size, and the (negative) effect of averaging."""
 
     hypothesis: int
     item: int
@@ -50,8 +50,9 @@ class Scan:
 
 @dataclass(frozen=True)
 class MemberOdds:
-    """A member of the best set, and who could stand in its place: log odds (N,) and shares of them, the last
-    share being nobody's."""
+    """A member of the best set and its possible replacements: log odds (N,) and their shares; the last share is that of
+    no replacement.
+    """
 
     taken: Member
     gain: float
@@ -60,7 +61,7 @@ class MemberOdds:
 
 
 class Search:
-    """Of the best set of hypotheses on some recordings."""
+    """The search for the best set of hypotheses on some recordings."""
 
     def __init__(self, on: ProjectedEvidence, pool: Sequence[Hypothesis], barred: Collection[int] = ()) -> None:
         """``barred``: hypotheses that no set may have. Items stand in the evidence in the order of the pool."""
@@ -72,7 +73,7 @@ class Search:
         self._sets: dict[frozenset[tuple[int, float]], Members] = {}
 
     def members(self, taken: Sequence[Member]) -> Members:
-        """The set, worked out once."""
+        """The members of a set, computed once."""
         key = _key(taken)
         if key not in self._sets:
             self._sets[key] = Members(self.on, [(t.item, t.size) for t in taken])
@@ -160,7 +161,7 @@ class Search:
         return [self.slot(taken, k) for k in range(len(taken))]
 
     def slot(self, taken: Sequence[Member], k: int) -> MemberOdds:
-        """A member of a set, and who could stand in its place."""
+        """A member of a set and its possible replacements."""
         taken = list(taken)
         rest = taken[:k] + taken[k + 1 :]
         rows = self.scan(rest)

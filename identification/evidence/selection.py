@@ -20,8 +20,8 @@ Array = NDArray[np.float64]
 class ArmNaming:
     """An effect that the search named.
 
-    ``gain`` is its log Bayes factor on the training recordings, ``share`` its posterior share among all that could
-    stand in its place.
+    ``gain`` is its log Bayes factor on the training recordings, ``share`` its posterior share among all possible
+    replacements.
     """
 
     placed: PlacedEffect
@@ -33,8 +33,9 @@ class ArmNaming:
 
 @dataclass(frozen=True)
 class Remainder:
-    """A nameless curve on a channel: what it runs over, its log Bayes factor, the share of the channel's residual that
-    it explains [0 to 1], and what the held-out recordings gain by it in standard errors."""
+    """A nameless curve on a channel: its coordinates, its log Bayes factor, the share of the channel's residual that it
+    explains [0 to 1], and the held-out recordings' gain by it in standard errors.
+    """
 
     channel: int
     over: str
@@ -56,7 +57,7 @@ class ArmTrial:
 
 @dataclass(frozen=True)
 class ArmSelection:
-    """Baseline fit, model with all that was named and its fit, and the recordings as they were weighed."""
+    """The baseline's fit, the model with all names and its fit, and the recordings under these fits."""
 
     first: Fit
     model: Model

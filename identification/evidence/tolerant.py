@@ -26,7 +26,7 @@ class _Best:
 def searched(
     weighed: WeighedRecordings, recordings: Sequence[int], barred: Collection[str], channels: Collection[int]
 ) -> tuple[WeighedRecordings, Search, list[MemberOdds], float]:
-    """The best set of explanations of some recordings, with the noise and the tolerance of the masses that go with it.
+    """The best set of explanations of some recordings, with its noise and its tolerance of the masses.
 
     Chosen before the search, a wide tolerance would take a payload in; without any, it would be named a payload. So
     with the noise: beside all that could be missing, a torque that wanders is taken for some of it; beside nothing,

@@ -1,1 +1,1 @@
-"""What the model says the torque is, and the fit of its parameters to recordings."""
+"""The torque of a model, and the fit of its parameters to recordings."""

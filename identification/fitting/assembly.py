@@ -69,8 +69,8 @@ class Block:
 class TorqueEvaluation:
     """A model evaluated along one recording.
 
-    ``load`` (n, J) is the rigid-body torque, ``tau`` (n, J) the modelled readings; ``passed`` holds, for each channel
-    with sensor effects, what they do to columns of the torque.
+    ``load`` (n, J) is the rigid-body torque, ``tau`` (n, J) the modelled readings. ``passed`` has, for each channel
+    with sensor effects, the map of torque columns to columns of the reading.
     """
 
     load: Array
@@ -147,10 +147,10 @@ class TorqueModel:
         self.high = np.array([s.high for s in slots], float)
 
     def at(self, p: PlacedEffect) -> EffectPlace:
-        """The place where an effect acts, which says what it adds to the torque.
+        """The place where an effect acts; it gives the effect's terms of the torque.
 
-        A late encoder of a single joint makes its channel early, whatever the joint's inertia; among others it moves
-        their torques, too, with the tree's inertia.
+        The late encoder of a single joint makes its channel early, whatever the joint's inertia. Among other joints it
+        also changes their torques, by the tree's inertia.
         """
         early_alone = len(self._joints) == 1 and self.base is not None
         return effect_place(self.tree, p, self.joint_of(p), self.speed_scale(p), early_alone)
@@ -173,7 +173,7 @@ class TorqueModel:
         return self._speeds[self._own(p)]
 
     def scale(self, p: PlacedEffect, parameter: Parameter) -> float:
-        """What a parameter's bounds and grid are multiples of at this place."""
+        """Unit of a parameter's bounds and grid at this place."""
         return self.scales[self._own(p)].of(parameter.relative_to)
 
     def bounds(self, p: PlacedEffect, parameter: Parameter) -> tuple[float, float]:

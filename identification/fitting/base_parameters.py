@@ -1,4 +1,4 @@
-"""Base inertial parameters: the combinations of links' inertial parameters that joint torque depends on.
+"""Base inertial parameters: the combinations of links' inertial parameters on which joint torque depends.
 
 Torque is linear in the standard parameters phi (10 * L,), but its regressor W has dependent columns: a mass on a
 revolute axis may as well belong to the link before. Columns are taken in turn, links from the base to the tip, and in a
@@ -6,8 +6,8 @@ link mass, first moments, inertias; one is kept where it is independent of those
 ``W = W[:, kept] @ B`` the torque is ``W[:, kept] @ beta``, ``beta = B @ phi``. What can be regrouped thus moves towards
 the base, as in the closed form of Gautier & Khalil (1990), and masses stay only where a prismatic joint shows them.
 
-W is analytic in the motion, so its rank is the same on any travel, however short. The motions it is found on are
-therefore not those within joint limits but whole turns, where rank shows most clearly.
+W is analytic in the motion, so its rank is the same on any travel, however short. So the rank is computed on motions of
+whole turns, where it shows most clearly, and not within joint limits.
 """
 
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ TOLERANCE = 1e-5
 
 @dataclass(frozen=True, eq=False)
 class BaseParameters:
-    """Independent columns of the regressor, and what the standard parameters add up to in them.
+    """Independent columns of the regressor, and the combinations of standard parameters that they multiply.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Physically consistent links behind identified base parameters: the nearest that some mass density could have.
+"""Physically consistent links behind identified base parameters: the nearest with a possible mass density.
 
 Every link's pseudo-inertia P (4, 4) has to be positive definite (Wensing, Kim, Slotine 2018). P is linear in phi, so
 the search is convex and its minimum global:
@@ -59,7 +59,7 @@ _TO_PHI = np.array([from_pseudo_inertia(unit.reshape(4, 4)) for unit in np.eye(1
 
 @dataclass(frozen=True, eq=False)
 class ConsistentInertia:
-    """Standard parameters that bodies can have.
+    """Standard parameters that are physically consistent.
 
     Parameters
     ----------
@@ -87,9 +87,9 @@ def consistent_inertia(
 ) -> ConsistentInertia:
     """Nearest physically consistent links to identified base parameters.
 
-    A ``beta`` that bodies can have is met to rounding; of all that have it, those nearest to the nominal are taken.
-    Else the misfit is the least to about 2 % if the nominal links are within a factor of ten of the true ones: the last
-    bit of it can often be had only with links that grow without end.
+    A physically possible ``beta`` is met to rounding; of all links that have it, the nearest to the nominal ones are
+    taken. Otherwise the misfit is within about 2 % of the least, if the nominal links are within a factor of ten of the
+    true ones: the least misfit often needs links that grow without end.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""Constants of drives that are identified beside the rest: a torque channel's gain, a servo's stiffness and damping.
+"""Identified constants of drives: a torque channel's gain, a servo's stiffness and damping.
 
-What was recorded is y, a current or a servo's error command - q; the torque that it stands for is y times a constant
-unknown. Fitted is the reading, so that noise stays where it is:
+The recording has y, a current or a servo's error command - q; the torque is y times an unknown constant. The fit
+predicts the reading, which carries the noise:
 
     y * nominal = (tau + damping * qd) * nominal / constant
 
@@ -39,8 +39,8 @@ _CONSTANT = {GAIN: "gain", SERVO: "stiffness"}
 def with_constants(
     model: Model, datasets: Sequence[xr.Dataset], n_train: int
 ) -> tuple[Model, list[xr.Dataset], tuple[str, ...]]:
-    """A model with its drives' constants among its effects, recordings in N·m or N, and notes; all as given where the
-    model has none.
+    """The model with its drives' constants among its effects, recordings in N·m or N, and notes; all unchanged where
+    the model has no free constant.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def settled(model: Model) -> Model:
 
 
 def notes_on(found: Fit) -> tuple[str, ...]:
-    """What each constant identified rests on, in words."""
+    """On what each identified constant depends, in words."""
     notes = []
     for slot, value, std in zip(found.assembly.slots, found.theta, found.std, strict=True):
         if slot.name != _CONSTANT.get(slot.effect):

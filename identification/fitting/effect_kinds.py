@@ -18,9 +18,8 @@ KINDS: dict[str, type[EffectPlace]] = {
 
 
 def effect_place(tree: Tree, placed: PlacedEffect, joint: int, speed_scale: float, early_alone: bool) -> EffectPlace:
-    """The place of an effect; arguments as `EffectPlace` has them.
+    """The place of an effect; arguments as of `EffectPlace`.
 
-    ``early_alone``: a late encoder makes its own torque channel early, and that alone.
-    """
+    ``early_alone``: a late encoder makes its own torque channel early, and no other."""
     encoder = placed.at.startswith("q.") and not early_alone
     return (EncoderPlace if encoder else KINDS[placed.effect.at])(tree, placed, joint, speed_scale)

@@ -56,9 +56,9 @@ def law_along(
 def passing(
     experiment: Experiment, effect: Effect, parameters: Array, by_value: Array | None, direction: slice
 ) -> Callable[[Array], Array]:
-    """What a sensor makes of columns (n, k) of its channel: a gain, or its impulse response.
+    """The map of columns (n, k) through a sensor: a gain, or its impulse response.
 
-    ``by_value`` (n, 1, 1) is the derivative of a stateless sensor's law by the true value; None: it passes it on.
+    ``by_value`` (n, 1, 1) is the derivative of a stateless sensor's law by the true value; None: a derivative of one.
     """
     segments = experiment.motion.segments
     if effect.states:
@@ -78,7 +78,7 @@ def impulse_response(effect: Effect, parameters: Array, period: float) -> Array:
 
 
 def causal(columns: Array, response: Array) -> Array:
-    """Columns (n, k) through a causal filter (m,) that has seen the first row for ever."""
+    """Columns (n, k) through a causal filter (m,), with the first row as its whole past."""
     count, before = len(columns), len(response) - 1
     seen = np.empty((columns.shape[1], before + count))
     seen[:, :before], seen[:, before:] = columns[:1].T, columns.T

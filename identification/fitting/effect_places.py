@@ -1,4 +1,4 @@
-"""Places of effects on any arm: what a law reads there along a recording, and how it reaches the torque channels.
+"""Places of effects on any arm: the signals that a law reads there, and the law's terms of the torque channels.
 
 Letters: n samples, J joints, m numbers that a law gives, p parameters of an effect. Places that only a suspension rig
 has are in `rig_places`.
@@ -38,7 +38,7 @@ class TorqueState(NamedTuple):
 
 
 class EffectTerms(NamedTuple):
-    """What one placed effect adds to the torque channels."""
+    """Terms of one placed effect in the torque channels."""
 
     terms: list[ChannelTerm]
     by_load: Array | None = None
@@ -75,15 +75,15 @@ class EffectPlace(ABC):
 
     @abstractmethod
     def spread(self, experiment: Experiment, values: Array, by_parameter: Array) -> list[ChannelTerm]:
-        """How what the law gives (n, m), and its derivative (n, m, p), reach the torque channels."""
+        """Terms of the torque channels from the law's values (n, m) and their derivative (n, m, p)."""
 
     def terms(self, along: TorqueState, parameters: Array, bare: bool = False) -> EffectTerms:
-        """What the effect adds with these parameters (p,); `law_along` says what ``bare`` leaves out."""
+        """The effect's terms at these parameters (p,); ``bare`` as of `law_along`."""
         law = law_along(along.experiment, self.placed.effect, self.signals(along), parameters, bare)
         return EffectTerms(self.spread(along.experiment, law.values, law.by_parameter), self.by_load(law))
 
     def by_load(self, law: LawEvaluation) -> Array | None:
-        """Derivative of the torque at the place by its load (n,); None where nothing follows it."""
+        """Derivative of the torque at the place by its load (n,); None where the law does not depend on the load."""
         return None
 
 
@@ -118,7 +118,7 @@ class JointPlace(EffectPlace):
         return found
 
     def spread(self, experiment: Experiment, values: Array, by_parameter: Array) -> list[ChannelTerm]:
-        """A torque is felt by virtual work; a change of motion moves every channel by the rigid body's derivative."""
+        """A torque acts by virtual work; a change of motion changes every channel by the rigid body's derivative."""
         if self.placed.effect.acts_on != "torque":
             return self.moved(experiment, values, by_parameter)
         here, torque, columns = self.where, values[:, 0], by_parameter[:, 0]
@@ -127,8 +127,8 @@ class JointPlace(EffectPlace):
         return [(int(c), here.along[c] * torque, here.along[c] * columns) for c in here.channels]
 
     def moved(self, experiment: Experiment, values: Array, by_parameter: Array) -> list[ChannelTerm]:
-        """What a change of the joint's position, rate and acceleration (n, 3) adds to every channel that feels it, to
-        first order; ``by_parameter`` (n, 3, p) is the change's derivative."""
+        """Terms of every channel that feels it by a change of the joint's position, rate and acceleration (n, 3), to
+        first order. ``by_parameter`` (n, 3, p) is the change's derivative."""
         by_position, by_rate = experiment.tangent
         terms = []
         for c in self.tree.coupled(self.joint):
@@ -137,14 +137,14 @@ class JointPlace(EffectPlace):
         return terms
 
     def by_load(self, law: LawEvaluation) -> Array | None:
-        """Of a torque, what the law says."""
+        """Of a torque, the derivative that the law gives."""
         if self.placed.effect.acts_on != "torque" or law.by_signal is None:
             return None
         return law.by_signal[:, 0, 0]
 
 
 class SensorPlace(JointPlace):
-    """A torque sensor; or the encoder of a single joint, which makes its own channel early, and that alone."""
+    """A torque sensor; or the encoder of a single joint, which makes its own channel early, and no other."""
 
     @property
     def where(self) -> Place:
@@ -157,7 +157,7 @@ class SensorPlace(JointPlace):
         return BACKWARD if self.placed.at.startswith("q.") else FORWARD
 
     def terms(self, along: TorqueState, parameters: Array, bare: bool = False) -> EffectTerms:
-        """How far the reading is off, and what the sensor does to columns of its channel."""
+        """The reading's error, and the map of its channel's columns through the sensor."""
         signals = self.signals(along)
         change, by, by_value = self.error(along, signals, signals["value"], parameters, bare)
         return self._told(along, [(self.joint, change, by)], parameters, by_value)
@@ -178,10 +178,9 @@ class SensorPlace(JointPlace):
 
 
 class EncoderPlace(SensorPlace):
-    """An encoder of a joint among others: its error moves every channel by the rigid body's derivative.
+    """An encoder of a joint among others: its error changes every channel by the rigid body's derivative.
 
-    What its own channel has beside the rigid body's load comes early as well.
-    """
+    The part of its own channel beside the rigid body's load is early as well."""
 
     apart = True
 
@@ -197,7 +196,7 @@ class EncoderPlace(SensorPlace):
 
 
 class LinkPlace(EffectPlace):
-    """A link: a change of its ten inertial parameters (m = 10), which its columns of the regressor take to torque."""
+    """A link: a change of its ten inertial parameters (m = 10); its columns of the regressor give the torque."""
 
     def signals(self, along: TorqueState) -> dict[str, Array]:
         """The link's inertial parameters (1, 10) and its far end (1, 3) [m], which no sample changes."""
@@ -229,5 +228,5 @@ class BasePlace(EffectPlace):
         return base_signals(along.experiment)
 
     def spread(self, experiment: Experiment, values: Array, by_parameter: Array) -> list[ChannelTerm]:
-        """What the effect gives to the base, nothing else has to supply."""
+        """The wrench that the effect gives to the base reduces the wrench that is needed from outside."""
         return [(c, -values[:, c], -by_parameter[:, c]) for c in rows(self.placed.effect)]

@@ -1,4 +1,4 @@
-"""A conditioned recording with everything the rigid body contributes worked out once."""
+"""A conditioned recording with the rigid body's terms, computed once."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -31,7 +31,8 @@ class Bridge:
     """Straight lines across runs of samples: the samples ``at`` (k,) lie the share ``part`` of the way from the samples
     ``before`` to the samples ``after``.
 
-    Linear, and the same for measured and modelled torque and every column, so that what they have in common stays.
+    A bridge is linear, and equal for measured torque, modelled torque and every column, so that their differences
+    remain exact.
     """
 
     at: NDArray[np.int_]
@@ -50,9 +51,9 @@ class Bridge:
 class Experiment:
     """Motion of one recording and the rigid body's share of its torque.
 
-    ``n`` samples, ``J`` joints, ``L`` links; ``tension`` holds what slings of a rig were measured to pull, each (n,)
-    [N]; ``impulse`` (n, 3) is the angular impulse that reaction wheels were told to give a floating base by then, in
-    its axes [N·m·s]; ``store`` keeps columns that do not change while a model is fitted.
+    ``n`` samples, ``J`` joints, ``L`` links; ``tension`` has the measured tension of each of a rig's slings (n,) [N].
+    ``impulse`` (n, 3) is the commanded angular impulse of reaction wheels on a floating base up to each sample, in its
+    axes [N·m·s]. ``store`` keeps columns that do not change while a model is fitted.
     """
 
     motion: Motion
@@ -81,7 +82,7 @@ class Experiment:
 
     @property
     def counted(self) -> Array:
-        """How many samples of the analysis band count, of each channel (J,)."""
+        """Number of samples of each channel that count in the analysis band (J,)."""
         return np.full(self.measured.shape[1], len(self.measured)) if self.kept is None else self.kept.sum(axis=0)
 
     def with_bridges(self, bridges: tuple[Bridge, ...], kept: NDArray[np.bool_] | None) -> "Experiment":
@@ -110,7 +111,7 @@ class Experiment:
 
     @cached_property
     def carried(self) -> Array:
-        """Torque that something else than the drives supplies (n, J) [N·m or N]: a rig's slings, a base's momentum."""
+        """Torque that is not supplied by the drives (n, J) [N·m or N]: of a rig's slings, of a base's momentum."""
         if self.whole:
             return self.whole.carried
         return self.body.tree.carried(self.body, self.motion.q, lambda: self.regressor, self.tension)
@@ -133,14 +134,14 @@ class Experiment:
 
 @dataclass(frozen=True)
 class Scales:
-    """What a joint does in the training recordings: peak speed, travel, peak torque; bounds and grids refer to them."""
+    """Peak speed, travel and peak torque of a joint in the training recordings; bounds and grids refer to them."""
 
     speed: float
     travel: float
     torque: float
 
     def of(self, kind: str) -> float:
-        """The scale a parameter's ``relative_to`` names."""
+        """The scale that a parameter's ``relative_to`` names."""
         return {
             "": 1.0,
             "speed": self.speed,
@@ -162,7 +163,7 @@ def load_experiments(
 ) -> list[Experiment]:
     """Read and condition recordings for a model; all in one analysis band, the narrowest that any of them carries.
 
-    With different sample rates that is about one band: each takes a whole number of its samples for one.
+    With different sample rates the bands differ a little: each recording is thinned by a whole number of samples.
 
     Parameters
     ----------
@@ -247,8 +248,8 @@ def _without_gaps_in(tensions: Mapping[str, Array], dataset: xr.Dataset) -> xr.D
 def with_silence(experiments: Sequence[Experiment]) -> list[Experiment]:
     """Recordings in which channels that read zero throughout have a floor of noise, a millionth of the largest torque.
 
-    Such a channel says nothing, and statistics of nothing do not exist: force on a base that floats in a plane, the
-    torque of an axis that no weight turns. It counts among `Motion.silent`, and a note says so.
+    Such a channel has no statistics: a force on a base that floats in a plane, the torque of an axis that no weight
+    turns. It counts among `Motion.silent`, and a note says so.
 
     Raises
     ------
@@ -280,8 +281,7 @@ def with_silence(experiments: Sequence[Experiment]) -> list[Experiment]:
 def scales(experiments: Sequence[Experiment]) -> Mapping[str, Scales]:
     """Peak speed, travel and peak torque of every joint and axis over all recordings; never zero.
 
-    Of a joint that nothing drives, the rigid body's peak torque stands for its own.
-    """
+    For a joint that nothing drives, the rigid body's peak torque replaces the measured one."""
     found = {}
     undriven = experiments[0].motion.undriven
     modelled = [e.modelled for e in experiments] if undriven else []

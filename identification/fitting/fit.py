@@ -30,7 +30,7 @@ PART = 1e-6
 
 @dataclass(frozen=True)
 class Fit:
-    """Where the fit ended.
+    """The result of a fit.
 
     Parameters
     ----------

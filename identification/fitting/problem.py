@@ -1,4 +1,4 @@
-"""A fit cut into the smallest problems that share no parameter, each with channels and parameters of its own.
+"""A fit, split into the smallest problems that share no parameter, each with its own channels and parameters.
 
 Friction of one joint says nothing about friction of another while the inertia is trusted: seven small problems settle
 each at its own pace, and none waits for, or is evaluated for, the slowest.
@@ -68,7 +68,7 @@ class Problem:
         return minimise_projected(self.objective(sigma), theta, self.shapes, tolerance=tolerance)
 
     def objective(self, sigma: Array) -> Objective:
-        """What is minimised, channels weighted by 1 / sigma (c,)."""
+        """The objective, with channels weighted by 1 / sigma (c,)."""
         return Objective(lambda x: self.normal(x, sigma), self.assembly.low, self.assembly.high)
 
     def channel_fits(self, experiment: Experiment, theta: Array) -> Iterator[tuple[Array, Index, Array]]:

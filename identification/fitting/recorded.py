@@ -1,4 +1,4 @@
-"""Recordings read once for all that looks at them, and the joints that none of them has, held."""
+"""Recordings, read once for checks and fits; joints that no recording has are held."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -16,17 +16,17 @@ from ...recordings.signals import Signal, default_unit, joint_of
 
 
 def read_all(model: Model, paths: Sequence[str | Path]) -> list[xr.Dataset]:
-    """Every recording as one of the model's joints; raises InputError for whatever is wrong with one."""
+    """Every recording, with the model's joints; raises InputError for one that cannot be used."""
     return [model.cuts(_with_servos(_of_joints(model, path, model.signals), model)) for path in paths]
 
 
 def read_motion(model: Model, path: str | Path) -> xr.Dataset:
-    """A recording of which only the motion counts: its torques need not be there."""
+    """A recording of which only the motion is used: it needs no torques."""
     return _of_joints(model, path, motion_signals(model))
 
 
 def motion_signals(model: Model) -> dict[str, Signal]:
-    """A model's [signals] but for torques, which a motion that is only followed need not have."""
+    """A model's [signals] without the torques, which a motion that is only followed does not need."""
     return {name: signal for name, signal in model.signals.items() if not name.startswith("tau.")}
 
 
@@ -61,7 +61,7 @@ def with_recorded_joints(model: Model, datasets: Sequence[xr.Dataset]) -> Model:
     """The model with joints that no recording has held at zero, and a note that names them.
 
     Only for an arm whose file does not say itself which joints move. Where a recording has a joint that the URDF has
-    not, a name may be misspelt: nothing is held then, and the missing signal is asked for as ever.
+    not, a name may be misspelt: then nothing is held, and the missing signal is an error.
 
     Raises
     ------

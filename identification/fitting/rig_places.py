@@ -22,7 +22,7 @@ PLACES = ("sling", "slide", "boom")
 
 
 class RigPlace(EffectPlace):
-    """A place whose numbers the rig's geometry takes to the torque of every joint that they can reach."""
+    """A place of a rig; the rig's geometry gives the torque of its law at every joint."""
 
     @property
     def rig(self) -> Rig:

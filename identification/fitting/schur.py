@@ -10,7 +10,7 @@ Array = NDArray[np.float64]
 def schur(matrix: Array, score: Array, before: int) -> tuple[Array, Array]:
     """Curvature and score of the last columns with the ``before`` first ones free: a Schur complement.
 
-    Directions of the first that the recordings do not tell from nothing are left out: what they add is rounding.
+    Directions of the first unknowns that the recordings do not determine are left out: they would add rounding only.
     The curvature returned is positive semidefinite, whatever the rounding.
     """
     scale = np.sqrt(np.maximum(np.diag(matrix)[:before], np.finfo(float).tiny))

@@ -1,1 +1,1 @@
-"""Drives with an encoder on either side: what lies between motor and link."""
+"""Joints with a motor encoder and a link encoder: the differences between the two."""

@@ -1,4 +1,4 @@
-"""What the link-side encoders say, in words and numbers, and one answer out of that and what the torques say."""
+"""The diagnosis of link encoders in words and numbers, and one answer with the diagnosis of the torques."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -49,7 +49,7 @@ def with_links(diagnosis: Diagnosis, model: Model, one: EncoderComparison) -> tu
         spoken_of = _foremost(fits).channel if first else spoken_of
         said = _sentence(moving, offsets, fits)
         if diagnosis.verdict == "adequate":
-            sentences = ["The torques ask for nothing that these recordings can show."]
+            sentences = ["The torques show nothing that the model leaves out."]
         sentences = [said, *sentences] if first else [*sentences, said]
     elif decided.left and both == "unknown_effect":
         description = "; ".join(filter(None, [description, nameless(one)]))
@@ -114,7 +114,7 @@ def _sentence(moving: Sequence[Finding], offsets: Sequence[Finding], fits: Seque
     worst = _foremost(fits)
     before, after = (length(x, worst.unit) for x in (worst.holdout.rms_before, worst.holdout.rms_after))
     return (
-        f"{said} With that added, the difference left on {worst.channel}, on the held-out recording, "
+        f"{said} With that added, the remaining difference of {worst.channel} on the held-out recording "
         f"falls from {before} to {after}."
     )
 

@@ -1,4 +1,4 @@
-"""Diagnosis of link-side encoders beside the torques': what motor and link encoder of each joint differ by."""
+"""Diagnosis of link encoders beside that of the torques: what makes motor and link encoder of each joint differ."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

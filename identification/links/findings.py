@@ -31,7 +31,7 @@ def unit_of(links: Links, c: int) -> str:
 
 
 def findings_of(one: EncoderComparison) -> tuple[Finding, ...]:
-    """What the held-out recordings miss most goes first; what adds the same at all times goes last."""
+    """Findings in order of held-out loss, the largest first; a constant difference comes last."""
     links, best = one.links, one.decided.best
     values = estimates(links, one.decided.given, best.train, covariances(one.decided.found.weighed))
     order = sorted(best.names, key=lambda n: (links.still(n.placed), -best.missed[n.placed.key].gain))
@@ -53,9 +53,9 @@ def _finding(one: EncoderComparison, n: Naming, values: dict[str, Estimate]) -> 
         values = {name: replace(estimate, std=spread / np.sqrt(len(own)))}
         without, within = (float(np.sqrt(within**2 + np.mean((zeros + x) ** 2))) for x in (estimate.value, 0.0))
         text += (
-            f"in every recording the link encoder's zero stands off the motor's by the same "
-            f"{length(estimate.value, unit)}; without it the held-out recording is missed by {length(without, unit)}, "
-            f"with it by {length(within, unit)}. It explains nothing that moves."
+            f"in every recording the link encoder's zero differs from the motor encoder's by "
+            f"{length(estimate.value, unit)}. Without it, the difference on the held-out recording is "
+            f"{length(without, unit)}, with it {length(within, unit)}. It explains no motion."
         )
     else:
         share = max(0.0, 1 - (within / max(without, 1e-300)) ** 2)
@@ -98,18 +98,18 @@ def noise_floor(links: Links, c: int) -> float:
 
 
 def nameless(one: EncoderComparison) -> str:
-    """What has no name, in words; empty where there is nothing."""
+    """Nameless curves in words; empty if there are none."""
     after = rms(one.decided.best.train)
     return "; ".join(
         f"on {one.links.channels[r.channel]}, a smooth curve over {r.over} still explains {percent(r.explained)} of "
-        f"what is left between the encoders "
+        f"the remaining difference between the encoders "
         f"({length(float(np.sqrt(r.explained) * after[r.channel]), unit_of(one.links, r.channel))})"
         for r in one.decided.left
     )
 
 
 def traces_of(one: EncoderComparison) -> list[Trace]:
-    """How the encoders differ over time, measured, as given and after: for pictures."""
+    """Difference of the encoders over time, measured, by the model as given and by the final one: for pictures."""
     links, decided = one.links, one.decided
     sets: tuple[tuple[Literal["train", "holdout"], Sequence[int], Linearisation, Linearisation], ...] = (
         ("train", links.train, decided.found.first, decided.best.train),

@@ -1,4 +1,4 @@
-"""A second, link-side encoder: how it differs from the motor's, modelled along the recorded motion.
+"""A link encoder's difference from the motor encoder, modelled along the recorded motion.
 
 What the two encoders of a joint differ by, channel ``q_link.<joint>`` less ``q.<joint>``, is a measurement of its own,
 far finer than either position::

@@ -1,4 +1,4 @@
-"""Motor and link encoders behind the one interface: each joint with both is a channel, what they differ by.
+"""Motor and link encoders as a source: the difference of the two encoders of a joint is a channel.
 
 The shifts are the encoders' zeros, one for each recording and joint: encoders may be referenced anew, and a zero
 explains no motion. How far they go is known to a share that the evidence chooses: a zero that every recording has is a
@@ -147,8 +147,7 @@ class Links:
     def library(self, placed: Sequence[PlacedEffect]) -> list[PlacedEffect]:
         """Sensors' faults of the link's encoder, of the motor's where time tells the two apart; twists of the drive.
 
-        Of one that either may have, a second, of the other encoder, is an alias of the first.
-        """
+        A fault that either encoder may have is listed for one of them: for the other it is an alias."""
         have = {(p.effect.name, self.channel(p)) for p in placed}
         found = []
         for c, joint in enumerate(self.joints):
@@ -160,7 +159,7 @@ class Links:
         return found
 
     def still(self, p: PlacedEffect) -> bool:
-        """Does an effect add the same at all times?"""
+        """Whether an effect is constant in time."""
         return not p.effect.states and all(np.ptp(self.term(i, p, np.ones(1))[0]) < 1e-9 for i in self.train)
 
     def variants(self, p: PlacedEffect) -> list[GridPoint]:

@@ -1,4 +1,4 @@
-"""Vibration that comes and goes: a residual far stronger at some times than its own noise is at most others.
+"""Vibration that comes and goes: a residual that is far stronger at some times than its noise is at most other times.
 
 What a model leaves out goes with a state of the arm; a disturbance or a noise is as strong at one time as at another.
 What does neither has no law in the joint's own motion to be named by: how much, when, and how fast is all there is to
@@ -26,8 +26,9 @@ LEAST = 0.25
 
 @dataclass(frozen=True)
 class ChannelResidual:
-    """What is left of one channel of one recording: residual (n,) [T], its part of e' K⁻¹ e (n,), whether a sample is
-    far from rest (n,), period [s]."""
+    """The remaining residual of one channel of one recording (n,) [T], its part of e' K⁻¹ e (n,), whether a sample is
+    far from rest (n,), and the period [s].
+    """
 
     residual: Array
     energy: Array
@@ -48,8 +49,8 @@ class Bursts:
 def bursts(channel: Sequence[ChannelResidual]) -> Bursts | None:
     """Whether one channel's residual comes in bursts: `BURST_SHARE` of it above `BURST_LOUD` times the median window.
 
-    A window counts by the time in motion in it. It comes again if as much is left without the loudest window: what was
-    there once, as a knock is, could not be held to any law of the arm's.
+    A window is weighted by its time in motion. A burst recurs if as much is left without the loudest window: what
+    occurs once, as a knock does, follows no law of the arm.
     """
     strength, weight, parts = [], [], []
     for own in channel:

@@ -118,7 +118,7 @@ class Covariance:
 
     @property
     def variance(self) -> Array:
-        """Of what is independent from sample to sample (n,)."""
+        """Variance of the part that is independent from sample to sample (n,)."""
         return self._variance
 
     @property
@@ -162,8 +162,8 @@ class Covariance:
     def white(self, x: Array) -> Array:
         """Columns x (n, k) made white, so that white(x)' white(y) = x' K⁻¹ y: `solve` at half its cost for many.
 
-        What each sample has that those before it do not predict, in units of its deviation (a Kalman filter's
-        innovations; Durbin and Koopman 2012, chapter 4). All columns go through one pass.
+        A white sample is an innovation of a Kalman filter in units of its deviation: the part that the samples before
+        it do not predict (Durbin and Koopman 2012, chapter 4). All columns go through one pass.
         """
         return np.concatenate(list(self.white_by_rows([x])))
 

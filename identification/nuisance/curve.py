@@ -1,4 +1,4 @@
-"""A nameless curve over one or two coordinates of a joint: what a law without a name looks like.
+"""A nameless curve over one or two coordinates of a joint.
 
 A Gaussian process with the squared-exponential kernel in the Hilbert-space basis of Solin and Särkkä (2020): sines over
 the coordinate's range, weighted by the kernel's spectral density at their frequency, so that the curve has unit
@@ -46,7 +46,7 @@ class Coordinates:
 
     @staticmethod
     def of(experiment: Experiment, state: TorqueEvaluation, joint: int, peak: float, travel: float) -> "Coordinates":
-        """Of a joint with its peak speed and travel over the training recordings."""
+        """Coordinates of a joint, with its peak speed and travel over the training recordings."""
         return Coordinates.along(experiment.motion, state.load[:, joint], joint, peak, travel)
 
     @staticmethod
@@ -82,7 +82,7 @@ def _since_turning(speed: Array, segments: Sequence[slice], period: float) -> Ar
 
 @dataclass(frozen=True)
 class NuisanceCurve:
-    """One member of the family: what it runs over in words, and its columns (n, k) along a recording."""
+    """One curve of the family: its coordinates in words, and its columns (n, k) along a recording."""
 
     words: str
     columns: Callable[[Coordinates], Array]

@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 
 def encoder_noise(experiment: Experiment, channel: int) -> Array:
-    """Standard deviation of what the encoders' noise makes of a channel in the analysis band (n_band,) [N·m or N]."""
+    """Standard deviation of the encoders' noise in a torque channel, in the analysis band (n_band,) [N·m or N]."""
     motion = experiment.motion
     torque = experiment.mass_matrix[:, channel, :] * motion.encoder_noise[2]
     return np.sqrt(np.maximum(motion.to_band(np.sum(torque**2, axis=1)), 0.0))

@@ -1,4 +1,4 @@
-"""The noise of one channel: white, coloured, wandering, of the encoders, and what a joint holds near rest.
+"""The noise of one channel: white, coloured, wandering, of the encoders, and of sticking near rest.
 
     K = w² I + a² e^(-|d|/τa) + v² e^(-|d|/τv) + encoders + s F (I + e^(-|d|/τh)) s F + diag((s' g)²)
 
@@ -46,7 +46,7 @@ class NoiseChannel:
     level: float
 
     def some(self, rows: slice) -> "NoiseChannel":
-        """The first samples of it."""
+        """The first samples of this channel."""
         inside = tuple(slice(s.start, min(s.stop, rows.stop)) for s in self.segments if s.start < rows.stop)
         sticks = tuple(x[rows] for x in self.sticks)
         return NoiseChannel(self.step, inside, self.encoder[rows], sticks, self.settles[rows], self.level)
@@ -69,7 +69,7 @@ class Noise:
 
     @property
     def log_prior(self) -> float:
-        """Of its wander, which has prior odds as whatever else has no name."""
+        """Log prior of its wander, which has the prior odds of nameless physics."""
         return float(np.log(ODDS_OF_CURVES)) - WANDER_PRIOR * self.wander / self.unit if self.wander else 0.0
 
     def covariance(self, run: NoiseChannel) -> Covariance:

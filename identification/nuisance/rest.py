@@ -1,4 +1,4 @@
-"""Sticking: near rest a joint holds whatever torque it is given, up to its level, and no law of speed says how much.
+"""Sticking: near rest a joint holds any torque up to its level, and no law of speed predicts which.
 
 A sign that is sampled, or rounded over a small speed, says it wrong, and so does any law of what moves. There the
 torque is free: a sample of which the share s stands near rest has, beside all else, the variance (s F)², F the level
@@ -30,7 +30,7 @@ SETTLES = Zone(*deciding.SETTLES)
 
 
 def share(motion: Motion, joint: int, zone: Zone, peak: float, travel: float) -> Array:
-    """How much of each sample in the analysis band stands near rest (n_band,), 0 to 1.
+    """Share of each sample in the analysis band that is near rest (n_band,), 0 to 1.
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ def answer(diagnosis: Diagnosis, origin: Provenance) -> tuple[str, str, str]:
     alike = _alike(diagnosis)
     content += f"<h3>What could not be told apart</h3>\n{alike}" if diagnosis.effects else ""
     content += f"<h3>What to do next</h3>\n{_next(diagnosis)}"
-    content += f"<h3>What this stands on</h3>\n{origin.markup()}"
+    content += f"<h3>Files and versions</h3>\n{origin.markup()}"
     return "answer", "The answer", content
 
 
@@ -64,7 +64,7 @@ def _values(finding: Finding) -> str:
 def _alike(diagnosis: Diagnosis) -> str:
     pairs = indistinguishable(diagnosis.effects)
     if not pairs:
-        return paragraph("Every name was told apart from its rivals by these recordings.")
+        return paragraph("These recordings separate every name from its rivals.")
     lines = [f"{words(finding.name)} at {finding.at}, or {rival}" for finding, rival, _ in pairs]
     return "".join(map(paragraph, _first(lines, _FEW)))
 
@@ -88,9 +88,9 @@ def _next(diagnosis: Diagnosis) -> str:
         {
             "missing_physics": "Take the improved model (--save-model) and diagnose it on a third recording: is it "
             "adequate there as well?",
-            "data_fault": "Mend what the checks below say, and diagnose again.",
+            "data_fault": "Correct what the checks below name, and diagnose again.",
             "adequate": "Nothing, unless an effect smaller than the limits of detection below would matter.",
-            "unknown_effect": "Look at the channel, the times and the states below, and record the same motion again: "
-            "does it come back?",
+            "unknown_effect": "Look at the channel, the times and the states below, and record that motion again: "
+            "does the residual recur?",
         }[diagnosis.verdict]
     )

@@ -75,7 +75,7 @@ def checked(diagnosis: Diagnosis) -> tuple[str, str, str]:
         for check in diagnosis.checks
     ]
     heads = ["Check", "At", "Probability", "What", "Line that mends it"]
-    return "checks", "Is the data sound?", table("What is not as it should be", heads, rows, (2,))
+    return "checks", "Is the data sound?", table("Findings of the check", heads, rows, (2,))
 
 
 def where(diagnosis: Diagnosis) -> tuple[str, str, str]:
@@ -91,7 +91,7 @@ def where(diagnosis: Diagnosis) -> tuple[str, str, str]:
         ]
         for place in diagnosis.location
     ]
-    content = table("Residual of the model as it was", ["Channel", "Share of all", "When", "In which state"], rows)
+    content = table("Residual of the model as given", ["Channel", "Share of all", "When", "In which state"], rows)
     seen: dict[str, Trace] = {}
     for trace in diagnosis.traces:
         if trace.role == "train":
@@ -104,7 +104,7 @@ def where(diagnosis: Diagnosis) -> tuple[str, str, str]:
             residual_over_time(first, diagnosis.location),
             "Residual before over time, with the table's windows shaded: "
             f"{', '.join(trace.channel for trace in first)}.",
-            "Measurement minus the model as it was. Shaded: the time windows of the table.",
+            "Measurement minus the model as given. Shaded: the time windows of the table.",
             zoom=_zoomable(first, diagnosis.location),
         )
     return "where", "Where", content
@@ -127,7 +127,7 @@ def _zoomable(traces: Sequence[Trace], places: Sequence[Location]) -> str:
 def detection_limits(diagnosis: Diagnosis) -> str:
     """The smallest size of each effect, at the place where it would have shown best and worst."""
     if not diagnosis.limits:
-        return paragraph("No limits of detection were worked out for these recordings.")
+        return paragraph("No limits of detection were computed for these recordings.")
     kinds: dict[tuple[str, str, str], list[Limit]] = {}
     for limit in diagnosis.limits:
         kinds.setdefault((limit.name, limit.parameter, limit.unit), []).append(limit)
@@ -136,7 +136,7 @@ def detection_limits(diagnosis: Diagnosis) -> str:
         ordered = sorted(limits, key=lambda x: x.value)
         ends = [f"{number(x.value)} {unit_words(unit)} at {x.at}".replace("  ", " ") for x in (ordered[0], ordered[-1])]
         rows.append([escape(words(name)), escape(words(parameter)), *(escape(end) for end in ends)])
-    text = "An effect smaller than this would not have stood out of these recordings."
+    text = "These recordings would not show an effect smaller than this."
     return paragraph(text) + table("Limits of detection", ["Effect", "Parameter", "Best seen", "Worst seen"], rows)
 
 

@@ -92,7 +92,7 @@ def screened(diagnosis: Diagnosis) -> tuple[str, str, str]:
     rows = diagnosis.candidates
     heading = "What each candidate explains by itself"
     if not rows:
-        return "candidates", heading, paragraph("No candidate was tried: nothing in the residual asked for one.")
+        return "candidates", heading, paragraph("No candidate was tried: the residual gave no reason for one.")
     top = sorted(rows, key=lambda row: -row.explained)[:_TOP]
     named = ", ".join(f"{words(row.name)} at {row.at}" for row in top if row.named)
     content = figure(
@@ -141,8 +141,7 @@ def parameters(diagnosis: Diagnosis) -> tuple[str, str, str]:
         )
     heads = ["Parameter", "Before", "After", "Std", "Unit", ""]
     lead = (
-        "A parameter that moves had been standing in for the missing physics. Marked: moved by more than two standard "
-        "deviations."
+        "A parameter that moves had imitated the missing physics. Marked: moved by more than two standard deviations."
     )
     return "parameters", heading, paragraph(lead) + table("Baseline parameters", heads, rows, (1, 2, 3), False)
 
@@ -154,7 +153,7 @@ def notes(diagnosis: Diagnosis) -> tuple[str, str, str]:
     if diagnosis.verdict != "adequate":
         limits = detection_limits(diagnosis)
         content += folded("The smallest effects that would have been seen", limits) if diagnosis.limits else limits
-    return "notes", "Notes", content or paragraph("Nothing to remark on the conditioning or excitation.")
+    return "notes", "Notes", content or paragraph("No remarks on conditioning or excitation.")
 
 
 _ROLE = {"train": "training", "holdout": "held-out"}

@@ -65,7 +65,7 @@ class EffectVariant:
 
 
 def library(model: Model) -> list[PlacedEffect]:
-    """Every effect at every place that the model does not have yet and its kind of inertia leaves room for."""
+    """Every effect at every place that the model does not have and that its kind of inertia allows."""
     have = {p.key for p in model.effects}
     if f"{SLIDE}.{model.joints[0]}" in have:
         # The first joint's slides act on it alone, so that the same law at the joint is the same column.
@@ -131,7 +131,7 @@ def _with_zeros(parameters: Array, where: list[int]) -> Array:
 def candidate_columns(
     assembly: TorqueModel, experiment: Experiment, state: TorqueEvaluation, variant: EffectVariant
 ) -> list[tuple[int, Array]]:
-    """What a variant adds to each channel it reaches, in the analysis band: (channel, (n_band, k))."""
+    """Columns that a variant adds to each channel that it reaches, in the analysis band: (channel, (n_band, k))."""
     placed = variant.placed
     effect = placed.effect
     key = None

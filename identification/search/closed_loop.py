@@ -1,10 +1,10 @@
 """The instrument motion: the measured motion, low-passed to the band that the servo and not a disturbance drove.
 
-In closed loop a torque that nobody modelled moves a light joint, and the measured acceleration then carries the very
-disturbance that stands in the torque; on a heavy one, encoder noise does the same. Least squares reads either as
-inertia, delay or elasticity (Gautier, Janot, Vandanjon 2013; the endogeneity of Brunot et al.). The cure here is an
-instrument that needs no reference signal: each joint's motion is low-passed to the band in which what the model
-cannot explain is no more than a small share of it.
+In closed loop an unmodelled torque moves a light joint, and the measured acceleration then contains the disturbance of
+the torque; on a heavy joint, encoder noise has this effect. Least squares reads either as inertia, delay or elasticity
+(Gautier, Janot, Vandanjon 2013; the endogeneity of Brunot et al.). The cure here is an instrument that needs no
+reference signal: each joint's motion is low-passed to the band in which what the model cannot explain is no more than a
+small share of it.
 """
 
 from collections.abc import Sequence
@@ -37,7 +37,7 @@ def planned(
     others: Sequence[Experiment] = (),
     driven: float,
 ) -> list[Experiment]:
-    """The experiments with every joint's motion low-passed to what was asked of it; torques stay as they are.
+    """The experiments along the instrument motion of every joint; torques are unchanged.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Smooth curves: what a channel's residual could run over.
+"""Smooth curves over which a channel's residual may run.
 
 A curve is a sum of hat functions with its knots at even steps over the range that all recordings travel together.
 """

@@ -1,4 +1,4 @@
-"""Where the misfit stands: which channel, when, and in which state of motion."""
+"""Where the misfit lies: which channel, when, and in which condition of motion."""
 
 from collections.abc import Sequence
 
@@ -22,7 +22,7 @@ MOST_WINDOWS = 6
 
 
 def locate(experiments: Sequence[Experiment], explained: Sequence[Array]) -> tuple[Location, ...]:
-    """Channels by their share of the misfit, with time windows of the first recording, and a state of motion.
+    """Channels by their share of the misfit, with time windows of the first recording, and a condition of motion.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The next experiment: a motion that parts what the recordings so far cannot part.
+"""The next experiment: a motion that separates rivals which the recordings do not separate.
 
 T-optimality (Atkinson and Fedorov 1975): of two rivals A and B, both fitted to what there is, the best motion is the
 one along which A's torque stays furthest from B's after B has fitted itself to it. Motions are finite Fourier series
@@ -87,7 +87,7 @@ def next_experiment(
     progress: Callable[[str], None] = lambda _: None,
     seed: int = 0,
 ) -> NextExperiment | None:
-    """Design the motion that best parts the effects named from their rivals; None where no rival is left.
+    """Plan the motion that best separates the named effects from their rivals; None where no rival remains.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ def next_experiment(
 
 
 def rivals(model: Model, diagnosis: Diagnosis) -> list[tuple[PlacedEffect, PlacedEffect]]:
-    """Effects named and what rivals each: those that the data cannot part; where they part all, the likeliest."""
+    """Named effects with their inseparable rivals; if there are none, with the likeliest rival."""
     open_, likely = [], []
     for finding in diagnosis.effects:
         if finding.at.startswith("q_link."):

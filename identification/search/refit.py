@@ -1,4 +1,4 @@
-"""A model fitted again, with something more or something less, from where it was."""
+"""A model fitted again with more or fewer effects, from its last fit."""
 
 from collections.abc import Mapping, Sequence
 
@@ -24,9 +24,10 @@ def assemble(model: Model, base: BaseParameters | None, scales: Mapping[str, Sca
 
 
 def refitted(before: Fit, assembly: TorqueModel, samples: Sequence[Experiment], everywhere: bool, seed: int) -> Fit:
-    """The fit of a model that has something more; from many starts if it was to be, or if one ended badly.
+    """The fit of a model with more effects; from many starts if that is asked for, or if the fit ended in a bad
+    optimum.
 
-    What it had before is a special case of it, so that it leaves no more, unless it ended in a bad optimum.
+    The model before is a special case, so that the new fit leaves no larger residual, unless it ended in a bad optimum.
     """
     found = fit(assembly, samples, start=carry(before, assembly), multi_start=everywhere, seed=seed)
     if everywhere or not _worse(found, before, samples):
@@ -41,13 +42,13 @@ def _worse(found: Fit, case: Fit, samples: Sequence[Experiment]) -> bool:
 
 
 def carry(found: Fit, assembly: TorqueModel) -> Array:
-    """A fit's parameters in another assembly's order; what is new there starts where that assembly says."""
+    """A fit's parameters in another assembly's order; new parameters start where that assembly says."""
     known = {s.key: v for s, v in zip(found.assembly.slots, found.theta, strict=True)}
     return np.array([known.get(s.key, s.start) for s in assembly.slots])
 
 
 def without(found: Fit, keys: Sequence[str], experiments: Sequence[Experiment], case: Fit) -> Fit:
-    """The fit of the same model with some effects taken out of it, from where it was.
+    """The fit of a model without some of its effects, from its last fit.
 
     ``case`` is the fit of a special case of what is left: where that leaves less, from there and from many starts.
     """

@@ -1,8 +1,8 @@
-"""Samples at which a joint may stick, and what a model is fitted to without them.
+"""Samples at which a joint may stick, and the samples to which a model is fitted without them.
 
-A joint at rest holds whatever torque it is given, up to its level: no law of speed says how much, and a sign that is
-sampled, or rounded over a small speed as simulators do, says it wrong. Nothing is fitted to that, unless a law says
-what happens there.
+A joint at rest holds any torque up to its level. No law of speed predicts which; a sign that is sampled, or rounded
+over a small speed as in simulators, predicts it wrongly. Nothing is fitted to such samples, unless a law describes
+friction near rest.
 """
 
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ of a speed is rounded, and friction falls short of any such law."""
 def slow(experiment: Experiment, joint: int, share: float = REST) -> Mask:
     """Samples at which a joint is near rest (n,), with those that differentiation mixes with them.
 
-    Near rest is below a ``share`` of its peak speed; with none, nothing is.
+    Near rest is below a ``share`` of the joint's peak speed; without a share, no sample is near rest.
 
     A floating base is never at rest. On a suspension, which never hangs quite still, friction lets go of what it holds,
     and the joints that stand feel what the others do to the slings: there, every sample counts.
@@ -77,7 +77,7 @@ def _bridge(experiment: Experiment, rest: Mask) -> Bridge:
 
 
 def fitted(assembly: TorqueModel, experiments: Sequence[Experiment]) -> list[Experiment]:
-    """What a model is fitted to: samples near rest count where it has a law for what happens there."""
+    """The samples to which a model is fitted: those near rest count where the model has a law for them."""
     whole = {assembly.joint_of(p) for p in assembly.placed if p.effect.at_rest}
     creeping = {assembly.joint_of(p) for p in assembly.placed if p.effect.exceeds_at_rest}
     joints = range(len(assembly.tree.joints))

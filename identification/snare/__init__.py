@@ -1,1 +1,1 @@
-"""Capture recordings: effects of the snare by simulation in the loop."""
+"""Captures: effects of the snare, with simulation in the loop."""

@@ -1,4 +1,4 @@
-"""What a search found in captures, in words and numbers: the `Diagnosis` that JSON, report and tests share."""
+"""The search's findings in captures, in words and numbers: the `Diagnosis` that JSON, report and tests share."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -25,7 +25,7 @@ from ..diagnosis import (
 )
 from ..reliability import probability as reliability
 from ..verdict import verdict
-from ..wording import experiment_sentence, foremost, named
+from ..wording import experiment_sentence, foremost, named, rejection
 from .channels import channel_errors, channels, modelled
 from .comparison import QUARTER, SLOW, variances
 from .fit import CaptureFit, spread
@@ -74,13 +74,10 @@ def report_on(
     unexplained = () if findings else _unexplained(fits)
     description = _unexplained_words(unexplained)
     notes = [f"{Path(c.path).name}: {note}" for c in (*train, *locked) for note in c.notes]
-    notes += [
-        f"{p.effect.name} at {p.at} passed on the captures fitted but made the held-out one hardly better: not named"
-        for p in found.rejected
-    ]
+    notes += [rejection(p) for p in found.rejected]
     notes += [
         "positions and forces are compared as means over 0.25 s, and the force's chatter by its size: "
-        "how cables chatter on the pin depends on everything",
+        "how cables chatter on the pin depends on every detail",
         f"{runs} captures were simulated in {seconds:.0f} s",
     ]
     keys = {n.trial.placed.key for n in found.named}
@@ -187,7 +184,7 @@ def _unexplained_words(channels: Sequence[ChannelFit]) -> str:
     if not channels:
         return ""
     sizes = " and ".join(f"{_size(f.train.rms_after, 'm')} of {f.channel}" for f in channels)
-    return f"{sizes} are left that no effect of a capture explains: check the set-up's sizes and masses"
+    return f"{sizes} remain that no effect of a capture explains: check the set-up's sizes and masses"
 
 
 def _foremost(findings: Sequence[Finding], fits: Sequence[ChannelFit]) -> ChannelFit:
@@ -208,7 +205,7 @@ def _sentence(findings: Sequence[Finding], fits: Sequence[ChannelFit], descripti
     if description:
         return f"Something is missing that no effect of the vocabulary explains: {description}."
     return (
-        "The model is adequate: nothing is left out that these captures can show. On the held-out capture, "
+        "The model is adequate: these captures show nothing that it leaves out. On the held-out capture, "
         f"the error of {worst.channel} is {_size(worst.holdout.rms_before, worst.unit)}."
     )
 
@@ -216,7 +213,7 @@ def _sentence(findings: Sequence[Finding], fits: Sequence[ChannelFit], descripti
 def _corrected(numbers: Sequence[str]) -> str:
     if not numbers:
         return ""
-    return f" Numbers of the set-up that the model file does not give are better taken as {', '.join(numbers)}."
+    return f" Numbers of the set-up that the model file does not give fit better as {', '.join(numbers)}."
 
 
 def _relative(captures: Sequence[CaptureRecording], found: CaptureFit) -> float:

@@ -1,4 +1,4 @@
-"""What a simulated capture is compared by, and how likely the recording is by it.
+"""How a simulated capture is compared with a recording, and the likelihood of that recording.
 
 What is compared comes in blocks: position and force averaged over a quarter of a second, and the logarithm of the
 force's chatter over half a second (RMS of its 50 ms means about those averages). A block's scale is not known
@@ -7,7 +7,8 @@ log-likelihood is, up to a constant (Beck and Arnold 1977),
 
     L = −½ Σ_b n_b ln(RSS_b/n_b + f_b²),
 
-f_b the least that sensors scatter and engines differ by. n_b counts what is news: neighbours in time miss alike.
+f_b the least that sensors scatter and engines differ by. n_b counts independent numbers: neighbours in time have
+similar errors.
 """
 
 from collections.abc import Mapping, Sequence
@@ -44,7 +45,7 @@ def slow_means(x: Array) -> Array:
 
 
 def blocks(capture: CaptureRecording, track: Track) -> dict[str, Array]:
-    """What a track is compared by."""
+    """The blocks of a track that are compared."""
     found = {"position": slow_means(track.position)}
     if capture.setup.target.rotates:
         start = Rotation.from_quat(capture.setup.target.orientation, scalar_first=True).inv()
@@ -97,5 +98,5 @@ def likelihood(captures: Sequence[CaptureRecording], residuals: Sequence[Blocks]
 
 
 def price(residuals: Sequence[Blocks]) -> float:
-    """What a parameter costs of L: ½ ln of the numbers that count (Schwarz 1978)."""
+    """Price of a parameter in L: ½ ln of the independent numbers (Schwarz 1978)."""
     return float(0.5 * np.log(NEWS * sum(x.size for own in residuals for x in own.values())))

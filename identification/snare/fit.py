@@ -34,7 +34,7 @@ SETTLED = 0.3
 
 @dataclass(frozen=True)
 class CaptureFit:
-    """Effects, their handles x (P,), and how a set of captures is told with them.
+    """Effects, their handles x (P,), and the likelihood of a set of captures with them.
 
     ``likelihood`` is L, −inf where a capture cannot be simulated; ``tracks`` and ``residuals`` are then empty.
     ``residuals`` holds each capture's blocks by name, ``slopes`` the derivatives of these by each handle: P tuples of
@@ -114,7 +114,7 @@ def step_from(captures: Sequence[CaptureRecording], at: CaptureFit, stride: Arra
 
 
 def fit(captures: CaptureSet, start: CaptureFit, most: int = 4) -> CaptureFit:
-    """Climb L from a start.
+    """Maximise L from a start.
 
     Derivatives are taken once, where the start has none, and then follow the steps by Broyden's update (1965).
 

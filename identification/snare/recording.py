@@ -1,8 +1,8 @@
-"""A capture test as recorded, brought to what a simulation of it can be compared with.
+"""A capture test as means over 50 ms, which a simulation can be compared with.
 
 Letters: K times 50 ms apart from the start; a `Track` is what is seen at them. Positions are means over 50 ms about
-each time, forces means over the 50 ms before it: how cables chatter on the pin depends on everything, what they push on
-average does not. Forces are tared: their mean over the first half second, snare open, is taken off.
+each time, forces means over the 50 ms before it: how cables chatter on the pin depends on every detail, their mean
+force does not. Forces are tared: their mean over the first half second, with the snare open, is subtracted.
 """
 
 from collections.abc import Mapping, Sequence
@@ -44,7 +44,7 @@ ON_TARGET = ("target", "pin")
 
 @dataclass(frozen=True)
 class Track:
-    """What is seen of a capture: position (K, 3) [m], quaternion (K, 4) w first, force (K, 3) [N] by body.
+    """The compared signals of a capture: position (K, 3) [m], quaternion (K, 4) w first, force (K, 3) [N] by body.
 
     ``force`` has ``target`` and ``effector``; of a recording only what was measured, not a number where it has a gap.
     """
@@ -154,8 +154,7 @@ def _forces(data: xr.Dataset, since: Array, times: Array, notes: list[str]) -> t
 def sensed_by(capture: CaptureRecording, track: Track | None) -> CaptureRecording:
     """The capture with its force sensor on the body whose force it shows in a simulation, with a note where it moved.
 
-    What the cables do to the target they do to the end effector the other way round: a name can be misread, a sign not.
-    """
+    The cables' force on the end effector is opposite to that on the target: a name can be wrong, the sign cannot."""
     if track is None or len(capture.sensors) != 1:
         return capture
     ((body, sensor),) = capture.sensors.items()
@@ -177,7 +176,7 @@ def sensed_by(capture: CaptureRecording, track: Track | None) -> CaptureRecordin
 
 
 def check_sensors(captures: Sequence[CaptureRecording]) -> None:
-    """Raise InputError where captures are not told by forces on the same bodies."""
+    """Raise InputError where captures do not have force sensors on the same bodies."""
     for capture in captures:
         if capture.sensors.keys() != captures[0].sensors.keys():
             raise InputError(f"{capture.path}: its force sensors are not those of {captures[0].path}; give the same")

@@ -1,8 +1,8 @@
 """What a capture's model leaves out, by simulation in the loop: forward search over the effects that a snare can have.
 
-A candidate is named when the likelihood gained, less ½ ln(numbers) for its parameter, beats what the best of all
-reaches by chance once in 200 diagnoses, when it explains a share worth a name, and when a capture that the fit never
-saw is told better with it.
+A candidate is named under three conditions: the likelihood gained, minus ½ ln(numbers) for its parameter, is above what
+the best of all candidates reaches by chance once in 200 diagnoses; it explains a share worth a name; and a held-out
+capture is predicted better with it.
 """
 
 from collections.abc import Callable
@@ -33,7 +33,9 @@ RIVAL = 0.2
 
 @dataclass(frozen=True)
 class CaptureNaming:
-    """An effect taken: its trial, how often it beat its rivals, these, and the held-out captures before and after."""
+    """An effect that a search chose: its trial, how often it beat its rivals, these rivals, and the fits of the
+    held-out captures before and after it.
+    """
 
     trial: CaptureTrial
     margin: float
@@ -44,10 +46,10 @@ class CaptureNaming:
 
 @dataclass(frozen=True)
 class CaptureSelection:
-    """What was named; the fits as the model came, and at the end; the same evaluated on the held-out captures.
+    """The names; the fits of the model as given and of the last one; and these two on the held-out captures.
 
-    ``opening`` is what the first round made of every candidate, ``rejected`` those that passed without being
-    confirmed, ``bar`` the score that a candidate had to beat.
+    ``opening`` has the first round's trials, ``rejected`` the effects that passed without being confirmed, ``bar`` the
+    score that a candidate had to reach.
     """
 
     named: tuple[CaptureNaming, ...]
@@ -122,7 +124,7 @@ def start_at(model: Model, captures: CaptureSet) -> CaptureFit:
 
 
 def demand_simulated(model: Model, at: CaptureFit) -> CaptureFit:
-    """The fit as it came; raises InputError for a capture, fitted or held out, that cannot be simulated."""
+    """The fit itself; raises InputError for a training or held-out capture that cannot be simulated."""
     if not np.isfinite(at.likelihood):
         raise InputError(
             f"{model.path}: the capture cannot be simulated from where the recording starts (the pin inside a cable, "

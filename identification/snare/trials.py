@@ -31,7 +31,7 @@ FORESIGHT = 4.0
 
 @dataclass(frozen=True)
 class CaptureTrial:
-    """A candidate beside what was there: its fit, and the share of the weighted residual energy that it explains.
+    """A candidate on top of a model: its fit, and the share of the weighted residual energy that it explains.
 
     ``score`` is the likelihood gained less the price of a parameter.
     """
@@ -78,7 +78,7 @@ def try_all(
     for rank, (expected, best, p, tries) in enumerate(sorted(entries, key=lambda e: -e[0])):
         hopeful = expected > found.likelihood - HOPE and np.isfinite(best.likelihood)
         if rank < FITTED and hopeful and p.key not in rejected:
-            progress(f"fitting {p.effect.name} at {p.at} together with what is there")
+            progress(f"fitting {p.effect.name} at {p.at} together with the model's effects")
             best = _joint(captures, found, [f for f in tries if f.residuals], absent(model, p))
         score = float(best.likelihood - found.likelihood - price(found.residuals))
         trials.append(CaptureTrial(p, best, score, _explained(captures.captures, found, best)))

@@ -10,7 +10,7 @@ from ...models.model import Model
 from ..deciding import CLASS
 from ..diagnosis import Candidate, ChannelFit, Estimate, Finding, Limit, Misfit, Rival
 from ..reliability import of_name
-from ..wording import experiment_sentence
+from ..wording import experiment_sentence, rejection
 from .decide import Decision
 from .fit import Covariances, deviations
 from .search import Naming
@@ -114,9 +114,4 @@ def limits(source: Source, decided: Decision) -> tuple[Limit, ...]:
 def not_confirmed(decided: Decision) -> list[str]:
     """Names that only the training recordings asked for, in words."""
     named = {n.placed.key for n in decided.best.names}
-    return [
-        f"{n.placed.effect.name} at {n.placed.at} raised the evidence of the training recordings, and the held-out "
-        "ones do not miss it: not named"
-        for n in decided.rejected
-        if n.placed.key not in named
-    ]
+    return [rejection(n.placed) for n in decided.rejected if n.placed.key not in named]

@@ -1,4 +1,4 @@
-"""Confirm on the held-out recordings what a search named: log density of them given the others, with and without each.
+"""Confirm names on the held-out recordings: their log density given the training ones, with and without each name.
 
 As in `evidence.confirm`: without an effect the rest is fitted again, and both predict the held-out recordings, every
 nuisance integrated out. A name stays if that density falls without it by more than it scatters over blocks of time. By
@@ -40,14 +40,15 @@ class HeldOutLoss:
 
     @property
     def sure(self) -> float:
-        """The gain in units of its scatter."""
+        """The loss in units of its scatter."""
         return self.gain / max(self.scatter, 1e-12)
 
 
 @dataclass(frozen=True)
 class Confirmation:
-    """Names that stay and what the held-out recordings miss of each, those that do not, the last fit, and the log
-    density of the held-out recordings."""
+    """The confirmed names with the held-out loss of each, the rejected ones, the last fit, and the log density of the
+    held-out recordings.
+    """
 
     names: tuple[Naming, ...]
     missed: Mapping[str, HeldOutLoss]
@@ -62,7 +63,7 @@ class Confirmation:
 def confirm(
     source: Source, given: ModelPoint, found: Selection, progress: Callable[[str], None] = lambda _: None
 ) -> Confirmation:
-    """Take out the name that the held-out recordings miss least, until they miss every one."""
+    """Remove the name with the smallest held-out loss, until every name's loss is beyond its scatter."""
     held, last, names = source.held, found.last, list(found.names)
     shifted, own = shift_columns(last), covariances(found.weighed)
     progress("confirming on the held-out recordings")

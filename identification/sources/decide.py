@@ -1,4 +1,4 @@
-"""The whole decision: search, confirm, search again where something was not confirmed, and what is left."""
+"""The whole decision: search, confirm, search again in place of names that were not confirmed, and nameless curves."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,8 +14,9 @@ from .source import Linearisation, ModelPoint, Source
 
 @dataclass(frozen=True)
 class Decision:
-    """What recordings say: the search, what was confirmed and was not, nameless curves, and the held-out recordings
-    under the model as given."""
+    """The decision: the search, the confirmed and the rejected names, nameless curves, and the held-out recordings
+    under the model as given.
+    """
 
     given: ModelPoint
     found: Selection
@@ -26,7 +27,7 @@ class Decision:
 
     @property
     def verdict(self) -> Verdict:
-        """By what is named, and by curves without a name."""
+        """The verdict by the names and the nameless curves."""
         return verdict(self.best.names, self.left)
 
 
@@ -38,7 +39,7 @@ def decide(source: Source, given: ModelPoint, progress: Callable[[str], None] = 
     for _ in range(SECOND_CHOICES):
         if not last.rejected:
             break
-        progress("looking for what else could explain what the held-out recordings did not confirm")
+        progress("searching another explanation for what the held-out recordings did not confirm")
         again = search(source, given, barred=rejected, progress=progress)
         last = confirm(source, given, again, progress)
         rejected |= {n.placed.key: n for n in last.rejected}

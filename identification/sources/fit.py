@@ -37,7 +37,7 @@ def forecast(source: Source, i: int, at: ModelPoint) -> Array:
 
 
 def residuals(source: Source, numbers: Sequence[int], at: ModelPoint) -> tuple[Array, ...]:
-    """Measurement less what is predicted, 0 where nothing was measured."""
+    """Measurement minus prediction, 0 where nothing was measured."""
     return tuple(np.nan_to_num(source.measured(i) - forecast(source, i, at)) for i in numbers)
 
 
@@ -56,7 +56,7 @@ def linearised(
 
 
 def differences(source: Source, i: int, at: ModelPoint, here: Array) -> Array:
-    """Slopes (n, c, P) by differences, for what has no derivatives."""
+    """Derivatives (n, c, P) by finite differences, for a source without derivatives."""
     own = []
     for k, (p, x) in enumerate(at.free):
         size = SMALL * max(abs(at.values[k]), source.size(p, x))
@@ -90,8 +90,9 @@ def bounds_of(source: Source, at: ModelPoint) -> tuple[Array, Array]:
 
 
 def priors(source: Source, given: ModelPoint, at: ModelPoint) -> tuple[Array, Array]:
-    """Mean and standard deviation of each free parameter (P,): of what the model file gives, a share of its value; of
-    what it does not, none to speak of."""
+    """Mean and standard deviation of each free parameter's prior (P,): a share of the value that the model file gives;
+    very wide without such a value.
+    """
     mean, spread = at.values.copy(), np.full(len(at.values), np.inf)
     own, sizes = given.all_values, sizes_of(source, at)
     for k, key in enumerate(at.keys):
@@ -117,8 +118,9 @@ def fit(
     shifted: Sequence[Array] | None = None,
     most: int = 0,
 ) -> Linearisation:
-    """Climb the posterior on the training recordings from a start, ``most`` steps or as many as the source has;
-    ``shifted`` as of `linearised`."""
+    """Maximise the posterior of the training recordings from a start, in ``most`` steps or as many as the source has;
+    ``shifted`` as in `linearised`.
+    """
     numbers, prior, n = source.train, priors(source, given, at), len(at.values)
     here = linearised(source, numbers, at, shifted)
     shifted = shift_columns(here)
@@ -165,7 +167,9 @@ def normal(here: Linearisation, covariances: Covariances, prior: tuple[Array, Ar
 
 
 def deviations(source: Source, given: ModelPoint, here: Linearisation, covariances: Covariances) -> tuple[Array, Array]:
-    """Standard deviation of each free parameter (P,), the shifts free within theirs, and the normal matrix (P, P)."""
+    """Standard deviation of each free parameter (P,), with the shifts free within their deviations; and the normal
+    matrix (P, P).
+    """
     _, matrix = normal(here, covariances, priors(source, given, here.at))
     size, n = np.sqrt(np.maximum(np.diag(matrix), 1e-300)), len(here.at.values)
     spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(matrix / np.outer(size, size), rcond=1e-12)), 0)) / size

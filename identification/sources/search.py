@@ -1,4 +1,4 @@
-"""Search what a model leaves out by the one evidence, fit what was found, and search again."""
+"""Search what a model leaves out by its evidence, fit what was found, and search again."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -23,8 +23,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Naming:
-    """An effect taken: where, its log Bayes factor, its posterior share, and who else could stand in its place: effect,
-    share."""
+    """An effect that a search chose: its place, log Bayes factor and posterior share; and its rivals, each with a
+    share.
+    """
 
     placed: PlacedEffect
     channels: tuple[int, ...]
@@ -45,8 +46,9 @@ class Trial:
 
 @dataclass(frozen=True)
 class Selection:
-    """What a search found: names, the fits as the model came and at the end, the noise at the end, and the first
-    round's trials."""
+    """What a search found: names, the fits of the model as given and of the last one, the last noise, and the first
+    round's trials.
+    """
 
     names: tuple[Naming, ...]
     first: Linearisation
@@ -56,7 +58,7 @@ class Selection:
 
     @property
     def noises(self) -> tuple[Noise, ...]:
-        """Of every channel."""
+        """The noise of every channel."""
         return self.weighed.noises
 
 
@@ -67,7 +69,7 @@ def search(
     barred: Collection[str] = (),
     progress: Callable[[str], None] = lambda _: None,
 ) -> Selection:
-    """Add effects to a model until nothing more that has a name raises the posterior of the training recordings."""
+    """Add effects to a model until no further name raises the posterior of the training recordings."""
     train = source.train
     progress(f"comparing {len(train)} recordings with the model as given")
     first = here = linearised(source, train, source.settled(given, train))
@@ -76,7 +78,7 @@ def search(
     trials: tuple[Trial, ...] = ()
     weighed: WeighedRecordings | None = None
     for number in range(1, ROUNDS + 1):
-        progress(f"round {number}: weighing each effect at each place")
+        progress(f"round {number}: comparing each effect at each place")
         weighed = opened(source, train, given, here)
         weighed, made, slots, _ = searched(weighed, range(len(train)), barred, range(len(weighed.noises)))
         trials = trials or _trials(made)
@@ -116,7 +118,7 @@ def opened(
     here: Linearisation,
     known: WeighedRecordings | None = None,
 ) -> WeighedRecordings:
-    """Recordings under a fit with every hypothesis; laws without amplitudes fitted by themselves."""
+    """Recordings under a fit with every hypothesis; laws without amplitudes are fitted by themselves."""
     weighed = weigh(source, numbers, given, here, known, search=True)
     if not any(h.named and h.items[0].whole for h in weighed.pool):
         return weighed

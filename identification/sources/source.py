@@ -1,7 +1,7 @@
-"""One interface for a kind of recording: what was measured, what values predict of it, and what else can act.
+"""One interface for a kind of recording: its measurements, a model's predictions of them, and its candidates.
 
-A kind is one package that offers a `Source`; fit, evidence, search and confirmation see nothing else of it. Letters: n
-samples of a recording, c channels, P free parameters of effects, S shifts.
+A kind of recording is one package with a `Source`. Fit, evidence, search and confirmation use nothing else of it.
+Letters: n samples of a recording, c channels, P free parameters of effects, S shifts.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ModelPoint:
-    """Effects with their free parameters' values (P,), and shifts (S,) in their deviations."""
+    """A model's effects with the values of their free parameters (P,), and the shifts (S,) in deviations."""
 
     placed: tuple[PlacedEffect, ...]
     fixed: dict[str, float]
@@ -30,17 +30,17 @@ class ModelPoint:
 
     @staticmethod
     def of(placed: Sequence[PlacedEffect], values: Mapping[str, float], n_shifts: int) -> "ModelPoint":
-        """Effects at these values by key, nothing shifted."""
+        """Effects at these values by key, without shifts."""
         return ModelPoint((), {}, np.zeros(0), np.zeros(n_shifts)).with_effects(placed, values)
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """Free parameters by ``effect.place.parameter``."""
+        """Keys ``effect.place.parameter`` of the free parameters."""
         return tuple(f"{p.key}.{x.name}" for p, x in self.free)
 
     @property
     def free(self) -> list[tuple[PlacedEffect, Parameter]]:
-        """Free parameters with their effects."""
+        """The free parameters, each with its effect."""
         return [(p, x) for p in self.placed for x in p.effect.parameters if x.name not in p.hold]
 
     @property
@@ -54,11 +54,11 @@ class ModelPoint:
         return np.array([every[f"{p.key}.{x.name}"] for x in p.effect.parameters])
 
     def with_effects(self, added: Sequence[PlacedEffect], values: Mapping[str, float]) -> "ModelPoint":
-        """With more effects at these values."""
+        """This model with more effects, at these values."""
         return self._with((*self.placed, *added), self.all_values | dict(values))
 
     def without(self, *keys: str) -> "ModelPoint":
-        """Without some effects."""
+        """This model without some effects."""
         return self._with(tuple(p for p in self.placed if p.key not in keys), self.all_values)
 
     def _with(self, placed: tuple[PlacedEffect, ...], every: Mapping[str, float]) -> "ModelPoint":
@@ -69,9 +69,10 @@ class ModelPoint:
 
 @dataclass(frozen=True)
 class GridPoint:
-    """An effect at one point of its grid: values by key, and the parameters that each column is in proportion to; none
-    where the one column is all that the law does. ``size``: a usual one of the column's amplitude, where the channels
-    do not tell it; of a whole law, its RMS as a share of its channel's."""
+    """An effect at one point of its grid: values by key, and the parameters in which each column is linear; none where
+    one column is the whole law. ``size`` is a usual amplitude of the column, where the channels do not give it; of a
+    whole law, its RMS as a share of its channel's.
+    """
 
     placed: PlacedEffect
     values: Mapping[str, float]
@@ -81,8 +82,9 @@ class GridPoint:
 
 @dataclass(frozen=True)
 class Linearisation:
-    """What recordings say about a fit: residuals (n, c) of each, and columns (n, c, P + S) of what is free there, in
-    units of the parameters and of the shifts' deviations."""
+    """Recordings linearised about a fit: residuals (n, c) of each, and derivatives (n, c, P + S) by the parameters, in
+    their units, and by the shifts, in deviations.
+    """
 
     at: ModelPoint
     residuals: tuple[Array, ...]
@@ -90,7 +92,7 @@ class Linearisation:
 
 
 class Source(Protocol):
-    """Recordings of one kind: those for training first, then the held-out ones."""
+    """Recordings of one kind: the training recordings first, then the held-out ones."""
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -109,17 +111,17 @@ class Source(Protocol):
 
     @property
     def n_shifts(self) -> int:
-        """Numbers beside the effects that may be others than they are said to be, with a deviation each."""
+        """How many numbers of the set-up may differ from their stated values, each with a standard deviation."""
         ...
 
     @property
     def anew(self) -> bool:
-        """Whether shifts may be known to a share of their deviations, which the evidence chooses, or not at all."""
+        """Whether the evidence chooses how well the shifts are known: to a share of their deviations, or not at all."""
         ...
 
     @property
     def steps(self) -> int:
-        """Most steps of a fit that are worth their time."""
+        """Largest number of steps of a fit."""
         ...
 
     def measured(self, i: int) -> Array:
@@ -127,27 +129,27 @@ class Source(Protocol):
         ...
 
     def predicted(self, i: int, at: ModelPoint) -> Array | None:
-        """Channels as the model predicts them (n, c); None where it cannot."""
+        """Channels that the model predicts (n, c); None where it cannot predict them."""
         ...
 
     def refused(self, i: int) -> InputError:
-        """What is wrong with a recording that the model cannot predict."""
+        """The error for a recording that the model cannot predict."""
         ...
 
     def slopes(self, i: int, at: ModelPoint, here: Array) -> Array:
-        """Derivatives (n, c, P) by the free parameters about what is predicted ``here``."""
+        """Derivatives (n, c, P) of the prediction ``here`` by the free parameters."""
         ...
 
     def shift_slopes(self, i: int, at: ModelPoint, here: Array) -> Array:
-        """Derivatives (n, c, S) by the shifts."""
+        """Derivatives (n, c, S) of the prediction by the shifts."""
         ...
 
     def settled(self, at: ModelPoint, numbers: Sequence[int]) -> ModelPoint:
-        """With what is some recordings' own read off them."""
+        """The model with the shifts of these recordings read from them."""
         ...
 
     def scale(self) -> Array:
-        """What sizes are shares of (c,): RMS of each channel in the training recordings."""
+        """RMS of each channel in the training recordings (c,); sizes are shares of it."""
         ...
 
     def bounds(self, p: PlacedEffect, x: Parameter) -> tuple[float, float]:
@@ -163,7 +165,7 @@ class Source(Protocol):
         ...
 
     def library(self, placed: Sequence[PlacedEffect]) -> list[PlacedEffect]:
-        """Every effect at every place that is not there yet."""
+        """Every effect at every place that the model does not have."""
         ...
 
     def variants(self, p: PlacedEffect) -> list[GridPoint]:
@@ -171,18 +173,19 @@ class Source(Protocol):
         ...
 
     def columns(self, i: int, at: ModelPoint, v: GridPoint) -> Array:
-        """What an effect adds beside those that are there (n, c, k); not a number where it cannot be predicted."""
+        """What an effect adds to the prediction of the model (n, c, k); not a number where it cannot be predicted."""
         ...
 
     def curves(self, numbers: Sequence[int]) -> Mapping[tuple[int, str], list[Array]]:
-        """Nameless curves by channel and what they run over in words: columns (n, k) for each recording."""
+        """Nameless curves by channel and by their coordinates in words: columns (n, k) for each recording."""
         ...
 
     def noise_channels(
         self, numbers: Sequence[int], linear: Linearisation, could: Sequence[Sequence[Array]]
     ) -> list[list[NoiseChannel]]:
-        """What the noise of every channel of every recording depends on; ``could`` (n, k) by channel and recording may
-        explain the residuals."""
+        """What the noise of every channel of every recording depends on; ``could`` (n, k) are the columns, by channel
+        and recording, that may explain the residuals.
+        """
         ...
 
     def blocks(self, i: int, x: Array) -> Array:

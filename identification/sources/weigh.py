@@ -28,7 +28,7 @@ STRONGEST = 10
 
 
 def covariances(weighed: WeighedRecordings) -> Covariances:
-    """Of every recording and channel."""
+    """Covariances of every recording and channel."""
     return [[channel.covariance for channel in row] for row in weighed.evidence.channels]
 
 
@@ -125,8 +125,9 @@ def weigh(
 def by_themselves(
     source: Source, given: ModelPoint, linear: Linearisation, weighed: WeighedRecordings
 ) -> dict[str, GridPoint]:
-    """Every law without amplitudes fitted by itself from the best point of its grid: between two of them it explains
-    much less."""
+    """Every law without amplitudes, fitted by itself from the best point of its grid: between grid points it explains
+    much less.
+    """
     on, found = ProjectedEvidence(weighed.evidence, range(len(source.train))), {}
     best, shifted = Search(on, weighed.pool).scan([]).item, shift_columns(linear)
     for h, x in enumerate(weighed.pool):

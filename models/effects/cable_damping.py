@@ -16,7 +16,7 @@ EFFECT = Effect(
     name="cable_damping",
     family="snare and contact",
     at="cables",
-    sentence="the cables' own swinging dies out sooner or later than the model has it",
+    sentence="the cables' own vibration decays faster or slower than in the model",
     equation="bending moment time * bending stiffness * rate of the curvature",
     source="Voigt (1892), Kelvin and Voigt's law on curvature",
     parameters=(Parameter("time", "s", "damping over stiffness in bending", low=0.0, high=1.0),),

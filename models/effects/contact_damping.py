@@ -17,7 +17,7 @@ EFFECT = Effect(
     name="contact_damping",
     family="snare and contact",
     at="pin",
-    sentence="cables and pin do not bounce off each other: a contact swallows energy",
+    sentence="cables and pin do not bounce off each other: a contact dissipates energy",
     equation="coefficient * elastic force * rate of the overlap, the whole force never below zero",
     source="Hunt and Crossley (1975)",
     parameters=(Parameter("coefficient", "s/m", "share of the force per rate of the overlap", low=0.0, high=1e5),),

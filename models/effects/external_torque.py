@@ -18,5 +18,5 @@ EFFECT = Effect(
     source="Wertz (1978), ch. 17 (disturbance torques)",
     parameters=tuple(Parameter(axis, "N*m", f"moment about the base's {axis} axis") for axis in "xyz"),
     law=_law,
-    experiment="let {at} drift with the joints locked: its spin then changes only by what is outside",
+    experiment="let {at} drift with the joints locked: only a torque from outside then changes its spin",
 )

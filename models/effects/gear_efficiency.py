@@ -20,7 +20,7 @@ EFFECT = Effect(
     name="gear_efficiency",
     family="drive train",
     at="joint",
-    sentence="a gear that loses another share of the load when it drives than when it brakes",
+    sentence="a gear whose loss is another share of the load while it drives than while it brakes",
     equation="(driving_loss if load * qd > 0, else braking_loss) * |load| * sgn(qd); driving_loss = 1/efficiency - 1",
     source="Wang and Lee (2004); Giberti, Cinquemani and Legnani (2010)",
     parameters=(

@@ -26,7 +26,7 @@ EFFECT = Effect(
     name="joint_elasticity",
     family="drive train",
     at="joint",
-    sentence="a springy drive: the link lags the motor under load and rings after it",
+    sentence="an elastic drive: the link lags the motor under load and rings after it",
     equation="inertia * twist'' + damping * twist' + stiffness * twist = load; link position = motor position - twist",
     source="Spong (1987)",
     parameters=(

@@ -17,7 +17,7 @@ EFFECT = Effect(
     name="latch_play",
     family="docking",
     at="latches",
-    sentence="the latches have play: what they hold moves before they bear",
+    sentence="the latches have play: the target moves before they bear",
     equation="stiffness of a latch acts beyond play/2 from where it took hold, in every direction",
     source="Nordin and Gutman (2002), the dead zone",
     parameters=(Parameter("play", "m", "free travel of a latch, both ways together", low=0.0, high=0.01,

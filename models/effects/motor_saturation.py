@@ -25,7 +25,7 @@ EFFECT = Effect(
     name="motor_saturation",
     family="drive train",
     at="sensor",
-    sentence="a motor that gives less than its current says once the torque is large",
+    sentence="a motor that gives less torque than its current implies, once the torque is large",
     equation="value + excess * (x beyond knee either side), x = value + knee * qd / no_load_speed; the corner rounded "
     "over 5 % of the knee",
     source="Fitzgerald, Kingsley and Umans (2003), chapters 1 and 7",

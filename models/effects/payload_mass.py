@@ -27,8 +27,12 @@ EFFECT = Effect(
         Parameter(
             "x", "m", "its place from the far end, along the link frame's x axis", low=-1.0, high=1.0, grid=(0.0,)
         ),
-        Parameter("y", "m", "the same along y", low=-1.0, high=1.0, grid=(0.0,)),
-        Parameter("z", "m", "the same along z", low=-1.0, high=1.0, grid=(0.0,)),
+        Parameter(
+            "y", "m", "its place from the far end, along the link frame's y axis", low=-1.0, high=1.0, grid=(0.0,)
+        ),
+        Parameter(
+            "z", "m", "its place from the far end, along the link frame's z axis", low=-1.0, high=1.0, grid=(0.0,)
+        ),
     ),
     law=_law,
     experiment="hold {at} still in several postures under gravity, or weigh what its link carries",

@@ -54,7 +54,9 @@ def main() -> int:
     friction = friction_study(model, train, holdout, stages(say))
     say("A flight arm without sensors, on the same rig ...")
     flown = flight_arm(model, friction, folder, CONCEALED)
-    say(f"{error_table(friction)}\nDiagnosing what is left, with {holdout.name} locked away ...")
+    say(
+        f"{error_table(friction)}\nDiagnosing the remaining residual, with {holdout.name} as the held-out recording ..."
+    )
     answer = diagnose(model, [train], holdout, progress=stages(say))
     found = answer.diagnosis
     boom = suspected_boom(built_in_rig(), found)

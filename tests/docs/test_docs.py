@@ -11,6 +11,7 @@ import pytest
 from diagnoses import spelt
 from documentation import CHANGELOG, DOCS, PAGES, README, ROOT, blocks, read
 
+import snarelab
 from snarelab.cli import main
 from snarelab.identification import deciding
 from snarelab.models.effects import FAMILIES, effects
@@ -151,6 +152,11 @@ def test_readme_says_what_can_be_named():
     for family, now, *planned in table:
         assert all(effects()[name].family == family for name in re.findall(r"`(\w+)`", now))
         assert not set(re.findall(r"`(\w+)`", " ".join(planned))) & set(effects())
+
+
+def test_the_reference_page_has_every_public_name():
+    listed = re.findall(r"auto\w+:: snarelab\.(\w+)$", read(DOCS / "python.md"), re.MULTILINE)
+    assert sorted(listed) == snarelab.__all__
 
 
 def numbers(code, name):

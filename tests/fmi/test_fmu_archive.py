@@ -7,6 +7,7 @@ import zipfile
 import zlib
 
 import pytest
+from refusal import refusal
 
 from bench.fmu_models import Slave, rewritten
 from snarelab.errors import InputError
@@ -25,11 +26,7 @@ def good(request, tmp_path_factory):
 def refused(path, folder):
     """The one line, and nothing written outside or inside."""
     before = sorted(p for p in folder.parent.rglob("*"))
-    with pytest.raises(InputError) as caught:
-        open_fmu(path, folder)
-    text = str(caught.value)
-    assert "\n" not in text
-    assert str(path) in text
+    text = refusal(lambda: open_fmu(path, folder), path, leads=False)
     assert sorted(p for p in folder.parent.rglob("*") if folder not in [p, *p.parents]) == before
     return text
 
@@ -195,10 +192,7 @@ def test_what_the_model_keeps_for_itself_is_its_own(good, tmp_path):
 )
 def test_descriptions_and_binaries_that_do_not_fit(good, tmp_path, change, words):
     path = rewritten(good[0], tmp_path / "bad.fmu", change)
-    with pytest.raises(InputError) as caught:
-        open_fmu(path, tmp_path / "x")
-    for word in words:
-        assert word in str(caught.value)
+    refusal(lambda: open_fmu(path, tmp_path / "x"), path, *words, leads=False)
 
 
 def test_another_machines_binary(good, tmp_path):

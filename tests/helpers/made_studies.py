@@ -1,8 +1,10 @@
 """What a study leaves, made once: by `make study-NAME` where that is newer than every source, else by the test."""
 
+import json
 from pathlib import Path
 from subprocess import run
 from types import ModuleType
+from typing import Any
 
 import pytest
 
@@ -20,6 +22,14 @@ def made_study(name: str, study: ModuleType, recordings: Path, tmp_path: Path, p
     patch.chdir(tmp_path)
     assert study.main() == 0
     return tmp_path / FOLDER / name
+
+
+def numbers_left(name: str) -> dict[str, Any] | None:
+    """A study's quantities by name, of today's sources; None where it was not made."""
+    left = ROOT / FOLDER / name
+    if not _newer_than_sources(left / "report.html"):
+        return None
+    return {q["name"]: q["value"] for q in json.loads((left / "result.json").read_text())["quantities"]}
 
 
 def _newer_than_sources(page: Path) -> bool:

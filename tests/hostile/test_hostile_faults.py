@@ -126,7 +126,7 @@ def test_an_interrupted_diagnosis_says_so_and_leaves_nothing(folder):
     process = start(folder, [*DIAGNOSE, "-v"])
     assert process.stderr is not None
     line = ""
-    while "weighing each effect" not in line:
+    while "comparing each effect" not in line:
         line = process.stderr.readline()
         assert line
     time.sleep(0.3)
@@ -152,7 +152,7 @@ def test_an_interrupted_tolerance_study_keeps_its_cases_and_goes_on(folder):
     assert process.returncode == 130, error
     last = error.splitlines()[-1]
     assert last.startswith("snarelab: interrupted; ")
-    assert last.endswith(" cases are kept, the same command goes on")
+    assert last.endswith(" cases are kept, the same command resumes it")
     assert "Traceback" not in error
     again = start(folder, words("tolerance", "."), env=os.environ | paths)
     _, error = again.communicate(timeout=100)

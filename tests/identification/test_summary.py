@@ -18,8 +18,8 @@ def test_what_cannot_be_told_apart_is_said_with_what_would_part_it():
     text = printed(missing_physics())
     said = text.partition("what these recordings cannot tell apart\n")[2]
     assert said.strip() == (
-        "Stribeck friction at joint5, or load dependent friction at joint5; to part them: repeat the slow part of the "
-        "motion with 5 kg"
+        "Stribeck friction at joint5, or load dependent friction at joint5; to separate them: repeat the slow part of "
+        "the motion with 5 kg"
     )
 
 

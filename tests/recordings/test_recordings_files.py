@@ -1,8 +1,5 @@
 """MATLAB and HDF5 files as other programs write them, and the measured EMPS files."""
 
-import os
-from pathlib import Path
-
 import h5py
 import numpy as np
 import pytest
@@ -109,29 +106,21 @@ def test_units_as_hdf5_attributes(tmp_path):
     assert read_recording(path)["q.a"].values[0] == pytest.approx(np.pi)
 
 
-def emps(name):
-    root = Path(os.environ.get("SNARELAB_RECORDINGS") or Path(__file__).parents[3] / "shared" / "recordings")
-    path = root / "emps" / name
-    if not path.is_file():
-        pytest.skip(f"{name} is not at {path}; set SNARELAB_RECORDINGS")
-    return path
-
-
 @pytest.mark.parametrize("name", ["DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"])
-def test_emps(name):
+def test_emps(name, emps):
     """The published facts: 1 kHz, 24.84 s, force = 35.15 N/V times the controller's volts (Janot et al., 2019)."""
     signals = {
         "time": Signal("t", unit="s"),
         "q.slide": Signal("qm", unit="m"),
         "tau.slide": Signal("vir", unit="V", gain="gtau"),
     }
-    data = read_recording(emps(name), signals, {"slide": "prismatic"})
+    data = read_recording(emps / name, signals, {"slide": "prismatic"})
     assert data.sizes["time"] == 24841
     assert np.median(np.diff(data["time"])) == pytest.approx(1e-3, rel=1e-4)
     assert data["time"].values[-1] == pytest.approx(24.84)
     assert data["q.slide"].attrs["unit"] == "m"
     assert data["tau.slide"].attrs == {"unit": "N", "column": "vir"}
-    volts = scipy.io.loadmat(emps(name))["vir"][:, 0]
+    volts = scipy.io.loadmat(emps / name)["vir"][:, 0]
     np.testing.assert_allclose(data["tau.slide"], 35.15 * volts, rtol=1e-4)  # published rounded
     assert not any(np.isnan(values).any() for values in data.data_vars.values())
     assert not any("gap" in note or "missing" in note for note in data.attrs["notes"])

@@ -1,18 +1,16 @@
 """The servo study (BAM, XL330): its simulator against closed forms and another integrator, and recordings."""
 
-import os
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from real_recordings import real_recordings
 
 from snarelab.errors import InputError
 from snarelab.studies import bam, bam_naming, bam_servo
 from snarelab.studies.bam_naming import START, LawTrial, ServoFit, best, evolve, fit, name_missing, rms
 from snarelab.studies.bam_servo import DUTY, GRAVITY, ServoRun, position_error, read_run, simulate
 
-ROOT = Path(__file__).resolve().parents[2]
 MASS, LENGTH = 0.49, 0.1
 WEIGHT = MASS * GRAVITY * LENGTH
 
@@ -119,14 +117,9 @@ def test_damaged_recording_is_named(tmp_path):
 
 @pytest.fixture(scope="module")
 def recorded():
-    """All runs, which are never copied into the repository: those to fit, and those at gain 400."""
-    given = os.environ.get("SNARELAB_RECORDINGS")
-    for folder in ([Path(given)] if given else []) + [ROOT.parent / "shared" / "recordings"]:
-        files = sorted((folder / "bam" / "xl330").glob("*.json"))
-        if files:
-            runs = [read_run(path) for path in files]
-            return [r for r in runs if r.gain != 400], [r for r in runs if r.gain == 400]
-    pytest.skip("servo recordings not found: set SNARELAB_RECORDINGS to the folder that holds bam/xl330")
+    """All runs: those to fit, and those at gain 400."""
+    runs = [read_run(path) for path in sorted(real_recordings("bam/xl330", "*.json").glob("*.json"))]
+    return [r for r in runs if r.gain != 400], [r for r in runs if r.gain == 400]
 
 
 def test_duty_is_what_the_firmware_makes_of_it(recorded):

@@ -4,9 +4,11 @@ import json
 from pathlib import Path
 
 import pytest
+from made_studies import made_study
 
 import snarelab.studies
 from snarelab.cli import main
+from snarelab.studies import emps as study
 
 pytestmark = pytest.mark.slow
 
@@ -23,13 +25,9 @@ def identified(emps, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def folder(emps, tmp_path_factory):
-    """Diagnosis from viscous friction alone, and a second one from the model that it saved."""
-    out = tmp_path_factory.mktemp("diagnose")
-    recordings = [str(emps / "DATA_EMPS.mat"), "--holdout", str(emps / "DATA_EMPS_PULSES.mat")]
-    first = ["--json", str(out / "1.json"), "--report", str(out / "1.html"), "--save-model", str(out / "new.toml")]
-    assert main(["diagnose", str(MODELS / "viscous.toml"), *recordings, *first]) == 0
-    assert main(["diagnose", str(out / "new.toml"), *recordings, "--json", str(out / "2.json")]) == 0
-    return out
+    """What the study leaves: a diagnosis from viscous friction alone, and a second one from the model that it saved."""
+    with pytest.MonkeyPatch.context() as patch:
+        return made_study("emps", study, emps.parent, tmp_path_factory.mktemp("study"), patch)
 
 
 @pytest.mark.parametrize(
@@ -56,7 +54,7 @@ def test_force_error_is_the_published_one(identified):
 
 
 def test_names_what_is_missing_in_order(folder):
-    found = json.loads((folder / "1.json").read_text())
+    found = json.loads((folder / "diagnosis.json").read_text())
     assert found["verdict"] == "missing_physics"
     names = [(e["name"], e["at"].removeprefix("q.").removeprefix("tau.")) for e in found["effects"]]
     # No law beside another that holds it.
@@ -70,7 +68,7 @@ def test_names_what_is_missing_in_order(folder):
 
 
 def test_ends_well_below_the_published_cross_test_error(folder):
-    found = json.loads((folder / "1.json").read_text())
+    found = json.loads((folder / "diagnosis.json").read_text())
     errors = [s["holdout"] for s in found["steps"]]
     assert errors[0] > 0.17
     assert errors[-1] <= 0.037
@@ -81,8 +79,8 @@ def test_ends_well_below_the_published_cross_test_error(folder):
 
 def test_what_the_saved_model_still_lacks_is_little(folder):
     """A law's form, for a hundredth of the error; the position says something without a name."""
-    found = json.loads((folder / "2.json").read_text())
-    first = json.loads((folder / "1.json").read_text())
+    found = json.loads((folder / "again.json").read_text())
+    first = json.loads((folder / "diagnosis.json").read_text())
     assert found["steps"][-1]["holdout"] > 0.95 * first["steps"][-1]["holdout"]
     assert {e["at"] for e in found["effects"]} <= {"slide"}
     assert found["limits"]
@@ -92,6 +90,6 @@ def test_what_the_saved_model_still_lacks_is_little(folder):
 
 
 def test_leaves_a_report(folder):
-    page = (folder / "1.html").read_text()
+    page = (folder / "report.html").read_text()
     assert "Coulomb friction" in page
     assert "https://" not in page

@@ -9,9 +9,8 @@ from snarelab.studies import free_floating
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory) -> Path:
+def folder(tmp_path_factory, own_cache) -> Path:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
         patch.chdir(tmp_path_factory.mktemp("study"))
         assert free_floating.main() == 0
         return Path.cwd() / "build" / "studies" / "free-floating"
@@ -51,5 +50,5 @@ def test_page_has_the_papers_figures_and_a_playback(folder):
     text = (folder / "report.html").read_text(encoding="utf-8")
     assert text.count("data:image/svg+xml") == 3
     assert all(f"figure {number}" in text for number in (2, 3, 4))
-    assert "link2, link3, link5 have inertias that no body can have" in text
+    assert "the inertias of link2, link3, link5 are physically impossible" in text
     assert 'id="playback-data"' in text

@@ -3,11 +3,11 @@
 The bars are those of an independent least-squares check, fitted on runs A and B, in mdeg RMS on run C.
 """
 
-import os
 from pathlib import Path
 
 import numpy as np
 import pytest
+from real_recordings import real_recordings
 
 import snarelab.studies
 from snarelab.identification.fitting.base_parameters import base_parameters
@@ -25,17 +25,11 @@ from snarelab.studies.kuka_figures import MDEG, pattern
 
 pytestmark = pytest.mark.slow
 
-ROOT = Path(__file__).resolve().parents[2]
-
 
 @pytest.fixture(scope="module")
 def runs():
-    """Runs A, B and C, which are never copied into the repository."""
-    given = os.environ.get("SNARELAB_RECORDINGS")
-    for folder in ([Path(given)] if given else []) + [ROOT.parent / "shared" / "recordings"]:
-        if (folder / "kuka_kr300" / "run_A.mat").is_file():
-            return [folder / "kuka_kr300" / f"run_{run}.mat" for run in "ABC"]
-    pytest.skip("KR 300 recordings not found: set SNARELAB_RECORDINGS to the folder that holds kuka_kr300/run_A.mat")
+    folder = real_recordings("kuka_kr300", "run_A.mat")
+    return [folder / f"run_{run}.mat" for run in "ABC"]
 
 
 @pytest.fixture(scope="module")

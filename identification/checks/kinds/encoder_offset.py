@@ -17,7 +17,7 @@ LEAST = 0.02
 
 
 def readings(case: CheckCase) -> list[Reading]:
-    """Each rotary joint's zero where torque goes best with it; sliding joints feel none."""
+    """Each rotary joint's zero that fits the torques best; sliding joints have none."""
     found = []
     for j in case.doubtful:
         joint = case.tree.joints[j]

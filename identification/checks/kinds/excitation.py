@@ -1,4 +1,4 @@
-"""Joints that hardly move: nothing but what they hold can be told of them."""
+"""Joints that hardly move: a recording shows only the torque that they hold."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""A joint's axis that the robot's file has the wrong way round: position and torque both count backwards."""
+"""A joint's axis that is reversed in the robot's file: position and torque both count the other way."""
 
 import numpy as np
 

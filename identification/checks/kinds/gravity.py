@@ -11,7 +11,7 @@ EARTH = 9.80665
 
 
 def readings(case: CheckCase) -> list[Reading]:
-    """Gravity along each axis, none, and along the direction that goes best with the torques."""
+    """Gravity along each axis, none, and along the direction that fits the torques best."""
     given = case.tree.gravity
     size = float(np.linalg.norm(given)) or EARTH
     found = [

@@ -1,4 +1,4 @@
-"""Time in another unit than it is read in: milliseconds taken for seconds, and back."""
+"""Time in another unit than the one in which it is read: milliseconds taken for seconds, and the reverse."""
 
 import numpy as np
 

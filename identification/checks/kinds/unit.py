@@ -1,4 +1,4 @@
-"""A column in another unit than it is read in: positions in degrees, torques in N·cm, currents, motor-side torques."""
+"""A column in another unit than the one in which it is read: degrees, N·cm, currents, motor-side torques."""
 
 import numpy as np
 

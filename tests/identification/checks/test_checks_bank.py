@@ -9,7 +9,7 @@ import snarelab
 from snarelab.identification.fitting.recorded import read_all
 from snarelab.models.model_file import load_model
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("each_diagnosis_once")]
 DRAWN = 10
 MISSED = 0.1
 HELD_OUT = 700
@@ -83,12 +83,18 @@ HEAVY = pytest.mark.xfail(
     ids=lambda mistake: mistake.__name__,
 )
 def test_a_mend_gives_the_verdict_of_the_sound_recording(tmp_path, mistake):
-    """Where the mend is an estimate, or leaves samples or recordings out. Two joints: such a diagnosis is short."""
-    seed = 23
-    made = bank.machine(seed, n_joints=2)
-    runs, _, _ = mistake(made, seed)
-    paths = written(tmp_path, made, runs)
-    found = checked(tmp_path, paths)
+    """Where the mend is an estimate, or leaves samples or recordings out. Two joints and no physics missing: a mend
+    that is not quite right would be told as some. The first arm on which the mistake is found: on the last joint a
+    wrong zero is the same as a link whose mass is turned."""
+    for seed in range(23, 33):
+        made = bank.machine(seed, n_joints=2, missing=False)
+        runs, name, _ = mistake(made, seed)
+        paths = written(tmp_path, made, runs)
+        found = checked(tmp_path, paths)
+        if any(f.name == name for f in found):
+            break
+    else:
+        pytest.fail(f"{name} is found on none of ten arms")
     kept = [run for path, run in zip(paths, runs, strict=True) if path in left(paths, found)]
     held = mistake(made, seed + HELD_OUT)[0][:1]
     as_it_should_be, lines = bank.sound(mistake, made, seed)

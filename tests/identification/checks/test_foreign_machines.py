@@ -1,12 +1,11 @@
 """Machines that no rule of ours was made on, from their publishers' bytes through a model file alone."""
 
 import json
-import os
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from made_studies import made_study
+from real_recordings import real_recordings
 
 import snarelab
 from snarelab.models.effects import get_effect
@@ -14,20 +13,10 @@ from snarelab.models.model import PlacedEffect
 from snarelab.models.model_file import load_model
 from snarelab.studies import cart, tx40
 
-ROOT = Path(__file__).resolve().parents[3]
-
-
-def folder(name, file):
-    given = os.environ.get("SNARELAB_RECORDINGS")
-    for place in ([Path(given)] if given else []) + [ROOT.parent / "shared" / "recordings"]:
-        if (place / name / file).is_file():
-            return place / name
-    pytest.skip(f"{name} recordings not found: set SNARELAB_RECORDINGS to the folder that holds {name}/{file}")
-
 
 @pytest.fixture(scope="module")
 def halves():
-    positions = folder("tx40", "pos_read_data.csv") / "pos_read_data.csv"
+    positions = real_recordings("tx40", "pos_read_data.csv") / "pos_read_data.csv"
     return [f"{positions}@{part}" for part in (tx40.TRAIN, tx40.HOLDOUT)]
 
 
@@ -62,7 +51,7 @@ def test_a_zero_that_is_a_quarter_turn_off_is_found(halves):
 
 
 def test_the_carts_bytes_come_to_a_mass_near_its_makers(tmp_path):
-    place = folder("cart", "cartTest2/0m05.csv")
+    place = real_recordings("cart", "cartTest2/0m05.csv")
     train = [place / "cartTest2" / name for name in cart.RUNS]
     result = snarelab.identify(cart.HERE / "cart" / "cart.toml", train, holdout=place / cart.HELD)
     (mass,) = [p for p in result.parameters if p.name == "mass"]
@@ -73,7 +62,7 @@ def test_the_carts_bytes_come_to_a_mass_near_its_makers(tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize(("study", "name"), [(cart, "cart"), (tx40, "tx40")])
 def test_a_study_leaves_its_page_and_numbers(study, name, tmp_path, monkeypatch):
-    place = folder(name, {"cart": "cartTest2/0m05.csv", "tx40": "pos_read_data.csv"}[name])
+    place = real_recordings(name, {"cart": "cartTest2/0m05.csv", "tx40": "pos_read_data.csv"}[name])
     left = made_study(name, study, place.parent, tmp_path, monkeypatch)
     assert "What cannot be told apart" in (left / "report.html").read_text()
     result = json.loads((left / "result.json").read_text())

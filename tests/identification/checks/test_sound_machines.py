@@ -1,26 +1,17 @@
 """Real recordings, read in place: none of them is said to contradict its model."""
 
-import os
 from pathlib import Path
 
 import pytest
+from real_recordings import real_recordings
 
 import snarelab
 from snarelab.studies import cart, tx40
 
 STUDIES = Path(cart.__file__).parent
-ROOT = Path(__file__).resolve().parents[3]
 
 CURRENTS = ["shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper"]
 MOTIONS = ["backlash_detection", "chirp_sweep", "friction_gravity", "large_amplitude", "multisine", "random_waypoints"]
-
-
-def recordings(name):
-    given = os.environ.get("SNARELAB_RECORDINGS")
-    for place in ([Path(given)] if given else []) + [ROOT.parent / "shared" / "recordings"]:
-        if (place / name).is_dir():
-            return place / name
-    pytest.skip(f"{name} recordings not found: set SNARELAB_RECORDINGS to the folder that holds {name}")
 
 
 def faults(model, runs):
@@ -28,27 +19,27 @@ def faults(model, runs):
 
 
 def test_an_axis_of_a_test_bench():
-    place = recordings("emps")
+    place = real_recordings("emps")
     for model in ("viscous.toml", "published.toml"):
         assert faults(STUDIES / "emps" / model, sorted(place.glob("*.mat"))) == []
 
 
 def test_a_heavy_robot_with_two_encoders_a_joint():
-    runs = sorted(recordings("kuka_kr300").glob("*.mat"))
+    runs = sorted(real_recordings("kuka_kr300").glob("*.mat"))
     assert len(runs) == 3
     assert faults(STUDIES / "kuka" / "kr300.toml", runs) == []
 
 
 @pytest.mark.parametrize("test", ["cartTest2", "cartTest3"])
 def test_a_cart_on_a_belt(test):
-    runs = sorted((recordings("cart") / test).glob("*.csv"))
+    runs = sorted((real_recordings("cart") / test).glob("*.csv"))
     assert len(runs) == 7
     assert faults(STUDIES / "cart" / "cart.toml", runs) == []
 
 
 @pytest.mark.parametrize("part", [tx40.TRAIN, tx40.HOLDOUT])
 def test_a_robot_with_a_coupled_wrist(part):
-    assert faults(STUDIES / "tx40" / "tx40.toml", [f"{recordings('tx40') / 'pos_read_data.csv'}@{part}"]) == []
+    assert faults(STUDIES / "tx40" / "tx40.toml", [f"{real_recordings('tx40') / 'pos_read_data.csv'}@{part}"]) == []
 
 
 @pytest.mark.parametrize(
@@ -56,7 +47,7 @@ def test_a_robot_with_a_coupled_wrist(part):
 )
 def test_a_hobby_arm_whose_currents_have_no_known_unit(tmp_path, motion):
     """Lists in cells, stamps in microseconds, currents with a constant that nobody states."""
-    place = recordings("so101")
+    place = real_recordings("so101")
     lines = [f'urdf = "{(place / "so101.urdf").resolve()}"', 'effects = ["viscous_friction", "coulomb_friction"]']
     lines += ["[signals]", '"time" = { column = "timestamp", unit = "us" }']
     for k, joint in enumerate(CURRENTS):

@@ -162,7 +162,7 @@ def test_body_with_negative_mass_becomes_the_nearest_physical():
     assert found.misfit > 0.9 * 2 * search.cost
 
 
-@pytest.mark.parametrize("base", [SLIDE, PLANAR, SIX])
+@pytest.mark.parametrize("base", [SLIDE, PLANAR, pytest.param(SIX, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("strength", [0.1, 30.0])
 def test_noisy_data_are_fitted_at_least_as_well_as_by_the_true_links(base, strength):
     rng = np.random.default_rng(7)

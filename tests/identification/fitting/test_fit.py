@@ -129,7 +129,14 @@ def test_many_starts_reach_the_best_makkar_curve(body):
         assert np.sqrt(np.mean((curve - wanted) ** 2)) < 0.01 * np.sqrt(np.mean(wanted**2))
 
 
-@pytest.mark.parametrize(("steep", "fade", "extra"), [(0.01, 0.06, 2.0), (0.01, 0.12, 4.0), (0.03, 0.12, 2.0)])
+@pytest.mark.parametrize(
+    ("steep", "fade", "extra"),
+    [
+        pytest.param(0.01, 0.06, 2.0, marks=pytest.mark.slow),
+        (0.01, 0.12, 4.0),
+        pytest.param(0.03, 0.12, 2.0, marks=pytest.mark.slow),
+    ],
+)
 def test_the_best_makkar_curve_is_found_for_a_bump_that_is_none_of_its_own(body, steep, fade, extra):
     """A bell-shaped bump, as LuGre friction has; scipy looks for the best curve from many random starts.
 

@@ -104,15 +104,24 @@ def test_alike_encoders_are_left_alone(rigid, tmp_path):
         assert one.decided.left == ()
 
 
+SLOW = pytest.mark.slow
+"""What `test_links_decided.py` holds with every run: the same law on one joint, its data by another solver."""
+
+
 @pytest.mark.parametrize(
     ("change", "key", "parameter", "value", "within"),
     [
-        (lambda t, q: CubicSpline(t, q)(t - 0.003), "sensor_delay.q_link.joint2", "delay", 0.003, 0.02),
-        (lambda t, q: CubicSpline(t, q)(t + 0.002), "sensor_delay.q.joint2", "delay", 0.002, 0.03),
-        (lambda t, q: 1.001 * q, "sensor_gain.q_link.joint2", "error", 0.001, 0.02),
-        (lambda t, q: q + 2e-5 * t, "sensor_drift.q_link.joint2", "rate", 2e-5, 0.05),
+        pytest.param(
+            lambda t, q: CubicSpline(t, q)(t - 0.003), "sensor_delay.q_link.joint2", "delay", 0.003, 0.02, id="late"
+        ),
+        pytest.param(
+            lambda t, q: CubicSpline(t, q)(t + 0.002), "sensor_delay.q.joint2", "delay", 0.002, 0.03, id="early"
+        ),
+        pytest.param(lambda t, q: 1.001 * q, "sensor_gain.q_link.joint2", "error", 0.001, 0.02, id="scale", marks=SLOW),
+        pytest.param(
+            lambda t, q: q + 2e-5 * t, "sensor_drift.q_link.joint2", "rate", 2e-5, 0.05, id="drift", marks=SLOW
+        ),
     ],
-    ids=["late", "early", "scale", "drift"],
 )
 def test_a_sensor_fault_is_named_with_its_size(rigid, tmp_path, change, key, parameter, value, within):
     folder, recordings = rigid
@@ -132,7 +141,7 @@ def test_a_zero_is_a_bias_only_where_it_stays(rigid, tmp_path):
     assert named(links_of(folder, write(tmp_path, recordings, change=lambda t, q: q + next(zeros)))) == []
 
 
-@pytest.mark.parametrize("gap", [0.0, 8e-4])
+@pytest.mark.parametrize("gap", [pytest.param(0.0, marks=SLOW), 8e-4])
 def test_a_spring_is_told_from_a_delay_and_from_play(tmp_path, gap):
     spring = Elasticity(4e4, 40.0, gap)
     recordings = record(tmp_path, elasticity={"joint2": spring}, armature={"joint2": 1.0})

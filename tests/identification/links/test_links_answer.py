@@ -63,14 +63,14 @@ def test_a_misfit_is_relative_to_the_link_encoders_own_reading():
              finding("sensor_delay", "q.joint3", 0.002)],
             [channel("x", 2e-3, 1e-3, "rad"), channel("y", 5e-3, 4e-3, "m"), channel("z", 9e-3, 9e-3, "m")],
             "Link and motor encoders differ by sensor delay of 12.3, 2 ms at q_link.joint1, q.joint3; joint elasticity "
-            "at joint2. With that added, the difference left on y, on the held-out recording, falls from "
+            "at joint2. With that added, the remaining difference of y on the held-out recording falls from "
             "5 mm to 4 mm.",
         ),
         (
             [finding("joint_elasticity", "joint1"), finding("sensor_gain")],
             [channel("x", 2e-3, 3e-3, "rad"), channel("y", 1e-3, 1e-3, "rad")],  # none became better: the worst
             "Link and motor encoders differ by joint elasticity at joint1; sensor gain at q_link.joint1. With that "
-            "added, the difference left on x, on the held-out recording, falls from 2 mrad to 3 mrad.",
+            "added, the remaining difference of x on the held-out recording falls from 2 mrad to 3 mrad.",
         ),
         ([finding("sensor_bias")], [], "Link and motor encoders differ by sensor bias at q_link.joint1."),
     ],
@@ -149,7 +149,7 @@ def test_where_the_torques_name_nothing_the_encoders_go_first_however_little_the
     assert made.verdict == "missing_physics"
     assert made.sentence == (
         "Link and motor encoders differ by sensor bias at q_link.joint1. "
-        "The torques ask for nothing that these recordings can show."
+        "The torques show nothing that the model leaves out."
     )
     assert [f.name for f in made.effects] == ["sensor_bias"]
     assert made.fit[0].channel == "A"

@@ -110,9 +110,9 @@ def test_a_bias_is_told_with_what_it_leaves_and_as_far_as_the_zeros_agree():
     (estimate,) = found.parameters.values()
     assert (estimate.value, estimate.std) == (0.02, pytest.approx(4e-3 / np.sqrt(2)))
     assert found.evidence == (
-        "The sensor reads a constant too much or too little: in every recording the link encoder's zero stands off the "
-        "motor's by the same 20 mm; without it the held-out recording is missed by 23.3 mm, with it by 5 mm. It "
-        "explains nothing that moves."
+        "The sensor reads a constant too much or too little: in every recording the link encoder's zero differs from "
+        "the motor encoder's by 20 mm. Without it, the difference on the held-out recording is 23.3 mm, with it 5 mm. "
+        "It explains no motion."
     )
 
 
@@ -185,13 +185,13 @@ def test_notes_tell_every_zero_what_was_not_named_and_what_has_no_name():
     one.train, one.held = range(2), range(2, 3)
     notes = findings.notes_of(given)
     words = (
-        "on q_link.joint1, a smooth curve over position still explains 25 % of what is left between the encoders "
-        "(2 mrad)"
+        "on q_link.joint1, a smooth curve over position still explains 25 % of the remaining difference between the "
+        "encoders (2 mrad)"
     )
     assert notes == [
         "zero of q_link.joint1 against q.joint1, one recording after another: 1, -2.5, 4 mrad",
-        "sensor_gain at q_link.joint1 raised the evidence of the training recordings, and the held-out ones do not "
-        "miss it: not named",
+        "sensor_gain at q_link.joint1 passed on the training recordings, but the held-out ones are predicted no better "
+        "with it: not named",
         f"without a name: {words}",
     ]
     assert findings.nameless(given) == words

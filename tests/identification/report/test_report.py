@@ -47,7 +47,7 @@ def test_all_sections_stand_in_order(reports: dict[str, Path], verdict: str) -> 
         unbroken(diagnosis.sentence),
         "pick_and_place.csv",
         "What to do next",
-        "What this stands on",
+        "Files and versions",
         "sha256:",
     )
     places = [page.text.index(part) for part in parts]

@@ -107,7 +107,7 @@ def test_where_no_candidate_was_named_or_tried_it_says_so(asked):
     assert "each of the best 1 candidates; none was named." in content
     assert "so the shares do not add up.</figcaption>" in content
     none = fit.screened(diagnosis())[2]
-    assert none == "<p>No candidate was tried: nothing in the residual asked for one.</p>\n"
+    assert none == "<p>No candidate was tried: the residual gave no reason for one.</p>\n"
     assert len(asked) == 1
 
 
@@ -141,7 +141,7 @@ def test_notes_close_with_the_limits_of_detection_unless_these_were_shown():
     assert fit.notes(none)[2] == items + findings.detection_limits(none)
     assert fit.notes(replace(said, verdict="adequate"))[2] == items
     quiet = fit.notes(diagnosis(verdict="adequate"))[2]
-    assert quiet == "<p>Nothing to remark on the conditioning or excitation.</p>\n"
+    assert quiet == "<p>No remarks on conditioning or excitation.</p>\n"
 
 
 def test_limits_name_the_place_that_shows_an_effect_best_and_worst():
@@ -153,7 +153,7 @@ def test_limits_name_the_place_that_shows_an_effect_best_and_worst():
         ["Coulomb friction", "level", "0.500 N at slide", "0.500 N at slide"],
         ["Coulomb friction", "b c", "2.00 at x", "2.00 at x"],
     ]
-    none = "<p>No limits of detection were worked out for these recordings.</p>\n"
+    none = "<p>No limits of detection were computed for these recordings.</p>\n"
     assert findings.detection_limits(diagnosis()) == none
 
 

@@ -26,7 +26,7 @@ def test_what_is_left_small_or_is_a_force_alone_is_no_unknown_effect():
 def test_motion_that_is_left_without_a_name_is_told_with_its_size(direction):
     left = channel(f"pos.target.{direction}", "m", 0.026)
     text = _unexplained_words(_unexplained([left, channel("pos.target.x", "m", 0.024), FORCE]))
-    assert text.startswith(f"26 mm of pos.target.{direction} are left")
+    assert text.startswith(f"26 mm of pos.target.{direction} remain")
     assert "check the set-up's sizes and masses" in text
     assert _sentence((), [left, FORCE], text).startswith(
         "Something is missing that no effect of the vocabulary explains"
@@ -41,4 +41,4 @@ def test_an_adequate_model_is_told_by_its_worst_motion_on_the_capture_held_out()
 
 def test_numbers_that_are_better_taken_otherwise_are_listed():
     assert _corrected([]) == ""
-    assert _corrected(["mass = 12 kg", "line = 2 m"]).endswith("are better taken as mass = 12 kg, line = 2 m.")
+    assert _corrected(["mass = 12 kg", "line = 2 m"]).endswith("fit better as mass = 12 kg, line = 2 m.")

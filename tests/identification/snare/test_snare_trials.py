@@ -145,7 +145,7 @@ def test_a_round_scores_every_candidate_and_fits_those_that_are_hopeful():
     assert [t.placed for t in tried] == [FRICTION, PRETENSION]
     assert told == [
         "trying 2 effects at 4 values in simulation",
-        "fitting contact_friction at pin together with what is there",
+        "fitting contact_friction at pin together with the model's effects",
     ]
     friction, pretension = tried
     assert friction.fit.x == pytest.approx([0.2], abs=1e-3)
