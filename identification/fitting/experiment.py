@@ -92,9 +92,8 @@ class Experiment:
     @cached_property
     def regressor(self) -> Regressor:
         """Torque per inertial parameter."""
-        if self.whole:
-            return self.whole.regressor
-        return self.body.packed_regressor(self.motion.q, self.motion.qd, self.motion.qdd)
+        m = self.motion
+        return self.whole.regressor if self.whole else self.body.packed_regressor(m.q, m.qd, m.qdd)
 
     @cached_property
     def mass_matrix(self) -> Array:
@@ -112,9 +111,8 @@ class Experiment:
     @cached_property
     def carried(self) -> Array:
         """Torque that is not supplied by the drives (n, J) [N·m or N]: of a rig's slings, of a base's momentum."""
-        if self.whole:
-            return self.whole.carried
-        return self.body.tree.carried(self.body, self.motion.q, lambda: self.regressor, self.tension)
+        own, q = self.body, self.motion.q
+        return self.whole.carried if self.whole else own.tree.carried(own, q, lambda: self.regressor, self.tension)
 
     @cached_property
     def modelled(self) -> Array:
