@@ -15,14 +15,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import lsq_linear
 
 from ...models.inertia import to_central
 from ...models.rigid_body import RigidBody
 from ...models.tree import Tree
+from .bounded import least_above
 from .reading import Reading, Samples
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int_]
 
 FLOOR = 0.015
 """Relative residual below which nothing is told: models of sound arms leave that much."""
@@ -86,28 +87,29 @@ class CheckBasis:
         J) do not count in the fit, but are part of its residual.
         """
         samples = self.samples.under(reading)
-        y, design, low = self.design(samples, reading.gravity, columns)
+        y, design, low = self._design(samples, reading.gravity, columns)
         # A channel brings its independent samples along where another reading gives it to another joint.
         counted = self.counted[reading.torque_source]
         used = counted > 0
         size = np.sqrt(np.mean(samples.tau**2, axis=0)) + 1e-300
-        y, design = (y / size)[:, used], (design / size[:, None])[:, used]
+        y, design = (y / size)[:, used], [(at, x / size[c]) for c, (at, x) in enumerate(design) if used[c]]
         counted, n = counted[used], len(y)
         scale = np.sum((samples.tau / size)[:, used] ** 2, axis=0)
         kept = np.ones_like(y) if without is None else 1.0 - without[:, used]
-        told = design * kept[:, :, None]
-        # a matrix product a channel: einsum would be ten times slower
-        grams = np.stack([told[:, c].T @ told[:, c] for c in range(len(counted))])
-        rights = np.stack([told[:, c].T @ y[:, c] for c in range(len(counted))])
-        weights, b, residual = counted / (np.sum(y**2, axis=0) + FLOOR**2 * scale), np.zeros(design.shape[2]), y
+        told = [x * kept[:, [c]] for c, (_, x) in enumerate(design)]
+        products = [(at, x.T @ x, x.T @ y[:, c]) for c, ((at, _), x) in enumerate(zip(design, told, strict=True))]
+        weights, b, residual = counted / (np.sum(y**2, axis=0) + FLOOR**2 * scale), np.zeros(len(low)), y
+        held = np.zeros(len(low), bool)
         for _ in range(ROUNDS if bounded else 2):
-            matrix = np.tensordot(weights, grams, 1) + np.eye(len(b))
-            right = weights @ rights
-            b = np.linalg.solve(matrix, right)
-            if bounded and (b < low).any():
-                upper = np.linalg.cholesky(matrix).T
-                b = lsq_linear(upper, np.linalg.solve(upper.T, right), (low, np.inf), method="bvls").x
-            residual = y - design @ b
+            matrix, right = np.eye(len(b)), np.zeros(len(b))
+            for weight, (at, gram, along) in zip(weights, products, strict=True):
+                matrix[np.ix_(at, at)] += weight * gram
+                right[at] += weight * along
+            if bounded:
+                b, held = least_above(matrix, right, low, held)
+            else:
+                b = np.linalg.solve(matrix, right)
+            residual = y - np.stack([x @ b[at] for at, x in design], 1)
             weights = counted / (np.sum((residual * kept) ** 2, axis=0) + FLOOR**2 * scale)
         share = np.sum((residual * kept) ** 2, axis=0) / scale
         prior = 0.5 * float(b @ b)
@@ -118,21 +120,31 @@ class CheckBasis:
         whole[:, used] = residual
         return ReadingFit(float(value), relative, prior, whole, b)
 
-    def design(
+    def _design(
         self, samples: Samples, gravity: Array | None, columns: tuple[Array, Array, Array] | None
-    ) -> tuple[Array, Array, Array]:
-        """Torque less the rigid body's (n, J), columns in units of their widths (n, J, P), lower bounds (P,)."""
-        q, qd, qdd = samples.q, samples.qd, samples.qdd
-        regressor = self.body.regressor(q, qd, qdd, gravity=gravity)
-        own = regressor @ self.body.tree.phi
-        inertial = regressor @ self.spread
+    ) -> tuple[Array, list[tuple[Index, Array]], Array]:
+        """Torque less the rigid body's (n, J), of each channel the columns that reach it, by positions among all P
+        and in units of their widths, and lower bounds (P,)."""
+        q, tree = samples.q, self.body.tree
+        regressor = self.body.packed_regressor(q, samples.qd, samples.qdd, gravity)
+        felt = [regressor.of(c) for c in range(tree.n_joints)]
+        own = np.stack([x @ tree.phi[at] for at, x in felt], 1)
         joints, lows = _joint_columns(samples, own, self.body.mass_matrix(q[:1])[0].diagonal())
-        parts, low = [inertial, joints], [self.least, lows]
+        low, first = [self.least, lows], len(self.least)
+        last = first + len(lows)
+        found = []
+        for c, (at, x) in enumerate(felt):
+            ways = (WAYS * np.flatnonzero(tree.moves[c])[:, None] + np.arange(WAYS)).ravel()
+            index, parts = [ways, first + WAYS * c + np.arange(WAYS)], [x @ self.spread[np.ix_(at, ways)], joints[c]]
+            if columns is not None:
+                extra, widths, _ = columns
+                here = np.flatnonzero(extra[:, c].any(axis=0))
+                index.append(last + here)
+                parts.append(extra[:, c, here] * widths[here])
+            found.append((np.concatenate(index), np.concatenate(parts, axis=1)))
         if columns is not None:
-            extra, widths, bounds = columns
-            parts.append(extra * widths)
-            low.append(bounds / widths)
-        return samples.tau - own, np.concatenate(parts, axis=2), np.concatenate(low)
+            low.append(columns[2] / columns[1])
+        return samples.tau - own, found, np.concatenate(low)
 
 
 def _inertial_directions(tree: Tree, wide: float) -> tuple[Array, Array]:
@@ -167,8 +179,9 @@ def _inertial_directions(tree: Tree, wide: float) -> tuple[Array, Array]:
     return np.stack(columns, 1), np.array(low)
 
 
-def _joint_columns(samples: Samples, own: Array, inertia: Array) -> tuple[Array, Array]:
-    """What joints and sensors of a sound machine may add (n, J, 7 J), one standard deviation each; lower bounds.
+def _joint_columns(samples: Samples, own: Array, inertia: Array) -> tuple[list[Array], Array]:
+    """What joints and sensors of a sound machine may add (n, 7) each, one standard deviation each; lower bounds
+    (7 J,).
 
     Viscous, Coulomb and load-dependent friction (not negative), a rotor's inertia (neither), a spring, a bias, a gain.
     Behind a gear a rotor is often all the inertia that a light joint feels, so that it may be all of the torque.
@@ -195,10 +208,5 @@ def _joint_columns(samples: Samples, own: Array, inertia: Array) -> tuple[Array,
             (own[:, j] * GAIN, -2.5),
         ]
         every.append(columns)
-    width = len(every[0])
-    made, low = np.zeros((n, n_joints, width * n_joints)), np.zeros(width * n_joints)
-    for j, columns in enumerate(every):
-        for k, (values, bound) in enumerate(columns):
-            made[:, j, width * j + k] = values
-            low[width * j + k] = bound
-    return made, low
+    low = np.array([bound for columns in every for _, bound in columns])
+    return [np.stack([values for values, _ in columns], 1) for columns in every], low
