@@ -108,7 +108,7 @@ class CheckBasis:
             if bounded:
                 b, held = least_above(matrix, right, low, held)
             else:
-                b = np.linalg.solve(matrix, right)
+                b = np.asarray(np.linalg.solve(matrix, right), float)
             residual = y - np.stack([x @ b[at] for at, x in design], 1)
             weights = counted / (np.sum((residual * kept) ** 2, axis=0) + FLOOR**2 * scale)
         share = np.sum((residual * kept) ** 2, axis=0) / scale

@@ -122,7 +122,7 @@ class Evidence:
         beside, each = np.zeros((p, m)), self._each(c)
         if m:
             gram = np.zeros((p, p))
-            blocks = (np.hstack([always[x], pool[x]]) for x in _rows(len(always)))
+            blocks = (np.hstack([always[x], pool[x].astype(float)]) for x in _rows(len(always)))
             for white in own.covariance.white_by_rows(blocks):
                 there = white[:, :p]
                 gram += there.T @ there

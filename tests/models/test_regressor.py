@@ -40,7 +40,8 @@ def test_the_columns_of_each_joint_and_link_are_its_own_change_of_torque(tree, m
     packed = body.packed_regressor(*motion)
     assert packed.values.shape == (N, 10 * sum(len(x) for x in BEYOND.values()))
     one = np.eye(60)
-    torque = np.stack([body.torque(*motion, phi) for phi in one], 2)  # (n, J, 60)
+    q, qd, qdd = motion
+    torque = np.stack([body.torque(q, qd, qdd, phi) for phi in one], 2)  # (n, J, 60)
     np.testing.assert_allclose(packed.dense(), torque, atol=1e-11)
     for c, links in BEYOND.items():
         index, columns = packed.of(c)
