@@ -12,6 +12,7 @@ are compared on the same data.
 """
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +33,10 @@ ROUNDS = 4
 """Reweightings; the channels' noise settles within them."""
 
 WAYS = 7
-"""Ways in which a link, and a joint with its sensors, may differ from the robot's file."""
+"""Ways in which a joint with its sensors may differ from the robot's file."""
+
+AROUND = np.array([x for x in product((-1.0, 0.0, 1.0), repeat=3) if sum(map(abs, x)) in (1.0, 3.0)])
+"""Directions (14, 3) in which a load may stand beside a link: they span every position and product of inertia."""
 
 GAIN = 0.2
 """One standard deviation of a torque channel's gain; it is the last of a joint's ways."""
@@ -72,7 +76,7 @@ class CheckBasis:
     def __init__(self, body: RigidBody, samples: Samples, free: bool, counted: Array) -> None:
         """Work out once what links may differ by."""
         self.body, self.samples, self.counted = body, samples, counted
-        self.spread, self.least = _inertial_directions(body.tree, 3.0 if free else 1.0)
+        self.spread, self.least, self.ways = _inertial_directions(body.tree, 3.0 if free else 1.0)
 
     def fit(
         self,
@@ -134,7 +138,7 @@ class CheckBasis:
         last = first + len(lows)
         found = []
         for c, (at, x) in enumerate(felt):
-            ways = (WAYS * np.flatnonzero(tree.moves[c])[:, None] + np.arange(WAYS)).ravel()
+            ways = np.concatenate([self.ways[k] for k in np.flatnonzero(tree.moves[c])])
             index, parts = [ways, first + WAYS * c + np.arange(WAYS)], [x @ self.spread[np.ix_(at, ways)], joints[c]]
             if columns is not None:
                 extra, widths, _ = columns
@@ -147,23 +151,26 @@ class CheckBasis:
         return samples.tau - own, found, np.concatenate(low)
 
 
-def _inertial_directions(tree: Tree, wide: float) -> tuple[Array, Array]:
-    """How links may differ from the robot's file (10 L, 7 L), one standard deviation each, and lower bounds (7 L,).
+def _inertial_directions(tree: Tree, wide: float) -> tuple[Array, Array, list[Index]]:
+    """How links may differ from the robot's file (10 L, W), one standard deviation each, lower bounds (W,), and which
+    of these ways each link has.
 
     Of each link: mass and all that goes with it by 30 %; loads of 10 % of the whole robot's mass, at its centre and as
     far out again; its centre along three axes by 6 % of its size, and 1 % of the whole robot's mass as far; its own
-    inertia by half. ``wide`` times that where the model file says that inertia is free.
+    inertia by half. What is held stands beside the last link of a branch: loads as heavy about its centre, along the
+    axes and the diagonals by its size. ``wide`` times that where the model file says that inertia is free.
     """
     whole = sum(float(link.phi[0]) for link in tree.links)
     reach = max((float(np.linalg.norm(joint.translation)) for joint, *_ in tree.bodies), default=0.0)
-    columns, low = [], []
+    last = tree.moves[tree.moves.sum(axis=1) == 1].any(axis=0)
+    columns, low, ways = [], [], []
     for k, link in enumerate(tree.links):
         mass, com, inertia = to_central(link.phi)
         extent = np.sqrt(max(float(np.trace(inertia)), 0.0) / (2 * mass)) if mass > 0 else 0.0
         size = extent + float(np.linalg.norm(com)) + 0.3 * reach
         steps = [(0.3 * link.phi, -3.0)]
         load = 0.1 * whole
-        for point in (com, 2.0 * com):
+        for point in (com, 2.0 * com, *(com + size * AROUND if last[k] else ())):
             about = load * (point @ point * np.eye(3) - np.outer(point, point))
             steps.append((np.concatenate([[load], load * point, about[np.triu_indices(3)]]), 0.0))
         for axis in np.eye(3):
@@ -171,12 +178,13 @@ def _inertial_directions(tree: Tree, wide: float) -> tuple[Array, Array]:
             change = com @ moved * 2 * np.eye(3) - np.outer(com, moved) - np.outer(moved, com)
             steps.append((np.concatenate([[0.0], moved, change[np.triu_indices(3)]]), -np.inf))
         steps.append((np.concatenate([np.zeros(4), 0.5 * inertia[np.triu_indices(3)]]), -2.0))
+        ways.append(np.arange(len(low), len(low) + len(steps)))
         for step, bound in steps:
             column = np.zeros(10 * len(tree.links))
             column[10 * k : 10 * k + 10] = wide * step
             columns.append(column)
             low.append(bound / wide)
-    return np.stack(columns, 1), np.array(low)
+    return np.stack(columns, 1), np.array(low), ways
 
 
 def _joint_columns(samples: Samples, own: Array, inertia: Array) -> tuple[list[Array], Array]:
