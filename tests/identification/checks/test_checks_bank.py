@@ -12,6 +12,7 @@ from snarelab.models.model_file import load_model
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("each_diagnosis_once")]
 DRAWN = 10
 MISSED = 0.1
+ARMS = 3
 HELD_OUT = 700
 """What the seed of a held-out recording is higher by."""
 
@@ -76,26 +77,32 @@ def diagnosed(folder, made, text, runs, held):
     ids=lambda mistake: mistake.__name__,
 )
 def test_a_mend_gives_the_verdict_of_the_sound_recording(tmp_path, mistake):
-    """Where the mend is an estimate, or leaves samples or recordings out. Two joints and no physics missing: a mend
-    that is not quite right would be told as some. The first arm on which the mistake is found: on the last joint a
-    wrong zero is the same as a link whose mass is turned."""
+    """Where the mend is an estimate, or leaves samples or recordings out: on two of three arms at least. Two joints and
+    no physics missing: a mend that is not quite right is told as some."""
+    missed, tried = [], 0
     for seed in range(23, 33):
         made = bank.machine(seed, n_joints=2, missing=False)
         runs, name, _ = mistake(made, seed)
-        paths = written(tmp_path, made, runs)
-        found = checked(tmp_path, paths)
-        if any(f.name == name for f in found):
+        folder = tmp_path / str(seed)
+        folder.mkdir()
+        paths = written(folder, made, runs)
+        found = checked(folder, paths)
+        if not any(f.name == name for f in found):
+            continue
+        kept = [run for path, run in zip(paths, runs, strict=True) if path in left(paths, found)]
+        held = mistake(made, seed + HELD_OUT)[0][:1]
+        as_it_should_be, lines = bank.sound(mistake, made, seed)
+        sound_held, _ = bank.sound(mistake, made, seed + HELD_OUT)
+        verdict, names = diagnosed(folder, made, mended(MODEL, found), kept, held)
+        sound_verdict, sound_names = diagnosed(folder, made, lines + MODEL, as_it_should_be, sound_held[:1])
+        assert verdict != "data_fault"
+        if verdict != sound_verdict:
+            missed.append((seed, names, sound_names))
+        tried += 1
+        if tried == ARMS or len(missed) > 1:
             break
-    else:
-        pytest.fail(f"{name} is found on none of ten arms")
-    kept = [run for path, run in zip(paths, runs, strict=True) if path in left(paths, found)]
-    held = mistake(made, seed + HELD_OUT)[0][:1]
-    as_it_should_be, lines = bank.sound(mistake, made, seed)
-    sound_held, _ = bank.sound(mistake, made, seed + HELD_OUT)
-    verdict, names = diagnosed(tmp_path, made, mended(MODEL, found), kept, held)
-    sound_verdict, sound_names = diagnosed(tmp_path, made, lines + MODEL, as_it_should_be, sound_held[:1])
-    assert verdict == sound_verdict, (names, sound_names)
-    assert verdict != "data_fault"
+    assert tried == ARMS
+    assert len(missed) <= 1, missed
 
 
 @pytest.mark.parametrize("seed", range(100, 160))
