@@ -152,7 +152,7 @@ class CheckBasis:
 
 
 def _inertial_directions(tree: Tree, wide: float) -> tuple[Array, Array, list[Index]]:
-    """How links may differ from the robot's file (10 L, W), one standard deviation each, lower bounds (W,), and which
+    """How links may differ from the robot's file (10 L, k), one standard deviation each, lower bounds (k,), and which
     of these ways each link has.
 
     Of each link: mass and all that goes with it by 30 %; loads of 10 % of the whole robot's mass, at its centre and as

@@ -275,7 +275,7 @@ def test_a_whole_answer_without_a_name(moved, verdict):
         ("cable_pretension", 0.3, 2.0, False),
         ("contact_friction", 0.1, 1.0, False),
     ]
-    assert said.notes[0].startswith("umbilical_stiffness at target passed on the captures fitted")
+    assert said.notes[0].startswith("umbilical_stiffness at target passed on the training recordings")
     assert said.notes[-1] == "37 captures were simulated in 12 s"
     assert said.effects == ()
 
@@ -294,7 +294,7 @@ def test_a_whole_answer_with_a_name_and_a_number_that_was_corrected(monkeypatch)
     said = report_on(MODEL, searched(simulated(0.2), last, names), [OWN], [OWN], 1.0, 1)
     assert said.verdict == "missing_physics"
     assert [f.name for f in said.effects] == ["contact_friction"]
-    assert said.sentence.endswith("better taken as mass = 100 kg.")
+    assert said.sentence.endswith("fit better as mass = 100 kg.")
     assert f"the error of {said.foremost} on" in said.sentence
     (moved,) = said.moved
     assert (moved.name, moved.unit) == ("capture.mass", "kg")
