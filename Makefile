@@ -26,12 +26,12 @@ study-emps: .venv/core
 $(filter-out study-emps,$(STUDIES:%=study-%)): study-%: .venv/installed ## run one study: report and numbers in build/studies/NAME
 	$(ONE_THREAD) $(BIN)/python -m snarelab.studies.$(subst -,_,$*)
 
-studies: $(filter-out study-tolerance,$(STUDIES:%=study-%)) ## every study but the tolerances, one after the other: a quarter of an hour; CI runs them
+studies: $(filter-out study-tolerance,$(STUDIES:%=study-%)) ## every study but the tolerances, one after the other: three quarters of an hour; CI runs them
 
 test: .venv/installed ## set up, then the tests
 	$(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist worksteal
 
-test-slow: .venv/installed ## the tests of whole studies and captures, which `make test` leaves out: ten minutes; CI runs them
+test-slow: .venv/installed ## the tests of whole studies and captures, which `make test` leaves out: half an hour; CI runs them
 	$(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist loadfile -m slow
 
 check: .venv/installed ## formatting, lint, words and types
