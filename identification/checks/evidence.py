@@ -162,7 +162,7 @@ def _inertial_directions(tree: Tree, wide: float) -> tuple[Array, Array, list[In
     """
     whole = sum(float(link.phi[0]) for link in tree.links)
     reach = max((float(np.linalg.norm(joint.translation)) for joint, *_ in tree.bodies), default=0.0)
-    last = tree.moves[tree.moves.sum(axis=1) == 1].any(axis=0)
+    last: NDArray[np.bool_] = np.any(tree.moves[np.sum(tree.moves, axis=1) == 1], axis=0)
     columns, low, ways = [], [], []
     for k, link in enumerate(tree.links):
         mass, com, inertia = to_central(link.phi)
