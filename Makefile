@@ -2,7 +2,8 @@
 PYTHON ?= python3
 BIN := .venv/bin
 SOURCES := $(shell git ls-files --cached --others --exclude-standard '*.py' '*.toml' '*.urdf' '*.csv' '*.json' '*.c' '*.h' 'fmu/c/*.txt' 2>/dev/null | grep -v -e '^tests/' -e '^bench/' -e '^proof/')
-STUDIES := emps kuka bam tx40 cart free-floating ground-capture zero-g-rig orbit-inspection orbit-hover orbit-abort tolerance
+# The longest first, so that two at a time end together.
+STUDIES := zero-g-rig cart orbit-inspection orbit-hover orbit-abort kuka free-floating tx40 ground-capture bam emps tolerance
 
 # Where processes share the cores, threads of a linear algebra library wait for each other, and burn the time they wait.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
@@ -25,12 +26,12 @@ study-emps: .venv/core
 $(filter-out study-emps,$(STUDIES:%=study-%)): study-%: .venv/installed ## run one study: report and numbers in build/studies/NAME
 	$(ONE_THREAD) $(BIN)/python -m snarelab.studies.$(subst -,_,$*)
 
-studies: $(filter-out study-tolerance,$(STUDIES:%=study-%)) ## every study but the tolerances, one after the other: a quarter of an hour; CI runs them
+studies: $(filter-out study-tolerance,$(STUDIES:%=study-%)) ## every study but the tolerances, one after the other: three quarters of an hour; CI runs them
 
 test: .venv/installed ## set up, then the tests
 	$(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist worksteal
 
-test-slow: .venv/installed ## the tests of whole studies and captures, which `make test` leaves out: ten minutes; CI runs them
+test-slow: .venv/installed ## the tests of whole studies and captures, which `make test` leaves out: half an hour; CI runs them
 	$(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist loadfile -m slow
 
 check: .venv/installed ## formatting, lint, words and types

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from ..errors import InputError
 from .compiled import SampleFunction
 from .inertia import Array
+from .regressor import Regressor
 from .rotation import exact, turn
 from .tree import Tree
 
@@ -111,7 +112,7 @@ def symbolic_torque(tree: Tree, q: ca.SX, qd: ca.SX, qdd: ca.SX, gravity: ca.SX,
 
 
 def _symbolic_regressor(tree: Tree, q: ca.SX, qd: ca.SX, qdd: ca.SX, gravity: ca.SX) -> ca.SX:
-    """Matrix (J, 10 * L): each joint's unit twist, carried outward, times each link's wrench matrix."""
+    """Each joint's unit twist, carried outward, times the wrench matrix of each link that it moves (10 F, 1)."""
     motions = _motions(tree, q, qd, qdd, gravity)
     matrices = [_wrench_matrix(motion) for motion in motions]
     bodies, none = tree.bodies, ca.SX(3, 1)
@@ -130,7 +131,7 @@ def _symbolic_regressor(tree: Tree, q: ca.SX, qd: ca.SX, qdd: ca.SX, gravity: ca
                 force, moment = matrices[i]
                 turn, slide = twists[i]
                 blocks[j][i] = turn.T @ moment + slide.T @ force
-    return ca.blockcat(blocks)
+    return ca.vertcat(*(blocks[j][i].T for j, i in zip(*np.nonzero(tree.moves), strict=True)))
 
 
 class RigidBody:
@@ -157,7 +158,14 @@ class RigidBody:
 
     def regressor(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, gravity: ArrayLike | None = None) -> Array:
         """Matrix (n, J, 10 * L) with ``torque = regressor @ phi``."""
-        return self._regressor(*self._motion(q=q, qd=qd, qdd=qdd), self._gravity(gravity))[0]
+        return self.packed_regressor(q, qd, qdd, gravity).dense()
+
+    def packed_regressor(
+        self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, gravity: ArrayLike | None = None
+    ) -> Regressor:
+        """`regressor` without what is zero whatever the motion."""
+        (values,) = self._regressor(*self._motion(q=q, qd=qd, qdd=qdd), self._gravity(gravity))
+        return Regressor(values[:, :, 0], self.tree.moves)
 
     def mass_matrix(self, q: ArrayLike, phi: ArrayLike | None = None) -> Array:
         """Mass matrix M(q) (n, J, J) [kg·m², kg·m or kg]."""

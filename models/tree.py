@@ -6,15 +6,18 @@ at zero, turned about (revolute) or moved along (prismatic) ``axis`` otherwise. 
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
 from .axes import JointAxis
 from .inertia import Array
 
 if TYPE_CHECKING:
+    from .regressor import Regressor
     from .rigid_body import RigidBody
 
 
@@ -150,11 +153,11 @@ class Tree:
         return [link.name for link in self.links].index(name)
 
     def carried(
-        self, body: "RigidBody", q: Array, regressor: Callable[[], Array], tension: Mapping[str, Array]
+        self, body: "RigidBody", q: Array, regressor: Callable[[], "Regressor"], tension: Mapping[str, Array]
     ) -> Array:
         """Torque that something else than the joints' drives supplies (n, J) [N·m or N].
 
-        ``q`` (n, J), what gives the ``regressor`` (n, J, 10 L) at the motion, measured ``tension`` (n,) [N] by name.
+        ``q`` (n, J), what gives the ``regressor`` at the motion, measured ``tension`` (n,) [N] by name.
         """
         return np.zeros_like(q)
 
@@ -163,6 +166,20 @@ class Tree:
         """Of every link: what moves it, and by which freedom: (joint, index, multiplier, offset), parents first."""
         own = [(joint, i, 1.0, 0.0) for i, joint in enumerate(self.joints)]
         return (*own, *((f.joint, f.leader, f.multiplier, f.offset) for f in self.followers))
+
+    @cached_property
+    def moves(self) -> NDArray[np.bool_]:
+        """Whether a joint moves a link (J, L), as leader of its followers too: only then does it feel its inertia."""
+        found = np.zeros((self.n_joints, len(self.links)), bool)
+        for link, (joint, own, _, _) in enumerate(self.bodies):
+            if joint.parent >= 0:
+                found[:, link] = found[:, joint.parent]
+            found[own, link] = True
+        return found
+
+    def coupled(self, joint: int) -> NDArray[np.int_]:
+        """Joints that feel how a joint moves, itself among them: a link is moved by both."""
+        return np.flatnonzero((self.moves & self.moves[joint]).any(axis=1))
 
     @property
     def phi(self) -> Array:

@@ -12,17 +12,19 @@ are compared on the same data.
 """
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import lsq_linear
 
 from ...models.inertia import to_central
 from ...models.rigid_body import RigidBody
 from ...models.tree import Tree
+from .bounded import least_above
 from .reading import Reading, Samples
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int_]
 
 FLOOR = 0.015
 """Relative residual below which nothing is told: models of sound arms leave that much."""
@@ -31,7 +33,10 @@ ROUNDS = 4
 """Reweightings; the channels' noise settles within them."""
 
 WAYS = 7
-"""Ways in which a link, and a joint with its sensors, may differ from the robot's file."""
+"""Ways in which a joint with its sensors may differ from the robot's file."""
+
+AROUND = np.array([x for x in product((-1.0, 0.0, 1.0), repeat=3) if sum(map(abs, x)) in (1.0, 3.0)])
+"""Directions (14, 3) in which a load may stand beside a link: they span every position and product of inertia."""
 
 GAIN = 0.2
 """One standard deviation of a torque channel's gain; it is the last of a joint's ways."""
@@ -71,7 +76,7 @@ class CheckBasis:
     def __init__(self, body: RigidBody, samples: Samples, free: bool, counted: Array) -> None:
         """Work out once what links may differ by."""
         self.body, self.samples, self.counted = body, samples, counted
-        self.spread, self.least = _inertial_directions(body.tree, 3.0 if free else 1.0)
+        self.spread, self.least, self.ways = _inertial_directions(body.tree, 3.0 if free else 1.0)
 
     def fit(
         self,
@@ -86,28 +91,29 @@ class CheckBasis:
         J) do not count in the fit, but are part of its residual.
         """
         samples = self.samples.under(reading)
-        y, design, low = self.design(samples, reading.gravity, columns)
+        y, design, low = self._design(samples, reading.gravity, columns)
         # A channel brings its independent samples along where another reading gives it to another joint.
         counted = self.counted[reading.torque_source]
         used = counted > 0
         size = np.sqrt(np.mean(samples.tau**2, axis=0)) + 1e-300
-        y, design = (y / size)[:, used], (design / size[:, None])[:, used]
+        y, design = (y / size)[:, used], [(at, x / size[c]) for c, (at, x) in enumerate(design) if used[c]]
         counted, n = counted[used], len(y)
         scale = np.sum((samples.tau / size)[:, used] ** 2, axis=0)
         kept = np.ones_like(y) if without is None else 1.0 - without[:, used]
-        told = design * kept[:, :, None]
-        # a matrix product a channel: einsum would be ten times slower
-        grams = np.stack([told[:, c].T @ told[:, c] for c in range(len(counted))])
-        rights = np.stack([told[:, c].T @ y[:, c] for c in range(len(counted))])
-        weights, b, residual = counted / (np.sum(y**2, axis=0) + FLOOR**2 * scale), np.zeros(design.shape[2]), y
+        told = [x * kept[:, [c]] for c, (_, x) in enumerate(design)]
+        products = [(at, x.T @ x, x.T @ y[:, c]) for c, ((at, _), x) in enumerate(zip(design, told, strict=True))]
+        weights, b, residual = counted / (np.sum(y**2, axis=0) + FLOOR**2 * scale), np.zeros(len(low)), y
+        held = np.zeros(len(low), bool)
         for _ in range(ROUNDS if bounded else 2):
-            matrix = np.tensordot(weights, grams, 1) + np.eye(len(b))
-            right = weights @ rights
-            b = np.linalg.solve(matrix, right)
-            if bounded and (b < low).any():
-                upper = np.linalg.cholesky(matrix).T
-                b = lsq_linear(upper, np.linalg.solve(upper.T, right), (low, np.inf), method="bvls").x
-            residual = y - design @ b
+            matrix, right = np.eye(len(b)), np.zeros(len(b))
+            for weight, (at, gram, along) in zip(weights, products, strict=True):
+                matrix[np.ix_(at, at)] += weight * gram
+                right[at] += weight * along
+            if bounded:
+                b, held = least_above(matrix, right, low, held)
+            else:
+                b = np.asarray(np.linalg.solve(matrix, right), float)
+            residual = y - np.stack([x @ b[at] for at, x in design], 1)
             weights = counted / (np.sum((residual * kept) ** 2, axis=0) + FLOOR**2 * scale)
         share = np.sum((residual * kept) ** 2, axis=0) / scale
         prior = 0.5 * float(b @ b)
@@ -118,40 +124,53 @@ class CheckBasis:
         whole[:, used] = residual
         return ReadingFit(float(value), relative, prior, whole, b)
 
-    def design(
+    def _design(
         self, samples: Samples, gravity: Array | None, columns: tuple[Array, Array, Array] | None
-    ) -> tuple[Array, Array, Array]:
-        """Torque less the rigid body's (n, J), columns in units of their widths (n, J, P), lower bounds (P,)."""
-        q, qd, qdd = samples.q, samples.qd, samples.qdd
-        regressor = self.body.regressor(q, qd, qdd, gravity=gravity)
-        own = regressor @ self.body.tree.phi
-        inertial = regressor @ self.spread
+    ) -> tuple[Array, list[tuple[Index, Array]], Array]:
+        """Torque less the rigid body's (n, J), of each channel the columns that reach it, by positions among all P
+        and in units of their widths, and lower bounds (P,)."""
+        q, tree = samples.q, self.body.tree
+        regressor = self.body.packed_regressor(q, samples.qd, samples.qdd, gravity)
+        felt = [regressor.of(c) for c in range(tree.n_joints)]
+        own = np.stack([x @ tree.phi[at] for at, x in felt], 1)
         joints, lows = _joint_columns(samples, own, self.body.mass_matrix(q[:1])[0].diagonal())
-        parts, low = [inertial, joints], [self.least, lows]
+        low, first = [self.least, lows], len(self.least)
+        last = first + len(lows)
+        found = []
+        for c, (at, x) in enumerate(felt):
+            ways = np.concatenate([self.ways[k] for k in np.flatnonzero(tree.moves[c])])
+            index, parts = [ways, first + WAYS * c + np.arange(WAYS)], [x @ self.spread[np.ix_(at, ways)], joints[c]]
+            if columns is not None:
+                extra, widths, _ = columns
+                here = np.flatnonzero(extra[:, c].any(axis=0))
+                index.append(last + here)
+                parts.append(extra[:, c, here] * widths[here])
+            found.append((np.concatenate(index), np.concatenate(parts, axis=1)))
         if columns is not None:
-            extra, widths, bounds = columns
-            parts.append(extra * widths)
-            low.append(bounds / widths)
-        return samples.tau - own, np.concatenate(parts, axis=2), np.concatenate(low)
+            low.append(columns[2] / columns[1])
+        return samples.tau - own, found, np.concatenate(low)
 
 
-def _inertial_directions(tree: Tree, wide: float) -> tuple[Array, Array]:
-    """How links may differ from the robot's file (10 L, 7 L), one standard deviation each, and lower bounds (7 L,).
+def _inertial_directions(tree: Tree, wide: float) -> tuple[Array, Array, list[Index]]:
+    """How links may differ from the robot's file (10 L, k), one standard deviation each, lower bounds (k,), and which
+    of these ways each link has.
 
     Of each link: mass and all that goes with it by 30 %; loads of 10 % of the whole robot's mass, at its centre and as
     far out again; its centre along three axes by 6 % of its size, and 1 % of the whole robot's mass as far; its own
-    inertia by half. ``wide`` times that where the model file says that inertia is free.
+    inertia by half. What is held stands beside the last link of a branch: loads as heavy about its centre, along the
+    axes and the diagonals by its size. ``wide`` times that where the model file says that inertia is free.
     """
     whole = sum(float(link.phi[0]) for link in tree.links)
     reach = max((float(np.linalg.norm(joint.translation)) for joint, *_ in tree.bodies), default=0.0)
-    columns, low = [], []
+    last: NDArray[np.bool_] = np.any(tree.moves[np.sum(tree.moves, axis=1) == 1], axis=0)
+    columns, low, ways = [], [], []
     for k, link in enumerate(tree.links):
         mass, com, inertia = to_central(link.phi)
         extent = np.sqrt(max(float(np.trace(inertia)), 0.0) / (2 * mass)) if mass > 0 else 0.0
         size = extent + float(np.linalg.norm(com)) + 0.3 * reach
         steps = [(0.3 * link.phi, -3.0)]
         load = 0.1 * whole
-        for point in (com, 2.0 * com):
+        for point in (com, 2.0 * com, *(com + size * AROUND if last[k] else ())):
             about = load * (point @ point * np.eye(3) - np.outer(point, point))
             steps.append((np.concatenate([[load], load * point, about[np.triu_indices(3)]]), 0.0))
         for axis in np.eye(3):
@@ -159,16 +178,18 @@ def _inertial_directions(tree: Tree, wide: float) -> tuple[Array, Array]:
             change = com @ moved * 2 * np.eye(3) - np.outer(com, moved) - np.outer(moved, com)
             steps.append((np.concatenate([[0.0], moved, change[np.triu_indices(3)]]), -np.inf))
         steps.append((np.concatenate([np.zeros(4), 0.5 * inertia[np.triu_indices(3)]]), -2.0))
+        ways.append(np.arange(len(low), len(low) + len(steps)))
         for step, bound in steps:
             column = np.zeros(10 * len(tree.links))
             column[10 * k : 10 * k + 10] = wide * step
             columns.append(column)
             low.append(bound / wide)
-    return np.stack(columns, 1), np.array(low)
+    return np.stack(columns, 1), np.array(low), ways
 
 
-def _joint_columns(samples: Samples, own: Array, inertia: Array) -> tuple[Array, Array]:
-    """What joints and sensors of a sound machine may add (n, J, 7 J), one standard deviation each; lower bounds.
+def _joint_columns(samples: Samples, own: Array, inertia: Array) -> tuple[list[Array], Array]:
+    """What joints and sensors of a sound machine may add (n, 7) each, one standard deviation each; lower bounds
+    (7 J,).
 
     Viscous, Coulomb and load-dependent friction (not negative), a rotor's inertia (neither), a spring, a bias, a gain.
     Behind a gear a rotor is often all the inertia that a light joint feels, so that it may be all of the torque.
@@ -195,10 +216,5 @@ def _joint_columns(samples: Samples, own: Array, inertia: Array) -> tuple[Array,
             (own[:, j] * GAIN, -2.5),
         ]
         every.append(columns)
-    width = len(every[0])
-    made, low = np.zeros((n, n_joints, width * n_joints)), np.zeros(width * n_joints)
-    for j, columns in enumerate(every):
-        for k, (values, bound) in enumerate(columns):
-            made[:, j, width * j + k] = values
-            low[width * j + k] = bound
-    return made, low
+    low = np.array([bound for columns in every for _, bound in columns])
+    return [np.stack([values for values, _ in columns], 1) for columns in every], low

@@ -208,7 +208,7 @@ def _noise(
         for i, e in enumerate(along.instruments[:n]):
             own = [others.baseline[i][channel][1], columns.some(i, channel, np.array(chosen, int))]
             if along.assembly.base is None:
-                own.append(regressor_columns(e, channel))
+                own.append(regressor_columns(e, channel)[1])
             parts.append(np.concatenate(own, axis=1))
         return principal(parts, STRONGEST)
 

@@ -7,7 +7,7 @@ of the masses, small curves. With S = K + A A' a hypothesis is H = C' S⁻¹ C a
 against nothing is ½ g' (H + κ⁻²)⁻¹ g - ½ log det(1 + κ² H). Letters: n samples, m columns, P parameters beside.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 
@@ -20,8 +20,8 @@ from .pool import CandidateColumns, Hypothesis, Item
 Array = NDArray[np.float64]
 Index = NDArray[np.int_]
 
-AT_ONCE = 512
-"""Columns that are worked on side by side: all at once, they would take several times the memory of all of them."""
+ROWS = 256
+"""Samples of all columns that are worked on together: all at once, they would take twice the memory of all of them."""
 
 
 @dataclass(frozen=True)
@@ -118,31 +118,33 @@ class Evidence:
     def _products(self, i: int, c: int) -> Products:
         own, pool = self.channels[i][c], self._pools[i][c]
         always, m = np.column_stack([own.residual, own.columns]), pool.shape[1]
-        beside, each = np.zeros((always.shape[1], m)), {}
+        p = always.shape[1]
+        beside, each = np.zeros((p, m)), self._each(c)
         if m:
-            always = own.covariance.white(always)
-            gram = always.T @ always
-            columns = np.empty(pool.shape, order="F")  # made white; nothing else is as large, so that it is not kept
-            for some in (slice(k, k + AT_ONCE) for k in range(0, m, AT_ONCE)):
-                columns[:, some] = own.covariance.white(pool[:, some].astype(float))
-                beside[:, some] = always.T @ columns[:, some]
-            each = self._each(c, columns)
+            gram = np.zeros((p, p))
+            blocks = (np.hstack([always[x], pool[x].astype(float)]) for x in _rows(len(always)))
+            for white in own.covariance.white_by_rows(blocks):
+                there = white[:, :p]
+                gram += there.T @ there
+                beside += there.T @ white[:, p:]
+                columns = np.ascontiguousarray(white[:, p:].T)
+                for at, total in each:
+                    some = columns[at]
+                    total += some @ some.transpose(0, 2, 1)
         else:  # few columns are divided sooner than made white
-            gram = always.T @ own.covariance.solve(always)
+            gram = own.covariance.gram(always)
+        known = {x.tobytes(): own for at, total in each for x, own in zip(at, total, strict=True)}
         return Products(
-            gram[1:, 1:], gram[1:, 0], own.covariance.log_det, float(gram[0, 0]), beside[1:], beside[0], each
+            gram[1:, 1:], gram[1:, 0], own.covariance.log_det, float(gram[0, 0]), beside[1:], beside[0], known
         )
 
-    def _each(self, c: int, white: Array) -> dict[bytes, Array]:
-        """Products of the columns of every item that reaches a channel, by their positions there."""
-        found: dict[bytes, Array] = {}
+    def _each(self, c: int) -> list[tuple[Index, Array]]:
+        """Positions (N, k) on a channel of the columns of every item that reaches it, and room for their products."""
+        found = []
         for group in self.alike:
             at = self.where[c][group.index]
             at = np.unique(at[at[:, 0] >= 0], axis=0)
-            step = max(1, AT_ONCE // at.shape[1])
-            for some in (at[k : k + step] for k in range(0, len(at), step)):
-                own = white.T[some]
-                found |= zip((x.tobytes() for x in some), own @ own.transpose(0, 2, 1), strict=True)
+            found.append((at, np.zeros((*at.shape, at.shape[1]))))
         return found
 
     def own(self, i: int, c: int) -> list[tuple[Index, Array]]:
@@ -163,8 +165,9 @@ class Evidence:
         if key not in self._rows:
             pool, at = self._pools[i][c], self.where[c][self.items[number].index]
             divided = self.channels[i][c].covariance.solve(pool[:, at].astype(float)).T
-            blocks = (pool[:, k : k + AT_ONCE].astype(float) for k in range(0, pool.shape[1], AT_ONCE))
-            self._rows[key] = np.hstack([divided @ block for block in blocks])
+            self._rows[key] = total = np.zeros((len(at), pool.shape[1]))
+            for x in _rows(len(pool)):
+                total += divided[:, x] @ pool[x].astype(float)
         return self._rows[key]
 
     def with_covariances(self, c: int, covariances: Sequence[Covariance]) -> "Evidence":
@@ -200,6 +203,23 @@ class Evidence:
         other._made = {(i, 0): x for (i, k), x in self._made.items() if k == c}
         other._arrange()
         return other, own, always
+
+    def of_items(self, numbers: Sequence[int]) -> "Evidence":
+        """The evidence of some items by themselves, without the columns of the others."""
+        columns = np.unique(np.concatenate([self.items[x].index for x in numbers]))
+        other = copy(self)
+        other.items = tuple(
+            replace(self.items[x], index=np.searchsorted(columns, self.items[x].index)) for x in numbers
+        )
+        there = [x[columns] >= 0 for x in self.where]
+        at = [x[columns[own]] for x, own in zip(self.where, there, strict=True)]
+        other._pools = [[pool[:, x] for pool, x in zip(row, at, strict=True)] for row in self._pools]
+        other.numbers = [np.flatnonzero(own) for own in there]
+        other.n_columns = len(columns)
+        other.where = [_inverse(x, other.n_columns) for x in other.numbers]
+        other._made = {}
+        other._arrange()
+        return other
 
     def with_channel(self, c: int, alone: "Evidence") -> "Evidence":
         """This evidence with one channel's covariance and products taken from ``alone``."""
@@ -237,6 +257,11 @@ class Evidence:
                 e = e - self.contribution(i, c, item, amplitudes)
             total += e * own.covariance.solve(e)
         return total
+
+
+def _rows(n: int) -> Iterator[slice]:
+    """Runs of `ROWS` of n samples."""
+    return (slice(k, k + ROWS) for k in range(0, n, ROWS))
 
 
 def _inverse(numbers: Index, count: int) -> Index:

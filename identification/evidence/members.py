@@ -38,10 +38,7 @@ class Members:
         sizes = [WHOLE if x.whole else size for x, (_, size) in zip(items, self.taken, strict=True)]
         self._deviation = np.concatenate([np.full(len(x.index), s) for x, s in zip(items, sizes, strict=True)])
         mean = np.concatenate([np.full(len(x.index), float(x.whole)) for x in items])
-        columns, spread = np.concatenate([x.index for x in items]), np.concatenate([x.spread for x in items])
-        # Of many a set only the value is asked for: what it has in common with every column is gathered when needed.
-        curvature = np.concatenate([on.cross(x)[:, columns] for x, _ in self.taken]) * spread
-        curvature = 0.5 * (curvature + curvature.T)
+        curvature = on.curvatures([x for x, _ in self.taken])
         score = np.concatenate([on.score(x) for x, _ in self.taken])
         shift = curvature @ mean
         news = (score - shift) * self._deviation

@@ -32,11 +32,14 @@ def remainders(found: ArmSelection, train: Sequence[Experiment], held: Sequence[
     """Nameless curves of the last search that the held-out recordings confirm."""
     n, search, slots = len(train), found.search, found.slots
     evidence = search.on.evidence
-    both = ProjectedEvidence(evidence, range(n + len(held)), found.weighed.beside.weight(found.tolerance))
+    if not slots:
+        return ()
+    some = evidence.of_items([s.taken.item for s in slots])
+    both = ProjectedEvidence(some, range(n + len(held)), found.weighed.beside.weight(found.tolerance))
 
-    def beside(some: Sequence[int]) -> tuple[float, Array]:
-        taken = [(slots[k].taken.item, slots[k].taken.size) for k in some]
-        own, all_of_it = Members(search.on, taken), Members(both, taken)
+    def beside(chosen: Sequence[int]) -> tuple[float, Array]:
+        taken = [(slots[k].taken.item, slots[k].taken.size) for k in chosen]
+        own, all_of_it = Members(search.on, taken), Members(both, [(k, slots[k].taken.size) for k in chosen])
         mean = [(item, own.of(item)) for item, _ in taken]
         always = search.on.beside(mean)
         pairs = [(evidence.items[item], a) for item, a in mean]

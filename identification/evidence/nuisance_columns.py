@@ -65,7 +65,8 @@ def beside(
         tolerant = slice(count, count + len(one))
         for row, e in zip(parts, along.instruments, strict=True):
             for c, own in enumerate(row):
-                own.append((np.arange(tolerant.start, tolerant.stop), e.to_band(e.regressor[:, c], c) * one))
+                at, felt = regressor_columns(e, c)
+                own.append((tolerant.start + at, felt * one[at]))
         count = tolerant.stop
     sizes = _small(found, baseline[:n], along.scale)
     for (c, words), item in by_words.items():
@@ -152,6 +153,7 @@ def inertial_part(assembly: TorqueModel) -> Array:
     return np.stack([mass, *[mass * reach] * 3, *[mass * reach**2] * 6], axis=1).ravel()
 
 
-def regressor_columns(e: Experiment, channel: int) -> Array:
-    """Torque by every inertial parameter in the analysis band (n_band, 10 L)."""
-    return e.to_band(e.regressor[:, channel], channel)
+def regressor_columns(e: Experiment, channel: int) -> Part:
+    """Inertial parameters that a channel feels (k,), and its torque by them in the analysis band (n_band, k)."""
+    at, columns = e.regressor.of(channel)
+    return at, e.to_band(columns, channel)

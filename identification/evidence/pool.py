@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -10,6 +9,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
+
+ROOM = 2048
+"""Columns that a channel of a recording has room for at first: more than most have, as a copy leaves a hole behind."""
 
 
 @dataclass(frozen=True)
@@ -58,10 +60,9 @@ class CandidateColumns:
     lengths: Sequence[int]
     """Samples of each recording in the analysis band."""
     count: int = 0
-    parts: dict[tuple[int, int], list[Single]] = field(default_factory=dict)
     numbers: dict[int, list[NDArray[np.int_]]] = field(default_factory=dict)
-    stacked: dict[tuple[int, int], Single] = field(default_factory=dict)
-    """Once asked for, side by side; ``parts`` are views of them."""
+    rows: dict[tuple[int, int], Single] = field(default_factory=dict)
+    """One a column; with room for more, which takes no memory before it is written to."""
 
     def add(self, own: Mapping[int, Sequence[Array]]) -> NDArray[np.int_]:
         """Enter columns: for each channel one array (n, k) a recording, of the same k everywhere; their numbers."""
@@ -69,21 +70,23 @@ class CandidateColumns:
         index = np.arange(self.count, self.count + k)
         self.count += k
         for c, parts in own.items():
-            self.numbers.setdefault(c, []).append(index)
+            before = sum(len(x) for x in self.numbers.setdefault(c, []))
+            self.numbers[c].append(index)
             for i, x in enumerate(parts):
-                self.parts.setdefault((i, c), []).append(x.astype(np.float32))
+                rows = self.rows.get((i, c), np.empty((0, self.lengths[i]), np.float32))
+                if before + k > len(rows):
+                    more = np.empty((max(2 * len(rows), before + k, ROOM), self.lengths[i]), np.float32)
+                    more[:before] = rows[:before]
+                    self.rows[i, c] = rows = more
+                rows[before : before + k] = x.T
         return index
 
     def of(self, recording: int, channel: int) -> tuple[NDArray[np.int_], Single]:
         """Numbers (m,) and columns (n, m) of a channel."""
         if channel not in self.numbers:
             return np.zeros(0, int), np.zeros((0, 0), np.float32)
-        key, numbers = (recording, channel), np.concatenate(self.numbers[channel])
-        if key not in self.stacked or self.stacked[key].shape[1] < len(numbers):
-            whole = self.stacked[key] = np.concatenate(self.parts[key], axis=1)
-            edges = np.cumsum([0, *(x.shape[1] for x in self.parts[key])])
-            self.parts[key] = [whole[:, a:b] for a, b in pairwise(edges)]
-        return numbers, self.stacked[key]
+        numbers = np.concatenate(self.numbers[channel])
+        return numbers, self.rows[recording, channel][: len(numbers)].T
 
     def has(self, channel: int, number: int) -> bool:
         """Whether a column belongs to a channel."""
@@ -91,13 +94,7 @@ class CandidateColumns:
 
     def some(self, recording: int, channel: int, wanted: NDArray[np.int_]) -> Array:
         """Columns of a channel (n, k) by their numbers."""
-        own = []
-        for index, x in zip(self.numbers.get(channel, ()), self.parts.get((recording, channel), ()), strict=True):
-            inside = wanted[(wanted >= index[0]) & (wanted <= index[-1])]
-            if len(inside):
-                own.append((inside, x[:, inside - index[0]]))
-        if not own:
+        if not len(wanted):
             return np.zeros((self.lengths[recording], 0))
-        numbers = np.concatenate([a for a, _ in own])
-        order = {int(a): k for k, a in enumerate(numbers)}
-        return np.concatenate([x for _, x in own], axis=1)[:, [order[int(w)] for w in wanted]].astype(float)
+        numbers, columns = self.of(recording, channel)
+        return columns[:, np.searchsorted(numbers, wanted)].astype(float, order="C")

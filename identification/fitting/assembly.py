@@ -28,6 +28,7 @@ from .effect_places import EffectPlace, TorqueState
 from .experiment import Experiment, Scales
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int_]
 
 KEPT = 3
 """Evaluations that stay with a recording: of the model as given, of the last fit, and of a trial beside them."""
@@ -282,16 +283,16 @@ class TorqueModel:
         """Rigid-body torque (n, J) and its derivative blocks."""
         n_joints = len(self._joints)
         if self.base is not None:
-            n_base = len(self.base.names)
             key = ("base", self.base.columns.tobytes())
             if key not in experiment.store:
-                experiment.store[key] = experiment.regressor[:, :, self.base.columns]
-            columns = experiment.store[key]
-            blocks = [Block(c, np.arange(n_base), columns[:, c], ("base", c)) for c in range(n_joints)]
-            return columns @ theta[:n_base] - experiment.carried, blocks
+                experiment.store[key] = [_kept(*experiment.regressor.of(c), self.base) for c in range(n_joints)]
+            blocks = [Block(c, at, own, ("base", c)) for c, (at, own) in enumerate(experiment.store[key])]
+            return np.stack([b.values @ theta[b.index] for b in blocks], 1) - experiment.carried, blocks
         key = ("rigid", self.phi.tobytes())
         if key not in experiment.store:
-            experiment.store[key] = np.asfortranarray(experiment.regressor @ self.phi - experiment.carried)
+            motion = experiment.motion
+            torque = experiment.body.torque(motion.q, motion.qd, motion.qdd, self.phi)
+            experiment.store[key] = np.asfortranarray(torque - experiment.carried)
         load, blocks = experiment.store[key].copy("F"), []  # a joint's samples side by side
         for k, p in enumerate(self.placed):
             if p.effect.at != "link":
@@ -301,6 +302,12 @@ class TorqueModel:
                 load[:, channel] += values
                 blocks.append(Block(channel, self._index[k], columns[:, self._free[k]]))
         return load, blocks
+
+
+def _kept(felt: Index, columns: Array, base: BaseParameters) -> tuple[Index, Array]:
+    """Base parameters that a joint feels (k,), and its torque by them (n, k)."""
+    known = np.isin(felt, base.columns)
+    return np.searchsorted(base.columns, felt[known]), np.ascontiguousarray(columns[:, known])
 
 
 def _sensed(blocks: Sequence[Block], channel: int, sense: Callable[[Array], Array]) -> list[Block]:

@@ -120,11 +120,21 @@ class JointPlace(EffectPlace):
     def spread(self, experiment: Experiment, values: Array, by_parameter: Array) -> list[ChannelTerm]:
         """A torque acts by virtual work; a change of motion changes every channel by the rigid body's derivative."""
         if self.placed.effect.acts_on != "torque":
-            return moved(experiment, self.joint, values, by_parameter)
+            return self.moved(experiment, values, by_parameter)
         here, torque, columns = self.where, values[:, 0], by_parameter[:, 0]
         if here.alone is not None:
             return [(here.alone, torque, columns)]
         return [(int(c), here.along[c] * torque, here.along[c] * columns) for c in here.channels]
+
+    def moved(self, experiment: Experiment, values: Array, by_parameter: Array) -> list[ChannelTerm]:
+        """Terms of every channel that feels it by a change of the joint's position, rate and acceleration (n, 3), to
+        first order. ``by_parameter`` (n, 3, p) is the change's derivative."""
+        by_position, by_rate = experiment.tangent
+        terms = []
+        for c in self.tree.coupled(self.joint):
+            path = np.stack([x[:, c, self.joint] for x in (by_position, by_rate, experiment.mass_matrix)], 1)
+            terms.append((int(c), np.einsum("nd,nd->n", path, values), np.einsum("nd,ndp->np", path, by_parameter)))
+        return terms
 
     def by_load(self, law: LawEvaluation) -> Array | None:
         """Of a torque, the derivative that the law gives."""
@@ -180,9 +190,9 @@ class EncoderPlace(SensorPlace):
         beside = signals["value"] - signals["load"]
         change, by, by_value = self.error(along, signals, beside, parameters, bare)
         errors = [self.error(along, signals, x[:, j], parameters, bare)[:2] for x in (motion.q, motion.qd, motion.qdd)]
-        terms = moved(along.experiment, j, *(np.stack(x, 1) for x in zip(*errors, strict=True)))
-        terms[j] = (j, terms[j][1] + change, terms[j][2] + by)
-        return self._told(along, terms, parameters, by_value)
+        terms = self.moved(along.experiment, *(np.stack(x, 1) for x in zip(*errors, strict=True)))
+        own = [(c, x + change, columns + by) if c == j else (c, x, columns) for c, x, columns in terms]
+        return self._told(along, own, parameters, by_value)
 
 
 class LinkPlace(EffectPlace):
@@ -207,8 +217,7 @@ class LinkPlace(EffectPlace):
 
     def spread(self, experiment: Experiment, values: Array, by_parameter: Array) -> list[ChannelTerm]:
         """Through the regressor: values (10,), by_parameter (10, p)."""
-        columns = experiment.regressor[:, :, 10 * self.joint : 10 * self.joint + 10]
-        return [(c, columns[:, c] @ values, columns[:, c] @ by_parameter) for c in range(columns.shape[1])]
+        return [(c, own @ values, own @ by_parameter) for c, own in experiment.regressor.of_link(self.joint)]
 
 
 class BasePlace(EffectPlace):
@@ -221,16 +230,3 @@ class BasePlace(EffectPlace):
     def spread(self, experiment: Experiment, values: Array, by_parameter: Array) -> list[ChannelTerm]:
         """The wrench that the effect gives to the base reduces the wrench that is needed from outside."""
         return [(c, -values[:, c], -by_parameter[:, c]) for c in rows(self.placed.effect)]
-
-
-def moved(experiment: Experiment, joint: int, values: Array, by_parameter: Array) -> list[ChannelTerm]:
-    """Terms of every channel by a change of a joint's position, rate and acceleration (n, 3), to first order.
-
-    ``by_parameter`` (n, 3, p) is the change's derivative.
-    """
-    by_position, by_rate = experiment.tangent
-    paths = np.stack([by_position[:, :, joint], by_rate[:, :, joint], experiment.mass_matrix[:, :, joint]], 2)
-    return [
-        (c, np.einsum("nd,nd->n", paths[:, c], values), np.einsum("nd,ndp->np", paths[:, c], by_parameter))
-        for c in range(paths.shape[1])
-    ]

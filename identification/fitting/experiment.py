@@ -14,6 +14,7 @@ from ...errors import InputError
 from ...models.axes import place
 from ...models.floating.tree import FloatingTree, channel
 from ...models.model import Model
+from ...models.regressor import Regressor
 from ...models.rigid_body import RigidBody
 from ...recordings.condition import Motion, condition
 from .floating_terms import as_carriers, twist_noise, wheel_impulse, with_base, with_twist
@@ -64,6 +65,8 @@ class Experiment:
     """For each channel, runs of samples that are no data; none by default."""
     kept: NDArray[np.bool_] | None = None
     """Samples of the analysis band that count (n_band, J); the others are zero. All by default."""
+    whole: "Experiment | None" = field(default=None, repr=False)
+    """This recording without bridges, along the same motion: what the rigid body gives is worked out there."""
 
     def to_band(self, x: Array, channel: int) -> Array:
         """Samples (n, ...) of a channel, bridged where they are no data, in the analysis band (n_band, ...)."""
@@ -84,31 +87,32 @@ class Experiment:
 
     def with_bridges(self, bridges: tuple[Bridge, ...], kept: NDArray[np.bool_] | None) -> "Experiment":
         """This recording with runs of samples that are no data. The rigid body's results are kept."""
-        made = replace(self, store={}, bridged=bridges, kept=kept)
-        shared = ("regressor", "mass_matrix", "tangent", "carried", "elapsed")
-        made.__dict__.update({name: getattr(self, name) for name in shared})
-        return made
+        return replace(self, store={}, bridged=bridges, kept=kept, whole=self.whole or self)
 
     @cached_property
-    def regressor(self) -> Array:
-        """Torque per inertial parameter (n, J, 10 L)."""
-        return self.body.regressor(self.motion.q, self.motion.qd, self.motion.qdd)
+    def regressor(self) -> Regressor:
+        """Torque per inertial parameter."""
+        m = self.motion
+        return self.whole.regressor if self.whole else self.body.packed_regressor(m.q, m.qd, m.qdd)
 
     @cached_property
     def mass_matrix(self) -> Array:
         """Joint-space inertia at the nominal parameters (n, J, J)."""
-        return self.body.mass_matrix(self.motion.q)
+        return self.whole.mass_matrix if self.whole else self.body.mass_matrix(self.motion.q)
 
     @cached_property
     def tangent(self) -> tuple[Array, Array]:
         """Derivative of the nominal torque by position and by rate, each (n, J, J); slings move with the arm."""
+        if self.whole:
+            return self.whole.tangent
         gravity = np.zeros(3) if self.body.tree.balanced else None
         return self.body.tangent(self.motion.q, self.motion.qd, self.motion.qdd, gravity=gravity)
 
     @cached_property
     def carried(self) -> Array:
         """Torque that is not supplied by the drives (n, J) [N·m or N]: of a rig's slings, of a base's momentum."""
-        return self.body.tree.carried(self.body, self.motion.q, lambda: self.regressor, self.tension)
+        own, q = self.body, self.motion.q
+        return self.whole.carried if self.whole else own.tree.carried(own, q, lambda: self.regressor, self.tension)
 
     @cached_property
     def modelled(self) -> Array:

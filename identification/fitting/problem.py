@@ -133,9 +133,12 @@ def reached(assembly: TorqueModel, p: PlacedEffect) -> tuple[int, ...]:
         return reached_joints(cast(Rig, tree), p.effect.at, p.at, rows(p.effect))
     if p.effect.at == "base":
         return rows(p.effect)
-    everywhere = p.effect.at == "link" or p.effect.acts_on == "position"
-    if everywhere or p.effect.at != "joint":
-        return tuple(range(tree.n_joints)) if everywhere else (assembly.joint_of(p),)
+    if p.effect.at == "link":
+        return tuple(int(c) for c in np.flatnonzero(tree.moves[:, assembly.joint_of(p)]))
+    if p.effect.acts_on == "position":
+        return tuple(int(c) for c in tree.coupled(assembly.joint_of(p)))
+    if p.effect.at != "joint":
+        return (assembly.joint_of(p),)
     return tuple(int(c) for c in assembly.place_of(p).channels)
 
 

@@ -106,7 +106,8 @@ def learn(
     size, most = float(np.std(whole)) + 1e-12, float(np.sqrt(np.mean(whole**2))) + 1e-12
     stretch = [slice(0, min(len(r), max(STRETCH // len(runs), 100))) for r in residuals]
     parts = [
-        (r[rows], c[rows], run.some(rows)) for r, c, run, rows in zip(residuals, columns, runs, stretch, strict=True)
+        (_beside(r[rows], c[rows]), run.some(rows))
+        for r, c, run, rows in zip(residuals, columns, runs, stretch, strict=True)
     ]
 
     def fast(x: Array) -> tuple[Noise, float]:
@@ -157,7 +158,12 @@ def _best(cost: Callable[[Array], float], start: Array, wide: Array, low: Array,
     return minimize(whole, start, method="L-BFGS-B", bounds=bounds, options={"maxiter": 12, "eps": 1e-3}).x
 
 
-def _averaged(residual: Array, columns: Array, run: NoiseChannel) -> tuple[Array, Array, NoiseChannel]:
+def _beside(residual: Array, columns: Array) -> Array:
+    """A residual and what could explain it (n, 1 + k), each column's samples side by side."""
+    return np.asfortranarray(np.column_stack([residual, columns]))
+
+
+def _averaged(residual: Array, columns: Array, run: NoiseChannel) -> tuple[Array, NoiseChannel]:
     """Means over blocks of `AVERAGED` seconds: what is faster becomes white."""
     length = max(int(AVERAGED / run.step), 1)
     starts, segments, count = [], [], 0
@@ -169,18 +175,17 @@ def _averaged(residual: Array, columns: Array, run: NoiseChannel) -> tuple[Array
     rows = np.concatenate(starts)[:, None] + np.arange(length)
     sticks, settles = tuple(x[rows].mean(axis=1) for x in run.sticks), run.settles[rows].mean(axis=1)
     other = NoiseChannel(run.step * length, tuple(segments), np.zeros(count), sticks, settles, run.level)
-    return residual[rows].mean(axis=1), columns[rows].mean(axis=1), other
+    return _beside(residual[rows].mean(axis=1), columns[rows].mean(axis=1)), other
 
 
-def _cost(own: tuple[Noise, float], parts: Sequence[tuple[Array, Array, NoiseChannel]]) -> float:
+def _cost(own: tuple[Noise, float], parts: Sequence[tuple[Array, NoiseChannel]]) -> float:
     """Minus the log-likelihood of all recordings, the amplitudes of the columns integrated out."""
     noise, spread = own
-    k = parts[0][1].shape[1]
+    k = parts[0][0].shape[1] - 1
     total, gram = 0.0, np.zeros((k + 1, k + 1))
-    for residual, columns, run in parts:
+    for both, run in parts:
         covariance = noise.covariance(run)
-        both = np.column_stack([residual, columns])
-        gram += both.T @ covariance.solve(both)
+        gram += covariance.gram(both)
         total += 0.5 * covariance.log_det
     factor = cho_factor(np.eye(k) + spread**2 * gram[1:, 1:], lower=True)
     score = spread * gram[1:, 0]

@@ -122,6 +122,6 @@ def _low_passed(experiment: Experiment, bands: Array) -> Experiment:
                     x[s, c] = sosfiltfilt(sos, x[s, c])
     kept = ", ".join(f"{j} {b:.2g} Hz" for j, b in zip(motion.joints, bands, strict=True) if np.isfinite(b))
     note = f"columns for the search come from low-passed motion, because disturbances drive these joints above: {kept}"
-    made = replace(experiment, motion=replace(motion, **filtered, notes=(*motion.notes, note)), store={})
+    made = replace(experiment, motion=replace(motion, **filtered, notes=(*motion.notes, note)), store={}, whole=None)
     made.store["bands"] = bands
     return made

@@ -14,6 +14,7 @@ from .arm import FloatingArm, load_arm
 from .ets_vii import ets_vii
 
 if TYPE_CHECKING:
+    from ..regressor import Regressor
     from ..rigid_body import RigidBody
 
 CARRIERS = 6
@@ -47,11 +48,12 @@ class FloatingTree(Tree):
         return CARRIERS
 
     def carried(
-        self, body: "RigidBody", q: Array, regressor: Callable[[], Array], tension: Mapping[str, Array]
+        self, body: "RigidBody", q: Array, regressor: Callable[[], "Regressor"], tension: Mapping[str, Array]
     ) -> Array:
         """Force and moment that the base's own momentum asks for, which its channels have as measured."""
-        own, columns = np.zeros_like(q), slice(10 * (CARRIERS - 1), 10 * CARRIERS)
-        own[:, :CARRIERS] = regressor()[:, :CARRIERS, columns] @ self.links[CARRIERS - 1].phi
+        own = np.zeros_like(q)
+        for c, columns in regressor().of_link(CARRIERS - 1):
+            own[:, c] = columns @ self.links[CARRIERS - 1].phi
         return own
 
 

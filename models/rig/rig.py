@@ -19,6 +19,7 @@ from ..tree import Joint, Link, Tree
 from .points import point_motion
 
 if TYPE_CHECKING:
+    from ..regressor import Regressor
     from ..rigid_body import RigidBody
 
 
@@ -121,7 +122,7 @@ class Rig(Tree):
         return next(s.link for s in self.slings if s.name == name)
 
     def carried(
-        self, body: "RigidBody", q: Array, regressor: Callable[[], Array], tension: Mapping[str, Array]
+        self, body: "RigidBody", q: Array, regressor: Callable[[], "Regressor"], tension: Mapping[str, Array]
     ) -> Array:
         """In balance the weight of the arm as the model gives it, so that all which differs from the model's masses
         shows under gravity. A measured tension adds what it exceeds the balance by."""

@@ -209,11 +209,12 @@ def on_the_wall(made, seed):
 
 
 def zero_off(made, seed):
-    """Of a joint that torque tells: by a shift of its zero, some torque changes by half."""
+    """Of a joint that torque tells: by a shift of its zero, some torque changes by half. Not of the last: to turn its
+    link is to take something from one side of it and to hold it on the other."""
     run = record(made, seed)
     far = 0.6 if seed % 4 < 2 else -1.2
-    told = _shifts(made, run, far)
-    able = [k for k in range(len(told)) if told[k] > 0.5]
+    told = _shifts(made, run, far)[:-1]
+    able = [k for k in range(len(told)) if told[k] > 0.5] or [int(np.argmax(told))]
     k = able[seed % len(able)]
     q = run.q.copy()
     q[:, k] += far

@@ -29,7 +29,7 @@ def numbers_left(name: str) -> dict[str, Any] | None:
     left = ROOT / FOLDER / name
     if not _newer_than_sources(left / "report.html"):
         return None
-    return {q["name"]: q["value"] for q in json.loads((left / "result.json").read_text())["quantities"]}
+    return {q["name"]: q["ours"] for q in json.loads((left / "result.json").read_text())["quantities"]}
 
 
 def _newer_than_sources(page: Path) -> bool:

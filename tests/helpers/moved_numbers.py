@@ -59,7 +59,7 @@ def about(monkeypatch, name: str, value: Any, answer: Callable[[], float]) -> tu
 def planted(size: float) -> Explained:
     """One of ten columns stands in the residual, with nothing else: its score is what noise leaves on average."""
     made = white(np.random.default_rng(0), 10, {})
-    (x,) = made.columns.parts[0, 0]
+    _, x = made.columns.of(0, 0)
     x[:] = np.linalg.qr(x)[0] * np.sqrt(len(x))
     own = made.pieces[0][0]
     made.pieces[0][0] = ResidualChannel(size * x[:, 0].astype(float), own.covariance, own.index, own.columns)

@@ -49,7 +49,7 @@ def test_blocks_of_time(monkeypatch):
 def rivals(share: float, cosine: float) -> list[bool]:
     """Can a rival of this share be told apart, whose column stands at this cosine to the name's?"""
     made = planted(1.0)
-    (x,) = made.columns.parts[0, 0]
+    _, x = made.columns.of(0, 0)
     x[:, 1] = cosine * x[:, 0] + np.sqrt(1 - cosine**2) * x[:, 2]
     labels = [SimpleNamespace(amplitudes=[0]), SimpleNamespace(amplitudes=[0])]
     items = [Item(i.index, i.spread, i.positive, False, y) for i, y in zip(made.items[:2], labels, strict=True)]
@@ -83,7 +83,7 @@ def test_what_adds_the_same_is_alike(monkeypatch):
 def becomes(alike: float) -> bool:
     """Does a curve become the name whose law can add this share of what it adds?"""
     made = planted(1.0)
-    (x,) = made.columns.parts[0, 0]
+    _, x = made.columns.of(0, 0)
     x[:, 1] = np.sqrt(alike) * x[:, 0] + np.sqrt(1 - alike) * x[:, 2]
     labels = [SimpleNamespace(amplitudes=[0])] * 2
     items = [Item(i.index, i.spread, i.positive, False, y) for i, y in zip(made.items[:2], labels, strict=True)]

@@ -70,7 +70,7 @@ def test_a_payload_is_named_beyond_what_masses_are_known_to(monkeypatch):
 
     def named(size):
         made = planted(1.0)
-        (x,) = made.columns.parts[0, 0]
+        _, x = made.columns.of(0, 0)
         x *= 1000
         own = made.pieces[0][0]
         made.pieces[0][0] = ResidualChannel(

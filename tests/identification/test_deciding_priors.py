@@ -108,7 +108,7 @@ def test_an_effect_that_is_at_one_joint_is_likelier_at_another(monkeypatch):
 
     def told(size):
         made = planted(1.0)
-        (x,) = made.columns.parts[0, 0]
+        _, x = made.columns.of(0, 0)
         own = made.pieces[0][0]
         made.pieces[0][0] = ResidualChannel(x[:, 0] + size * x[:, 1], own.covariance, own.index, own.columns)
         several = odds_of(made)
@@ -129,7 +129,7 @@ def shaped(monkeypatch, off: float, bent: float, curve: bool) -> float:
     Between shapes the law changes by one of ten columns, and it is bent by another, over which there may be a curve.
     """
     made = planted(1.0)
-    x = made.columns.parts[0, 0][0].astype(float)
+    x = made.columns.of(0, 0)[1].astype(float)
     placed = PlacedEffect(get_effect("stribeck_friction"), "joint1")
     grid = [
         EffectVariant(placed, np.array([1.0, s]), np.zeros(1, int), np.zeros(1), np.ones(1)) for s in (1.0, 2.0, 3.0)

@@ -71,7 +71,7 @@ def test_a_good_study(write):
         ("[-0.1, 0.1]", "[-0.9, 0.1]", "the model holds for -0.5 to 0.5 m"),
         ("radial_y = [-0.1, 0.1]", "", r"\[ranges\] is empty; name at least one of radial_y, friction"),
         ("radial_y = [-0.1, 0.1]", "radial_z = [-0.1, 0.1]", "unknown key 'radial_z'.*did you mean 'radial_y'"),
-        ("radial_error = 0.01", "radial_error = 0", "radial_error = 0; no case could ever meet it"),
+        ("radial_error = 0.01", "radial_error = 0", "radial_error = 0; no case can meet it"),
         ("strength = 800.0", "", r"\[success\] strength is missing"),
         ("[fixed]", "[fixed]\nradial_y = 0.0", r"radial_y stands in \[ranges\] and in \[fixed\]; keep one"),
         ("friction = 0.2", "friction = 2.0", "allowed is 0 to 1 1"),
@@ -124,7 +124,7 @@ def test_a_full_disk_loses_nothing(write, tmp_path, monkeypatch):
 
     with monkeypatch.context() as patch:
         patch.setattr("pandas.DataFrame.to_parquet", full)
-        with pytest.raises(InputError, match="No space left on device; finished cases are safe; make room"):
+        with pytest.raises(InputError, match="No space left on device; finished cases are kept; make room"):
             results.add("space", 1, study.values(np.array([0.01])), good)
     again = Results(tmp_path / "out", study)
     assert again.done("space", 0)

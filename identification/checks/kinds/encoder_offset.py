@@ -35,7 +35,8 @@ def readings(case: CheckCase) -> list[Reading]:
 
 
 def _best(case: CheckCase, j: int) -> float:
-    """Zero of a joint [rad] by the evidence without bounds: the best of a circle, then of ever finer steps."""
+    """Zero of a joint [rad] by the evidence without bounds: the best of a circle, then of ever finer steps, at last the
+    peak of the parabola through the best and its neighbours."""
 
     def value(offset: float) -> float:
         shift = np.zeros(len(case.joints))
@@ -52,6 +53,9 @@ def _best(case: CheckCase, j: int) -> float:
         best = max((best - step, best, best + step), key=lambda x: values[x])
         if halving == 1 and values[best] < values[0.0] + WORTH:
             return 0.0
+    below, above = value(best - step), value(best + step)
+    if (bend := below + above - 2.0 * values[best]) < 0:
+        best += 0.5 * step * (below - above) / bend
     return float((best + np.pi) % (2 * np.pi) - np.pi)
 
 

@@ -95,7 +95,7 @@ def _candidates(case: CheckCase) -> Iterator[OwnValue]:
     spread = case.grounds.spread
     inertial, modelled = regressor @ spread, regressor @ tree.phi
     for k, link in enumerate(tree.links):
-        part, rows = slice(WAYS * k, WAYS * k + WAYS), slice(10 * k, 10 * k + 10)
+        part, rows = case.grounds.ways[k], slice(10 * k, 10 * k + 10)
         yield OwnValue(
             f"the mass properties of {link.name}",
             link.name,
@@ -106,7 +106,7 @@ def _candidates(case: CheckCase) -> Iterator[OwnValue]:
         )
     slope, _ = body.tangent(samples.q, samples.qd, samples.qdd)
     for c, joint in enumerate(case.joints):
-        column, gain = np.zeros((*samples.q.shape, 1)), WAYS * (len(tree.links) + c + 1) - 1
+        column, gain = np.zeros((*samples.q.shape, 1)), len(case.grounds.least) + WAYS * (c + 1) - 1
         column[:, c, 0] = modelled[:, c]
         yield OwnValue(
             f"the gain of tau.{joint}",

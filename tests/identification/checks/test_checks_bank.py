@@ -12,6 +12,7 @@ from snarelab.models.model_file import load_model
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("each_diagnosis_once")]
 DRAWN = 10
 MISSED = 0.1
+ARMS = 3
 HELD_OUT = 700
 """What the seed of a held-out recording is higher by."""
 
@@ -54,8 +55,6 @@ def test_mistakes_are_found_in_nine_of_ten_arms(tmp_path, mistake):
         good = bool(told) and all(f.name == name and f.at in places for f in told)
         (folder / "arm.toml").write_text(mended(MODEL, found))
         after = [f for f in checked(folder, left(paths, found)) if f.fault]
-        if mistake is bank.load_turned:  # the load that is left is another matter: see the last test
-            after = [f for f in after if f.name == name]
         good = good and not after
         if good and mistake in bank.SAME:
             good = same(folder, paths, lambda other, m=made, s=seed: written(other, m, bank.sound(mistake, m, s)[0]))
@@ -72,37 +71,38 @@ def diagnosed(folder, made, text, runs, held):
     return answer.verdict, {(e.name, e.at) for e in answer.effects}
 
 
-HEAVY = pytest.mark.xfail(
-    reason="a load far beside a link may be read as an encoder's zero or another unit: none is expected"
-)
-
-
 @pytest.mark.parametrize(
     "mistake",
-    [pytest.param(m, marks=HEAVY if m is bank.load_turned else ()) for m in bank.MISTAKES if m not in bank.SAME],
+    [m for m in bank.MISTAKES if m not in bank.SAME],
     ids=lambda mistake: mistake.__name__,
 )
 def test_a_mend_gives_the_verdict_of_the_sound_recording(tmp_path, mistake):
-    """Where the mend is an estimate, or leaves samples or recordings out. Two joints and no physics missing: a mend
-    that is not quite right would be told as some. The first arm on which the mistake is found: on the last joint a
-    wrong zero is the same as a link whose mass is turned."""
+    """Where the mend is an estimate, or leaves samples or recordings out: on two of three arms at least. Two joints and
+    no physics missing: a mend that is not quite right is told as some."""
+    missed, tried = [], 0
     for seed in range(23, 33):
         made = bank.machine(seed, n_joints=2, missing=False)
         runs, name, _ = mistake(made, seed)
-        paths = written(tmp_path, made, runs)
-        found = checked(tmp_path, paths)
-        if any(f.name == name for f in found):
+        folder = tmp_path / str(seed)
+        folder.mkdir()
+        paths = written(folder, made, runs)
+        found = checked(folder, paths)
+        if not any(f.name == name for f in found):
+            continue
+        kept = [run for path, run in zip(paths, runs, strict=True) if path in left(paths, found)]
+        held = mistake(made, seed + HELD_OUT)[0][:1]
+        as_it_should_be, lines = bank.sound(mistake, made, seed)
+        sound_held, _ = bank.sound(mistake, made, seed + HELD_OUT)
+        verdict, names = diagnosed(folder, made, mended(MODEL, found), kept, held)
+        sound_verdict, sound_names = diagnosed(folder, made, lines + MODEL, as_it_should_be, sound_held[:1])
+        assert verdict != "data_fault"
+        if verdict != sound_verdict:
+            missed.append((seed, names, sound_names))
+        tried += 1
+        if tried == ARMS or len(missed) > 1:
             break
-    else:
-        pytest.fail(f"{name} is found on none of ten arms")
-    kept = [run for path, run in zip(paths, runs, strict=True) if path in left(paths, found)]
-    held = mistake(made, seed + HELD_OUT)[0][:1]
-    as_it_should_be, lines = bank.sound(mistake, made, seed)
-    sound_held, _ = bank.sound(mistake, made, seed + HELD_OUT)
-    verdict, names = diagnosed(tmp_path, made, mended(MODEL, found), kept, held)
-    sound_verdict, sound_names = diagnosed(tmp_path, made, lines + MODEL, as_it_should_be, sound_held[:1])
-    assert verdict == sound_verdict, (names, sound_names)
-    assert verdict != "data_fault"
+    assert tried == ARMS
+    assert len(missed) <= 1, missed
 
 
 @pytest.mark.parametrize("seed", range(100, 160))
@@ -113,7 +113,6 @@ def test_sound_recordings_raise_nothing(tmp_path, seed):
     assert [(f.name, f.at, f.message) for f in checked(tmp_path, paths)] == []
 
 
-@HEAVY
 def test_a_heavy_load_far_beside_a_link_raises_nothing(tmp_path):
     """0.6 of the last link's mass and half a kilogram more, a third of a metre off."""
     wrong = []

@@ -9,6 +9,7 @@ from scipy.integrate import quad
 from scipy.stats import norm
 
 from snarelab.identification import deciding
+from snarelab.identification.evidence import evidence as evidence_module
 from snarelab.identification.evidence.members import SIZES, Members
 from snarelab.identification.evidence.pool import CandidateColumns, Hypothesis
 from snarelab.identification.evidence.projected import ProjectedEvidence
@@ -175,3 +176,46 @@ def test_columns_are_given_back_in_the_order_that_was_asked_for():
     numbers, x = columns.of(0, 0)
     assert numbers.tolist() == [2, 3, 4]
     np.testing.assert_array_equal(x, two[0].astype(np.float32))
+
+
+@pytest.mark.parametrize("recording", [0, 1])
+def test_products_do_not_depend_on_how_many_rows_are_worked_on_together(case, recording, monkeypatch):
+    """The last run of rows is shorter than the others, and noise is remembered from one to the next."""
+    made, evidence = case
+    for c in range(2):
+        whole, row = evidence.products(recording, c), evidence.row(recording, c, 1)
+        assert len(made.pieces[recording][c].residual) % 7
+        with monkeypatch.context() as patch:
+            patch.setattr(evidence_module, "ROWS", 7)
+            other = made.evidence()
+            parts = other.products(recording, c)
+            np.testing.assert_allclose(other.row(recording, c, 1), row, rtol=1e-9, atol=1e-9)
+        for name in ("always", "seen", "beside", "score"):
+            np.testing.assert_allclose(getattr(parts, name), getattr(whole, name), rtol=1e-9, atol=1e-9)
+        assert parts.each.keys() == whole.each.keys()
+        for key, own in whole.each.items():
+            np.testing.assert_allclose(parts.each[key], own, rtol=1e-9, atol=1e-9)
+
+
+def test_a_set_is_worth_the_same_whichever_of_its_members_comes_last(case, monkeypatch):
+    _, evidence = case
+    on = ProjectedEvidence(evidence, (0, 1), WEIGHT)
+    one, other = ((0, 0.3), (1, 0.1), (2, 0.3)), ((2, 0.3), (0, 0.3), (1, 0.1))
+    assert Members(on, one).value == pytest.approx(Members(on, other).value, rel=1e-9)
+    alone = ProjectedEvidence(evidence, (0, 1), WEIGHT)
+    with monkeypatch.context() as patch:
+        patch.setattr(alone, "cross", lambda number: pytest.fail("the value of one member needs no other column"))
+        assert Members(alone, [(1, 0.3)]).value == pytest.approx(Members(on, [(1, 0.3)]).value, rel=1e-12)
+
+
+def test_items_by_themselves_keep_their_evidence(case):
+    """The second reaches both channels, the third the last alone."""
+    _, evidence = case
+    chosen = [2, 1]
+    on = ProjectedEvidence(evidence, (0, 1), WEIGHT)
+    alone = ProjectedEvidence(evidence.of_items(chosen), (0, 1), WEIGHT)
+    assert alone.null == pytest.approx(on.null, rel=1e-12)
+    assert len(alone.score_all) == len({int(k) for x in chosen for k in evidence.items[x].index})
+    wanted, found = Members(on, [(2, 0.3), (1, 0.1)]), Members(alone, [(0, 0.3), (1, 0.1)])
+    assert found.value == pytest.approx(wanted.value, rel=1e-9)
+    np.testing.assert_allclose(found.amplitudes, wanted.amplitudes, rtol=1e-9)

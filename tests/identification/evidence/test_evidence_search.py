@@ -57,7 +57,7 @@ def test_of_two_effects_whose_sum_a_third_imitates_the_two_are_found():
     """A forward search takes the third, which explains most alone; exchanges and steps back mend it."""
     rng = np.random.default_rng(3)
     made = white(rng, 6, {})
-    (x,) = made.columns.parts[0, 0]
+    _, x = made.columns.of(0, 0)
     x[:, 2] = (x[:, 0] + x[:, 1]) / np.sqrt(2) + 0.2 * rng.normal(size=len(x))
     own = made.pieces[0][0]
     residual = own.residual + 1.4 * x[:, 0] + 0.7 * x[:, 1]
@@ -123,7 +123,7 @@ def test_a_curve_wins_over_a_name_that_only_looks_like_it():
     """Column 1 is a name at 0.8 of the curve's column 0."""
     rng = np.random.default_rng(9)
     made = white(rng, 2, {})
-    (x,) = made.columns.parts[0, 0]
+    _, x = made.columns.of(0, 0)
     x[:, 1] = 0.8 * x[:, 0] + 0.6 * x[:, 1]
     own = made.pieces[0][0]
     made.pieces[0][0] = type(own)(own.residual + 1.5 * x[:, 0], own.covariance, own.index, own.columns)
@@ -137,7 +137,7 @@ def test_likeness_is_the_share_of_what_one_adds_that_another_can_add(cosine):
     """Of single columns the squared cosine; in white noise with nothing beside."""
     rng, n = np.random.default_rng(10), 200
     made = white(rng, 2, {})
-    (x,) = made.columns.parts[0, 0]
+    _, x = made.columns.of(0, 0)
     q = np.linalg.qr(rng.normal(size=(n, 2)))[0] * np.sqrt(n)
     x[:, 0], x[:, 1] = q[:, 0], -3 * (cosine * q[:, 0] + np.sqrt(1 - cosine**2) * q[:, 1])
     for item in made.items:

@@ -12,6 +12,7 @@ from snarelab.identification.fitting.effect_law import RESPONSE, causal, impulse
 from snarelab.identification.fitting.effect_places import LinkPlace, TorqueState
 from snarelab.models.effects import get_effect
 from snarelab.models.model import PlacedEffect
+from snarelab.models.regressor import Regressor
 
 N, PERIOD = 300, 5e-3
 TIME = PERIOD * np.arange(N)
@@ -32,14 +33,15 @@ def run(segments=(slice(0, N),), links=1) -> Any:
     return Made(
         motion=motion,
         elapsed=TIME,
-        regressor=rng.normal(size=(N, 2, 10 * (links + 1))),
+        regressor=Regressor(rng.normal(size=(N, 20 * (links + 1))), np.ones((2, links + 1), bool)),
         tangent=(by_position, by_rate),
         mass_matrix=rng.normal(size=(N, 2, 2)),
     )
 
 
 def added(e, name, at, parameters, joint=1, load=None, reading=None, scale=1.0, early_alone=False, tree=None) -> Any:
-    own: Any = tree or Made(joints=[Made(name=f"joint{k}", kind="revolute") for k in (1, 2)], axes=())
+    joints = [Made(name=f"joint{k}", kind="revolute") for k in (1, 2)]
+    own: Any = tree or Made(joints=joints, axes=(), coupled=lambda _: (0, 1))
     load, reading = (np.zeros((N, 2)) if x is None else np.stack([np.zeros(N), x], 1) for x in (load, reading))
     here = effect_place(own, PlacedEffect(get_effect(name), at), joint, scale, early_alone)
     return here.terms(TorqueState(e, load, reading), np.array(parameters, float))
@@ -81,10 +83,11 @@ def test_a_links_change_goes_through_its_own_columns_of_the_regressor():
     assert (by_load, passed) == (None, None)
     assert [c for c, *_ in terms] == [0, 1]
     for c, torque, by in terms:
-        np.testing.assert_allclose(torque, e.regressor[:, c, 10:20] @ (2.0 * point), atol=1e-12)
-        np.testing.assert_allclose(by[:, 0], e.regressor[:, c, 10:20] @ point, atol=1e-12)
+        columns = e.regressor.dense()[:, c, 10:20]
+        np.testing.assert_allclose(torque, columns @ (2.0 * point), atol=1e-12)
+        np.testing.assert_allclose(by[:, 0], columns @ point, atol=1e-12)
         along_x = 2.0 * np.array([0, 1, 0, 0, 0, -y, -z, 2 * x, 0, 2 * x])
-        np.testing.assert_allclose(by[:, 1], e.regressor[:, c, 10:20] @ along_x, atol=1e-12)
+        np.testing.assert_allclose(by[:, 1], columns @ along_x, atol=1e-12)
     here = LinkPlace(tree, PlacedEffect(get_effect("inertia_error"), "link2"), 1, 1.0)
     change, _ = here.change(np.arange(10.0))
     np.testing.assert_allclose(change, np.arange(10.0), atol=1e-12)

@@ -300,6 +300,6 @@ def test_a_model_with_an_effect_taken_out_keeps_the_links_that_its_file_holds(bo
     whole = TorqueModel(body.tree, placed, None, scales([run]), values)
     kept = whole.keep(placed[:1], np.array([3.0, 5.0]))
     assert kept.start == pytest.approx([3.0])
-    wanted = run.regressor @ np.concatenate([[1.5 * link.phi[0], *link.phi[1:]] for link in links])
+    wanted = run.regressor.dense() @ np.concatenate([[1.5 * link.phi[0], *link.phi[1:]] for link in links])
     wanted[:, 0] += 3.0 * run.motion.qd[:, 0]
     np.testing.assert_allclose(kept.torque(run, np.array([3.0])), wanted, rtol=1e-12, atol=1e-12)

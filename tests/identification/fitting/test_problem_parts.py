@@ -12,6 +12,9 @@ from snarelab.identification.fitting.problem import Problem, reached, split
 from snarelab.models.effects import get_effect
 from snarelab.models.model import PlacedEffect
 
+MOVES = np.array([[True, True, False], [False, True, False], [False, False, True]])
+"""The second joint hangs from the first, and the third is on a branch of its own."""
+
 
 def assembly(*placed, n_joints=3, blocks=()) -> Any:
     """Free parameters of effects one behind the other; scales are 2 a joint's number, by what they refer to."""
@@ -27,7 +30,7 @@ def assembly(*placed, n_joints=3, blocks=()) -> Any:
         scale=lambda p, x: 2.0 * int(p.at[-1]) if x.relative_to else 1.0,
         joint_of=lambda p: int(p.at[-1]) - 1,
         place_of=lambda p: Made(channels=np.array([0, 2] if p.at == "tie" else [int(p.at[-1]) - 1])),
-        tree=Made(joints=range(n_joints), n_joints=n_joints),
+        tree=Made(joints=range(n_joints), n_joints=n_joints, moves=MOVES, coupled=lambda c: (0, 1) if c < 2 else (2,)),
         evaluate=lambda *_: Made(blocks=list(blocks)),
         keep=lambda kept, theta: ("kept", [p.key for p in kept], theta),
     )
@@ -58,8 +61,9 @@ def test_shapes_have_the_grids_of_their_free_parameters_in_the_joints_scale():
         ("viscous_friction", "joint2", (1,)),
         ("viscous_friction", "tie", (0, 2)),  # an axis of the first joint and the third
         ("sensor_gain", "tau.joint2", (1,)),
-        ("joint_elasticity", "joint2", (0, 1, 2)),  # the link behind it moves all
-        ("payload_mass", "link1", (0, 1, 2)),
+        ("joint_elasticity", "joint2", (0, 1)),  # all that feel the motion of the link behind it
+        ("payload_mass", "link1", (0,)),
+        ("payload_mass", "link2", (0, 1)),
         ("external_torque", "base", (3, 4, 5)),  # a moment, and no force
     ],
 )

@@ -25,6 +25,7 @@ from snarelab.identification.fitting.experiment import (
 from snarelab.identification.fitting.held_out import demand_apart
 from snarelab.identification.fitting.recorded import motion_signals
 from snarelab.models.floating.tree import FloatingTree
+from snarelab.models.regressor import Regressor
 from snarelab.models.rig.rig import Rig
 from snarelab.models.tree import Tree
 
@@ -66,8 +67,11 @@ def test_a_floating_bases_own_momentum_stands_on_the_measured_side():
     """The base is the sixth link, and the first six channels are its own: 2 there for a unit of each parameter."""
     tree: Any = Made(links=(*(5 * [None]), Made(phi=np.arange(1.0, 11.0)), None))
     tree.carried = partial(FloatingTree.carried, tree)
-    regressor = np.zeros((N, 7, 70))
-    regressor[:, :, 50:60], regressor[:, :, 60:] = 2.0, 99.0
+    moves = np.zeros((7, 7), bool)
+    moves[:6, 5] = moves[:, 6] = True
+    regressor = Regressor(np.full((N, 130), 99.0), moves)
+    for _, columns in regressor.of_link(5):
+        columns[:] = 2.0
     e = run(np.full((N, 7), 1000.0), body=Made(tree=tree))
     e.__dict__["regressor"] = regressor
     np.testing.assert_allclose(e.carried, np.tile([*(6 * [110.0]), 0.0], (N, 1)))

@@ -57,6 +57,7 @@ def test_solutions_and_determinant_are_those_of_the_dense_matrix(kind, segments)
     found = Covariance(variance, processes, b, STEP, segments)
     np.testing.assert_allclose(found.solve(x), np.linalg.solve(k, x), rtol=1e-9, atol=1e-10)
     np.testing.assert_allclose(found.solve(x[:, 0]), np.linalg.solve(k, x[:, 0]), rtol=1e-9, atol=1e-10)
+    np.testing.assert_allclose(found.gram(x), x.T @ np.linalg.solve(k, x), rtol=1e-9, atol=1e-10)
     assert found.log_det == pytest.approx(np.linalg.slogdet(k)[1], rel=1e-11)
     np.testing.assert_allclose(found.dense(), k, rtol=1e-8, atol=1e-9)
 

@@ -125,4 +125,5 @@ def test_the_likelihood_is_that_of_all_samples_with_the_amplitudes_integrated_ou
         + spread**2 * np.concatenate(x) @ np.concatenate(x).T
     )
     wanted = -multivariate_normal(np.zeros(2 * n), k).logpdf(np.concatenate(r)) - n * np.log(2 * np.pi)
-    assert _cost((noise, spread), [(a, b, own) for a, b in zip(r, x, strict=True)]) == pytest.approx(wanted, rel=1e-9)
+    parts = [(np.column_stack([a, b]), own) for a, b in zip(r, x, strict=True)]
+    assert _cost((noise, spread), parts) == pytest.approx(wanted, rel=1e-9)
