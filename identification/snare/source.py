@@ -150,16 +150,16 @@ class Captures:
             return [GridPoint(p, {key: g}, (), inverse=True) for g in x.grid]
         return [GridPoint(p, {key: g}, (key,), origin={key: self.origin(p)}) for g in x.grid]
 
-    def columns(self, i: int, at: ModelPoint, v: GridPoint) -> Array:
+    def columns(self, i: int, at: ModelPoint, many: Sequence[GridPoint]) -> list[Array]:
         """What the simulation changes by, for a unit of an amplitude."""
-        # All that will be asked for of this recording, so that the processes share them.
-        every = [x for p in self.library(at.placed) for x in self.variants(p)]
-        self.tracks(i, [at, *(self._with(at, x) for x in every)])
-        none, own = self._seen(i, [at, self._with(at, v)])
+        none, *each = self._seen(i, [at, *(self._with(at, v) for v in many)])
         assert none is not None
-        change = np.full_like(none, np.nan) if own is None else own - none
-        ((key, value),) = v.values.items()
-        return (change / (value - v.origin[key]) if v.amplitudes else change)[:, :, None]
+        found = []
+        for v, own in zip(many, each, strict=True):
+            change = np.full_like(none, np.nan) if own is None else own - none
+            ((key, value),) = v.values.items()
+            found.append((change / (value - v.origin[key]) if v.amplitudes else change)[:, :, None])
+        return found
 
     def _with(self, at: ModelPoint, v: GridPoint) -> ModelPoint:
         """With an effect at a point of its grid; on top of a number's shift, where it stands for that number."""

@@ -79,7 +79,7 @@ def search(
     weighed: WeighedRecordings | None = None
     for number in range(1, ROUNDS + 1):
         progress(f"round {number}: comparing each effect at each place")
-        weighed = opened(source, train, given, here)
+        weighed, _ = opened(source, given, here)
         weighed, made, slots, _ = searched(weighed, range(len(train)), barred, range(len(weighed.noises)))
         trials = trials or _trials(made)
         error = LAW_ERROR**2 * _taken_out(first, here, weighed)
@@ -116,20 +116,15 @@ def _taken_out(first: Linearisation, here: Linearisation, weighed: WeighedRecord
 
 
 def opened(
-    source: Source,
-    numbers: Sequence[int],
-    given: ModelPoint,
-    here: Linearisation,
-    known: WeighedRecordings | None = None,
-) -> WeighedRecordings:
-    """Recordings under a fit with every hypothesis; laws without amplitudes are fitted by themselves."""
-    weighed = weigh(source, numbers, given, here, known, search=True)
+    source: Source, given: ModelPoint, here: Linearisation, known: WeighedRecordings | None = None
+) -> tuple[WeighedRecordings, dict[str, GridPoint]]:
+    """The training recordings under a fit with every hypothesis, and the laws without amplitudes, which are fitted by
+    themselves."""
+    weighed = weigh(source, source.train, given, here, known, search=True)
     if not any(h.named and h.items[0].whole for h in weighed.pool):
-        return weighed
-    n = len(source.train)
-    train = Linearisation(here.at, here.residuals[:n], here.columns[:n])
-    own = by_themselves(source, given, train, weighed)
-    return weigh(source, numbers, given, here, known or weighed, search=True, alone=own)
+        return weighed, {}
+    own = by_themselves(source, given, here, weighed)
+    return weigh(source, source.train, given, here, known or weighed, search=True, alone=own), own
 
 
 def _large(made: Search, slot: MemberOdds, error: Array) -> bool:

@@ -61,6 +61,15 @@ class ModelPoint:
         """This model without some effects."""
         return self._with(tuple(p for p in self.placed if p.key not in keys), self.all_values)
 
+    def held(self, count: int) -> "ModelPoint":
+        """This model with the first ``count`` free parameters held at their values."""
+        known = set(self.keys[:count])
+        placed = [
+            replace(p, hold=(*p.hold, *(x.name for x in p.effect.parameters if f"{p.key}.{x.name}" in known)))
+            for p in self.placed
+        ]
+        return self._with(tuple(placed), self.all_values)
+
     def _with(self, placed: tuple[PlacedEffect, ...], every: Mapping[str, float]) -> "ModelPoint":
         held = {f"{p.key}.{h}": every[f"{p.key}.{h}"] for p in placed for h in p.hold}
         empty = ModelPoint(placed, held, np.zeros(0), self.shifts)
@@ -180,8 +189,9 @@ class Source(Protocol):
         """Points of an effect's grid."""
         ...
 
-    def columns(self, i: int, at: ModelPoint, v: GridPoint) -> Array:
-        """What an effect adds to the prediction of the model (n, c, k); not a number where it cannot be predicted."""
+    def columns(self, i: int, at: ModelPoint, many: Sequence[GridPoint]) -> list[Array]:
+        """What each effect by itself adds to the prediction of the model (n, c, k); not a number where it cannot be
+        predicted."""
         ...
 
     def curves(self, numbers: Sequence[int]) -> Mapping[tuple[int, str], list[Array]]:

@@ -91,12 +91,12 @@ def test_an_amplitude_is_counted_from_what_is_there_without_the_effect():
     _, source = source_of()
     for v, tried in zip(source.variants(FRICTION), (0.08, 0.25), strict=True):
         assert (dict(v.values), v.amplitudes) == ({key_of(FRICTION): tried}, (key_of(FRICTION),))
-        np.testing.assert_allclose(source.columns(0, NOTHING, v)[:, 0, 0], COURSE[::5, 0], atol=1e-9)
+        np.testing.assert_allclose(source.columns(0, NOTHING, [v])[0][:, 0, 0], COURSE[::5, 0], atol=1e-9)
     # The rope's own 1 ms is in the simulation already; of 3 and 10 ms it is what is more that counts.
     _, source = source_of(key=key_of(DAMPING), law=lambda x: x - 1e-3)
     for v in source.variants(DAMPING):
         assert v.origin == {key_of(DAMPING): 1e-3}
-        np.testing.assert_allclose(source.columns(0, NOTHING, v)[:, 0, 0], COURSE[::5, 0], atol=1e-9)
+        np.testing.assert_allclose(source.columns(0, NOTHING, [v])[0][:, 0, 0], COURSE[::5, 0], atol=1e-9)
 
 
 def test_an_effect_of_a_number_that_is_shifted_counts_from_there():
@@ -104,7 +104,7 @@ def test_an_effect_of_a_number_that_is_shifted_counts_from_there():
     _, source = source_of(key=key_of(DAMPING), law=lambda x: x - 1e-3)
     shifted = ModelPoint((), {}, np.zeros(0), np.array([2.0]))
     for v in source.variants(DAMPING):
-        np.testing.assert_allclose(source.columns(0, shifted, v)[:, 0, 0], COURSE[::5, 0], atol=1e-9)
+        np.testing.assert_allclose(source.columns(0, shifted, [v])[0][:, 0, 0], COURSE[::5, 0], atol=1e-9)
 
 
 def test_a_contact_that_gives_way_is_a_whole_law_at_each_stiffness():
@@ -112,7 +112,7 @@ def test_a_contact_that_gives_way_is_a_whole_law_at_each_stiffness():
     _, source = source_of(key=key_of(STIFFNESS), law=lambda k: k ** (-2 / 3))
     for v, tried in zip(source.variants(STIFFNESS), (1e7, 2e6, 3e5), strict=True):
         assert v.amplitudes == ()
-        whole = source.columns(0, NOTHING, v)
+        whole = source.columns(0, NOTHING, [v])[0]
         assert whole.shape == (8, 3, 1)
         np.testing.assert_allclose(whole[:, 0, 0], tried ** (-2 / 3) * COURSE[::5, 0], rtol=1e-9)
 
@@ -120,8 +120,8 @@ def test_a_contact_that_gives_way_is_a_whole_law_at_each_stiffness():
 def test_a_column_that_cannot_be_simulated_is_no_number():
     _, source = source_of(fails=lambda x: x.get(key_of(FRICTION), 0.0) > 0.1)
     first, second = source.variants(FRICTION)
-    assert np.isfinite(source.columns(0, NOTHING, first)).all()
-    assert np.isnan(source.columns(0, NOTHING, second)).all()
+    assert np.isfinite(source.columns(0, NOTHING, [first])[0]).all()
+    assert np.isnan(source.columns(0, NOTHING, [second])[0]).all()
 
 
 def test_what_can_be_missing_are_effects_and_numbers_that_the_file_does_not_give():

@@ -75,8 +75,8 @@ class Slide:
     def variants(self, p):
         return [GridPoint(p, {}, (f"{p.key}.{p.effect.parameters[0].name}",))]
 
-    def columns(self, i, at, v):
-        return self.columns_of(i)[v.placed.key][:, None, None]
+    def columns(self, i, at, many):
+        return [self.columns_of(i)[v.placed.key][:, None, None] for v in many]
 
     def curves(self, numbers):
         return {}
