@@ -17,6 +17,7 @@ from ..sources.answer import with_found as with_effects
 from ..sources.decide import Decision
 from ..sources.search import Naming
 from ..sources.source import Linearisation, ModelPoint
+from ..sources.stages import stages
 from ..sources.weigh import covariances
 from ..verdict import verdict
 from ..wording import foremost, listed, named
@@ -147,11 +148,10 @@ def _steps(source: Captures, decided: Decision) -> tuple[Step, ...]:
         kinds = [[c for c in shown(source.channels) if units[c] == unit] for unit in ("m", "N") if unit in units]
         return float(np.sqrt(np.mean([left[own].sum() / max(float(size[own].sum()), 1e-300) for own in kinds])))
 
-    lines = [Step("model as given", share(decided.found.first, source.train), share(decided.before, source.held))]
-    if decided.best.names:
-        label = " ".join(f"+ {n.placed.effect.name} at {n.placed.at}" for n in decided.best.names)
-        lines.append(Step(label, share(decided.best.train, source.train), share(decided.best.held, source.held)))
-    return tuple(lines)
+    return tuple(
+        Step(label, share(train, source.train), share(held, source.held))
+        for label, train, held in stages(source, decided)
+    )
 
 
 def _moved(

@@ -2,15 +2,14 @@
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from ...models.model import Model
 from ...recordings.part import several
 from ..diagnosis import Diagnosis
 from ..sources.decide import decide
+from ..sources.own import settled
 from .answer import report_on, with_found
-from .identify import fitted, given
 from .source import captures_of, start
 
 
@@ -47,9 +46,5 @@ def diagnose_captures(
     begun = time.monotonic()
     progress("reading the recordings")
     with captures_of(model, recordings, several(holdout), jobs) as source:
-        point = start(model)
-        if len(given(model).placed) < len(point.placed):
-            progress("fitting what the model file has no value of")
-            point = replace(fitted(source)[1].at, shifts=point.shifts)
-        decided = decide(source, point, progress)
+        decided = decide(source, settled(source, model, start(model), progress), progress)
     return report_on(source, decided, time.monotonic() - begun), with_found(model, decided.best.train.at)

@@ -8,19 +8,16 @@ from typing import Any
 import numpy as np
 
 from ...models.model import Model
-from ..deciding import ROUNDS
 from ..evidence.arm import WeighedRecordings
 from ..parameter_list import parameter_list
 from ..sources.answer import estimates, rms
-from ..sources.fit import STILL, deviations, fit, linearised, shift_columns, sizes_of
+from ..sources.fit import deviations, linearised
+from ..sources.own import fitted, known
 from ..sources.source import Linearisation, ModelPoint
-from ..sources.weigh import covariances, weigh
+from ..sources.weigh import covariances
 from .answer import with_found
 from .seen import shown, unit_of
 from .source import Captures, captures_of, start
-
-STEPS = 8
-"""Most steps of the fit."""
 
 
 @dataclass(frozen=True)
@@ -67,30 +64,7 @@ def identify_captures(
     progress("reading the recordings")
     with captures_of(model, recordings, holdout, jobs) as source:
         progress("fitting the effects' parameters with the simulation in the loop")
-        weighed, found = fitted(source)
+        given = known(model, start(model))
+        weighed, found = fitted(source, given, start(model))
         held = linearised(source, source.held, found.at) if holdout else None
-        return CaptureIdentification(with_found(model, found.at), given(model), source, weighed, found, held)
-
-
-def given(model: Model) -> ModelPoint:
-    """What the model file has a value of; of the rest there is no prior."""
-    unknown = {p.key for p in model.effects for x in p.effect.parameters if f"{p.key}.{x.name}" not in model.values}
-    return start(model).without(*unknown)
-
-
-def fitted(source: Captures) -> tuple[WeighedRecordings, Linearisation]:
-    """The model's own parameters, fitted to the training recordings, and these as they were weighed.
-
-    Far from the truth a misfit is taken for noise: where a fit ends the noise is learnt anew, until that moves nothing.
-    """
-    known = given(source.model)
-    here = linearised(source, source.train, start(source.model))
-    weighed = weigh(source, source.train, known, here, search=False)
-    for _ in range(ROUNDS):
-        found = fit(source, known, here.at, covariances(weighed), shift_columns(here), STEPS)
-        moved = np.abs(found.at.values - here.at.values) / sizes_of(source, found.at)
-        here = found
-        if np.all(moved < STILL):
-            break
-        weighed = weigh(source, source.train, known, here, search=False)
-    return weighed, here
+        return CaptureIdentification(with_found(model, found.at), given, source, weighed, found, held)
