@@ -50,9 +50,9 @@ def linearised(
     for k, i in enumerate(numbers):
         here = forecast(source, i, at)
         left.append(np.nan_to_num(source.measured(i) - here))
-        own = np.zeros((*here.shape, 0)) if known is None else known[k][:, :, : known[k].shape[2] - n_shifts]
-        beside = source.shift_slopes(i, at, here) if known is None else known[k][:, :, own.shape[2] :]
-        columns.append(np.concatenate([own, source.slopes(i, at.held(own.shape[2]), here), beside], axis=2))
+        there = source.shift_slopes(i, at, here) if known is None else known[k]
+        p = there.shape[2] - n_shifts
+        columns.append(np.concatenate([there[:, :, :p], source.slopes(i, at.held(p), here), there[:, :, p:]], axis=2))
     return Linearisation(at, tuple(left), tuple(columns))
 
 
