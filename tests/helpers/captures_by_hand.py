@@ -53,13 +53,15 @@ def along(*directions):
 
 class Straight:
     """Simulations (K, 3) of the target: a motion that all have, and a course in proportion to each value, or a law of
-    it; the cables touch from a time of the track on. ``asked`` keeps what was asked for; it stands for processes."""
+    it; the cables touch from a time of the track on. ``asked`` keeps what was asked for, ``numbers`` of which capture;
+    it stands for processes."""
 
     def __init__(self, motion, courses=(), law=None, fails=lambda _: False, touch=0):
         self.motion, self.courses, self.law = np.asarray(motion, float), dict(courses), law or {}
-        self.fails, self.touch, self.asked = fails, touch, []
+        self.fails, self.touch, self.asked, self.numbers = fails, touch, [], []
 
     def __call__(self, asked: Any):
+        self.numbers += [n for n, _ in asked]
         return [self.one(values) for _, values in asked]
 
     @property

@@ -100,6 +100,14 @@ def test_a_contact_that_gives_way_is_named_with_its_stiffness():
     assert found.best.train.at.all_values[key_of(STIFFNESS)] == pytest.approx(7e5, rel=0.05)
 
 
+def test_a_held_out_capture_is_simulated_with_what_was_named_only():
+    """Each simulation costs seconds. A rope's damping is a shift, which has its column everywhere."""
+    runs: Any = decided({key_of(FRICTION): 0.15})[0].runs
+    asked = list(zip(runs.numbers, runs.asked[-len(runs.numbers) :], strict=True))
+    assert {k for n, values in asked if n == 0 for k in values} >= set(COURSES)
+    assert {k for n, values in asked if n == 1 for k in values} == {key_of(FRICTION), key_of(DAMPING)}
+
+
 def test_two_effects_are_both_named():
     _, found = decided({key_of(FRICTION): 0.15, key_of(PRETENSION): 600.0})
     assert {n.placed.key for n in found.best.names} == {FRICTION.key, PRETENSION.key}
