@@ -26,7 +26,7 @@ class Machine:
     model : Path
     train : sequence of str
         Recordings to fit, or parts of them.
-    holdout : str
+    holdout : sequence of str
     sections : callable
         What the page says of an answer, beside the numbers.
     """
@@ -35,7 +35,7 @@ class Machine:
     title: str
     model: Path
     train: Sequence[str]
-    holdout: str
+    holdout: Sequence[str]
     sections: Callable[[Answer], list[Section]]
 
 
@@ -59,7 +59,7 @@ def run(machine: Machine, more: Callable[[Answer], list[Quantity]] = lambda _: [
     files: list[tuple[str, str | Path]] = [
         ("Model", machine.model),
         *(("Training", x) for x in machine.train),
-        ("Held-out", machine.holdout),
+        *(("Held-out", x) for x in machine.holdout),
     ]
     write_report(found, folder / "diagnosis.html", provenance(f"make study-{machine.name}", files))
     write_json(folder / "diagnosis.json", found.to_json())

@@ -36,7 +36,7 @@ def main() -> int:
         return 2
     model = HERE / "tx40" / "tx40.toml"
     halves = [f"{positions}@{part}" for part in (TRAIN, HOLDOUT)]
-    run(Machine("tx40", "Stäubli TX40: a coupled wrist", model, halves[:1], halves[1], sections), coupling)
+    run(Machine("tx40", "Stäubli TX40: a coupled wrist", model, halves[:1], halves[1:], sections), coupling)
     return 0
 
 

@@ -83,17 +83,18 @@ def names(
     have = {p.key for p in along.model.effects}
     found = {}
     for p in library(along.model):
-        # A whole law beside some of its parts is another way to write the same curve.
-        if (
-            p.effect.at == "joint"
-            and len(p.effect.contains) > 1
-            and any(f"{x}.{p.at}" in have for x in p.effect.contains)
-        ):
+        if have & parts_of(p):
             continue
         items = _items(along, p, by_words, columns)
         if items:
             found[p.key] = (p, items)
     return found
+
+
+def parts_of(p: PlacedEffect) -> frozenset[str]:
+    """Keys of the laws of which a whole law is another way to write the sum; none of any other law."""
+    whole = p.effect.at == "joint" and len(p.effect.contains) > 1
+    return frozenset(f"{x}.{p.at}" for x in p.effect.contains) if whole else frozenset()
 
 
 def pool(
@@ -114,7 +115,8 @@ def pool(
         steps = (float(np.log(odds)) + logs[0], *(b - a for a, b in pairwise(logs)))[have:]
         if p.effect.at != "joint":
             steps = (float(np.log(odds / n)),)
-        found.append(Hypothesis(key, True, tuple(items), steps[0], p, name, steps[1:]))
+        apart = parts_of(p) | {k for k, (x, _) in named.items() if key in parts_of(x)}
+        found.append(Hypothesis(key, True, tuple(items), steps[0], p, name, steps[1:], apart))
     each = float(np.log(ODDS_OF_CURVES / max(len(by_words), 1)))
     return found + [
         Hypothesis(f"curve.{c}.{words}", False, (item,), each, item.label) for (c, words), item in by_words.items()

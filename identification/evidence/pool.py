@@ -34,7 +34,8 @@ class Item:
 class Hypothesis:
     """An explanation with all its shapes, and its prior log odds. ``key`` names it; ``named``: it is in the
     vocabulary; ``kind`` is the same for all places of an effect, and ``more`` holds its prior log odds where one, two
-    and more of its kind are in the set already."""
+    and more of its kind are in the set already. ``apart`` holds the keys of those that write the same curve: no set has
+    them beside it."""
 
     key: str
     named: bool
@@ -43,6 +44,7 @@ class Hypothesis:
     label: Any = None
     kind: str = ""
     more: tuple[float, ...] = ()
+    apart: frozenset[str] = frozenset()
 
     def prior_beside(self, others: int) -> float:
         """Prior log odds beside this number of others of its kind."""

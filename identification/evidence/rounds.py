@@ -16,7 +16,7 @@ from ..search.closed_loop import planned
 from ..search.refit import assemble, refitted
 from ..search.rest import fitted
 from .arm import WeighedRecordings, weigh
-from .hypotheses import remembers, rings
+from .hypotheses import parts_of, remembers, rings
 from .members import Members, log_bayes
 from .rival import RivalOdds
 from .search import Member, MemberOdds, Search
@@ -71,6 +71,7 @@ def search(
     trials: tuple[ArmTrial, ...] = before.trials if before is not None else ()
     tuned = _tuned(model, base, scales, train, first, seed) if before is None else before.tuned
     channels = None if before is None else _reached_by(before.opening, barred)
+    barred = set(barred)
     for number in range(1, ROUNDS + 1):
         progress(f"round {number}: comparing each effect at each place")
         if number == 1 and before is not None:
@@ -109,6 +110,7 @@ def search(
         placed = [x.placed for x in named[-len(news) :]]
         channels = {c for x in named[-len(news) :] for c in x.channels}
         model = model.with_effects(placed, start)
+        barred |= frozenset().union(*(parts_of(p) for p in placed))
         progress("refitting with " + ", ".join(f"{p.effect.name} at {p.at}" for p in placed))
         assembly = assemble(model, base, scales)
         found = refitted(found, assembly, fitted(assembly, train), any(rings(p) for p in placed), seed)

@@ -136,8 +136,14 @@ class Search:
     def _best(self, taken: Sequence[Member], count: int) -> list[Member]:
         """The hypotheses with the highest odds on top of a set, which does not have them."""
         odds = self.scan(taken).odds.copy()
-        odds[[t.hypothesis for t in taken] + sorted(self.barred)] = -np.inf
+        odds[self._out(taken)] = -np.inf
         return [self.take(taken, int(h)) for h in np.argsort(-odds)[:count] if np.isfinite(odds[h])]
+
+    def _out(self, taken: Sequence[Member]) -> list[int]:
+        """What cannot join a set: its members, what writes the same curve as one of them, and what is barred."""
+        own = [t.hypothesis for t in taken]
+        apart = frozenset().union(*(self.pool[h].apart for h in own))
+        return sorted({*own, *self.barred, *(h for h, x in enumerate(self.pool) if x.key in apart)})
 
     def take(self, taken: Sequence[Member], h: int) -> Member:
         """A hypothesis at its best on top of a set."""
@@ -166,7 +172,7 @@ class Search:
         rest = taken[:k] + taken[k + 1 :]
         rows = self.scan(rest)
         odds = rows.odds.copy()
-        odds[[t.hypothesis for t in rest] + sorted(self.barred)] = -np.inf
+        odds[self._out(rest)] = -np.inf
         both = np.append(odds, 0.0)
         return MemberOdds(taken[k], float(rows.gain[taken[k].hypothesis]), odds, np.exp(both - logsumexp(both)))
 

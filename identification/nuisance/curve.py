@@ -26,6 +26,9 @@ TURNING = 0.006
 SHORTEST = 1e-3
 """Share of the travel from which on the distance since a reversal is told apart, on a logarithmic scale."""
 
+ORDERS = 4
+"""Derivatives of the load by time that a drive's response is expanded in: a delay and a mode need two each."""
+
 NEIGHBOURS = 3
 """Other joints, the nearest first, whose coordinates a curve may run over."""
 
@@ -43,6 +46,8 @@ class Coordinates:
     path: Array
     driving: Array
     turned: Array
+    rates: Array
+    """Derivatives of the load by time (n, `ORDERS`), in units of the analysis band [N·m or N]."""
 
     @staticmethod
     def of(experiment: Experiment, state: TorqueEvaluation, joint: int, peak: float, travel: float) -> "Coordinates":
@@ -64,6 +69,7 @@ class Coordinates:
             np.concatenate([np.cumsum(np.abs(speed[s])) * m.period for s in m.segments]),
             0.5 * (1 + np.tanh(3 * power / max(float(np.std(power)), 1e-300))),
             np.log10(1 + _since_turning(speed, m.segments, m.period) / max(SHORTEST * travel, 1e-300)),
+            _rates(load, m.segments, 2 * np.pi * m.band * m.period),
         )
 
 
@@ -77,6 +83,17 @@ def _since_turning(speed: Array, segments: Sequence[slice], period: float) -> Ar
         last = np.zeros(len(own), int)
         last[turns] = turns
         found[s] = gone - gone[np.maximum.accumulate(last)]
+    return found
+
+
+def _rates(x: Array, segments: Sequence[slice], step: float) -> Array:
+    """Derivatives by time (n, `ORDERS`) of a signal; ``step``: of the samples, in the unit of time."""
+    found = np.zeros((len(x), ORDERS))
+    for s in segments:
+        own = x[s]
+        for k in range(ORDERS if len(own) > 2 else 0):
+            own = np.gradient(own, step)
+            found[s, k] = own
     return found
 
 
@@ -145,6 +162,9 @@ def family(joint: int, names: Sequence[str], training: Sequence[Coordinates], al
         reach.curve("load by speed", load, 0.25, 6, speed),
         reach.curve("load when driving", load, 0.25, 8, lambda x: x.direction * x.driving),
         reach.curve("load when braking", load, 0.25, 8, lambda x: x.direction * (1 - x.driving)),
+        # What lies between the measured torque and the link answers late, and rings: its frequency response, expanded
+        # in powers of the frequency, adds these to the load (a delay: the first; a mode above the band: the second).
+        NuisanceCurve("rate of load", lambda x: x.rates),
         reach.curve("time by direction", lambda x: x.time, 0.25, 6, forth),
         reach.curve("time by speed", lambda x: x.time, 0.25, 6, speed),
         reach.curve("distance travelled by direction", lambda x: x.path, 0.25, 6, forth),

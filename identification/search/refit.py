@@ -15,7 +15,7 @@ from .rest import fitted
 Array = NDArray[np.float64]
 
 WORSE = 1.05
-"""Ratio of a channel's residuals, with something more and without, that no good optimum has."""
+"""Product of the channels' ratios of residuals, with something more and without, that no good optimum has."""
 
 
 def assemble(model: Model, base: BaseParameters | None, scales: Mapping[str, Scales]) -> TorqueModel:
@@ -30,24 +30,20 @@ def refitted(before: Fit, assembly: TorqueModel, samples: Sequence[Experiment], 
     The model before is a special case, so that the new fit leaves no larger residual, unless it ended in a bad optimum.
     """
     found = fit(assembly, samples, start=carry(before, assembly), multi_start=everywhere, seed=seed)
-    if everywhere or not _worse(found, before, samples):
+    if everywhere or not _less_likely(found, before, samples):
         return found
     return fit(assembly, samples, start=carry(before, assembly), multi_start=True, seed=seed)
 
 
-def _worse(found: Fit, case: Fit, samples: Sequence[Experiment]) -> bool:
-    """Whether a fit ended in a bad optimum: it leaves more on a channel than the fit of a special case of it."""
-    with_it, without_it = (channel_rms(f.assembly, samples, f.theta)[0] for f in (found, case))
-    return not np.all(with_it <= WORSE * without_it)
-
-
 def _less_likely(found: Fit, case: Fit, samples: Sequence[Experiment]) -> bool:
-    """Whether a fit explains all channels together less well than the fit of a special case of it.
+    """Whether a fit ended in a bad optimum: it explains all channels together less well than the fit of a special case.
 
-    A fit weighs channels against each other: one may end a little above the case's where others end far below.
+    With the noise of each channel estimated, the likelihood is the product of the channels' residuals: one may end
+    above the case's where others end far below.
     """
     with_it, without_it = (channel_rms(f.assembly, samples, f.theta)[0] for f in (found, case))
-    return float(np.sum(np.log(np.maximum(with_it, 1e-300) / np.maximum(without_it, 1e-300)))) > np.log(WORSE)
+    ratio = float(np.sum(np.log(np.maximum(with_it, 1e-300) / np.maximum(without_it, 1e-300))))
+    return not ratio <= np.log(WORSE)
 
 
 def carry(found: Fit, assembly: TorqueModel) -> Array:

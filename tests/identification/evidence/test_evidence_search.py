@@ -1,5 +1,7 @@
 """The search over sets: a planted pair among decoys, false alarms counted in noise, twins, and who is barred."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from explained import Explained, explained, hypotheses, white
@@ -85,6 +87,18 @@ def test_what_is_barred_is_not_taken_and_no_rival():
     assert 4 not in {s.taken.hypothesis for s in slots}
     assert all(np.isneginf(s.odds[4]) for s in slots)
     assert all(s.shares[4] == 0 for s in slots)
+
+
+def test_a_whole_law_does_not_stand_beside_its_parts():
+    """Two parts and a law that can write their sum and more: all three are there, and no set has it beside a part."""
+    made = white(np.random.default_rng(12), 3, {0: 0.8, 1: 0.8, 2: 0.8})
+    assert found(made, odds=0.1) == [0, 1, 2]
+    pool = hypotheses(made.items, 0.1)
+    parts, whole = frozenset(h.key for h in pool[:2]), frozenset({pool[2].key})
+    pool = [replace(h, apart=parts if k == 2 else whole) for k, h in enumerate(pool)]
+    slots = Search(ProjectedEvidence(made.evidence(), (0,)), pool).answer()
+    assert sorted(s.taken.hypothesis for s in slots) in ([0, 1], [2])
+    assert all(np.isneginf(s.odds[2]) == (len(slots) > 1) for s in slots)
 
 
 def test_twins_share_their_slot():
