@@ -63,7 +63,7 @@ def diagnose(
     progress : callable
         Told in a few words what is under way.
     seed : int
-        Of random starts, and of bootstraps over captures.
+        Of random starts.
     jobs : int or None
         Processes in which captures are simulated; None: one a core, at most four. For captures only.
     anyway : bool
@@ -79,7 +79,7 @@ def diagnose(
         # Loaded here: numba takes longer to load than a short arm to fit.
         from .snare.diagnose import diagnose_captures
 
-        return Answer(*diagnose_captures(model, recordings, held, progress=progress, seed=seed, jobs=jobs))
+        return Answer(*diagnose_captures(model, recordings, held, progress=progress, jobs=jobs))
     demand_one_process(model, jobs)
     if isinstance(model.tree, DockingTree):
         from .docking.diagnose import diagnose_dockings

@@ -38,12 +38,10 @@ class Rival:
 class Finding:
     """An effect that the model left out, in the field's words.
 
-    Of torques, ``margin`` is what the held-out recordings gain by the effect, in standard errors over blocks of time.
-    ``gain`` is its log Bayes factor on the training recordings. ``explained`` is the share of the held-out residual's
+    ``margin`` is what the held-out recordings gain by the effect, in standard errors over blocks of time. ``gain`` is
+    its log Bayes factor on the training recordings. ``explained`` is, of torques, the share of the held-out residual's
     energy that it explains, on the channel where this is largest. ``probability`` is how often a name with these three
-    was right on simulated arms, shared with the rivals that are not separable. Of encoders and captures, ``margin`` is
-    how often the effect, or one that is not separable from it, beat the others in a bootstrap over blocks of time;
-    ``gain`` and ``explained`` are None.
+    was right on simulated arms, shared with the rivals that are not separable.
     """
 
     name: str

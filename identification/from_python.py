@@ -46,7 +46,7 @@ def diagnose(
     progress : callable
         Called with a few words on what is under way, for example ``print``.
     seed : int
-        Of random starts, and of bootstraps over link encoders and captures.
+        Of random starts.
     jobs : int, optional
         Processes in which captures are simulated, by default one for each core, at most four; other systems refuse it.
     anyway : bool

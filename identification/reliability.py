@@ -1,7 +1,6 @@
 """How often a name was right: frequencies counted on simulated arms with known answers, not a softmax.
 
-``reliability.json`` beside this file holds what was counted, by which command: a logistic map for names of torques, and
-a curve over the margin for those of link encoders and captures.
+``reliability.json`` beside this file holds what was counted, by which command: a logistic map.
 """
 
 import json
@@ -10,47 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
-
 
 LEAST = 1e-3
 """What stands for any smaller held-out gain or share."""
-
-BOOTSTRAPS = 400
-"""Resamplings of time blocks that a margin is counted over."""
 
 
 @cache
 def _stored() -> dict[str, Any]:
     return json.loads(Path(__file__).with_name("reliability.json").read_text(encoding="utf-8"))
-
-
-@cache
-def _curve() -> tuple[Array, Array]:
-    """Knots of margin, rising, and of probability, never falling; each (n_knots,)."""
-    stored = _stored()
-    return np.array(stored["margin"], float), np.array(stored["probability"], float)
-
-
-def probability(margin: float) -> float:
-    """Frequency with which an effect named at this margin was the right one, at the right place.
-
-    Parameters
-    ----------
-    margin : float
-        How often the effect beat its rivals in a bootstrap over time blocks, 0 to 1.
-
-    Returns
-    -------
-    float
-        Strictly between 0 and 1, and never less for a larger margin: linear between the knots, level beyond them. A
-        name counts as right if the effect concealed in the simulation is the one named, or one that the recordings
-        cannot tell from it.
-    """
-    knots, frequencies = _curve()
-    return float(np.interp(margin, knots, frequencies))
 
 
 def of_name(gain: float, sure: float, explained: float) -> float:

@@ -6,7 +6,6 @@ score`` kept. A name is right as ``proof/judge.py`` and ``proof/drives/judge.py`
 cannot tell from it, is concealed at its place. The result is the logistic map of names of torques in
 ``identification/reliability.json`` (`counting`), with how well each generator is predicted by a map that leaves it out;
 it is written only where such maps have a smaller Brier score on what they leave out than the map that is stored.
-The curve over margins, of link encoders and captures, stays there as it was counted.
 """
 
 import argparse

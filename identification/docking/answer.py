@@ -11,6 +11,7 @@ from ..diagnosis import Diagnosis, Estimate, Location, ParameterShift, Step, Tra
 from ..sources.answer import candidates, channel_fits, estimates, finding, limits, not_confirmed, rms
 from ..sources.decide import Decision
 from ..sources.source import Linearisation, ModelPoint
+from ..sources.stages import stages
 from ..sources.weigh import covariances
 from ..wording import foremost, named
 from .recording import EVERY, DockingRecording, unit_of
@@ -61,7 +62,7 @@ def report_on(source: Dockings, name: str, decided: Decision, seconds: float) ->
     notes.append(f"{source.count} dockings were simulated in {seconds:.0f} s")
     return Diagnosis(
         decided.verdict, sentence, "", name, tuple(findings),
-        _locations(own[0], decided), fits, _steps(decided, sizes), candidates(decided),
+        _locations(own[0], decided), fits, _steps(source, decided, sizes), candidates(decided),
         _moved(decided.given, values), _traces(own, locked, decided), limits(source, decided), tuple(notes), BAND,
         foremost=worst.channel,
     )  # fmt: skip
@@ -82,15 +83,11 @@ def _size(value: float, unit: str) -> str:
     return f"{factor * value:.3g} {word}"
 
 
-def _steps(decided: Decision, sizes: tuple[Array, Array]) -> tuple[Step, ...]:
-    def line(label: str, *fits: Linearisation) -> Step:
-        return Step(label, *(float(np.sqrt(np.mean((rms(x) / s) ** 2))) for x, s in zip(fits, sizes, strict=True)))
-
-    lines = [line("model as given", decided.found.first, decided.before)]
-    if decided.best.names:
-        label = "".join(f"+ {n.placed.effect.name} at {n.placed.at} " for n in decided.best.names).strip()
-        lines.append(line(label, decided.best.train, decided.best.held))
-    return tuple(lines)
+def _steps(source: Dockings, decided: Decision, sizes: tuple[Array, Array]) -> tuple[Step, ...]:
+    return tuple(
+        Step(label, *(float(np.sqrt(np.mean((rms(x) / s) ** 2))) for x, s in zip(fits, sizes, strict=True)))
+        for label, *fits in stages(source, decided)
+    )
 
 
 def _moved(given: ModelPoint, values: dict[str, dict[str, Estimate]]) -> tuple[ParameterShift, ...]:

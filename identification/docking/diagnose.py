@@ -9,6 +9,7 @@ from ...recordings.part import several
 from ..diagnosis import Diagnosis
 from ..sources.answer import with_found
 from ..sources.decide import decide
+from ..sources.own import settled
 from .answer import report_on
 from .source import Dockings, start
 
@@ -43,6 +44,6 @@ def diagnose_dockings(
     begun = time.monotonic()
     progress("reading the recordings")
     source = Dockings(model, recordings, several(holdout))
-    decided = decide(source, start(model), progress)
+    decided = decide(source, settled(source, model, start(model), progress), progress)
     diagnosis = report_on(source, model.name, decided, time.monotonic() - begun)
     return diagnosis, with_found(model, decided.best.train.at)

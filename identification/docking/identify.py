@@ -11,14 +11,12 @@ from ...models.model import Model
 from ..evidence.arm import WeighedRecordings
 from ..parameter_list import parameter_list
 from ..sources.answer import estimates, rms, with_found
-from ..sources.fit import deviations, fit, linearised, shift_columns
+from ..sources.fit import deviations, linearised
+from ..sources.own import fitted, known
 from ..sources.source import Linearisation, ModelPoint
-from ..sources.weigh import covariances, weigh
+from ..sources.weigh import covariances
 from .recording import unit_of
 from .source import Dockings, start
-
-STEPS = 8
-"""Most steps of the fit."""
 
 
 @dataclass(frozen=True)
@@ -60,10 +58,8 @@ def identify_dockings(
 ) -> DockingIdentification:
     """Fit every parameter of a docking's effects; arguments and errors as `diagnose_dockings`."""
     progress("reading the recordings")
-    source, given = Dockings(model, recordings, holdout), start(model)
+    source, given = Dockings(model, recordings, holdout), known(model, start(model))
     progress("fitting the effects' parameters with the simulation in the loop")
-    here = linearised(source, source.train, given)
-    weighed = weigh(source, source.train, given, here, search=False)
-    found = fit(source, given, here.at, covariances(weighed), shift_columns(here), STEPS)
+    weighed, found = fitted(source, given, start(model))
     held = linearised(source, source.held, found.at) if holdout else None
     return DockingIdentification(with_found(model, found.at), given, source, weighed, found, held)

@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 class Dockings(DockingRuns):
     """Docking tests of a model, the training recordings first."""
 
-    n_shifts, anew, steps = len(SHIFTS), False, 4
+    n_shifts, anew, bent, steps = len(SHIFTS), False, False, 4
 
     def __init__(self, model: Model, train: Sequence[str | Path], held: Sequence[str | Path] = ()) -> None:
         """Read the recordings; raises InputError for whatever is wrong with one."""
@@ -95,7 +95,10 @@ class Dockings(DockingRuns):
                 found.append(GridPoint(p, values, tuple(f"{p.key}.{x.name}" for x in amplitudes)))
         return found
 
-    def columns(self, i: int, at: ModelPoint, v: GridPoint) -> Array:
+    def columns(self, i: int, at: ModelPoint, many: Sequence[GridPoint]) -> list[Array]:
+        return [self._column(i, at, v) for v in many]
+
+    def _column(self, i: int, at: ModelPoint, v: GridPoint) -> Array:
         """Change of the simulation for each amplitude, from zero."""
         shape = {k: x for k, x in v.values.items() if k not in v.amplitudes}
         none, own = self.predicted(i, at), []

@@ -13,9 +13,7 @@ from ...recordings.part import several
 from ..fitting.assembly import TorqueModel
 from ..fitting.experiment import Experiment, Scales
 from ..sources.decide import Decision, decide
-from ..sources.fit import fit, residuals
-from ..sources.source import Linearisation
-from ..sources.weigh import covariances
+from ..sources.stages import Stage, stages
 from .run import load_links
 from .source import Links, links_of, start
 
@@ -29,7 +27,7 @@ class EncoderComparison:
 
     links: Links
     decided: Decision
-    stages: tuple[tuple[str, Linearisation, Linearisation], ...]
+    stages: tuple[Stage, ...]
     train: tuple[Experiment, ...]
 
 
@@ -68,21 +66,4 @@ def diagnose_links(
         return None
     links = links_of(joints, model, train, held, assembly, theta, scales)
     decided = decide(links, start(links, model), lambda text: progress(f"link encoders: {text}"))
-    return EncoderComparison(links, decided, tuple(stages(links, decided)), tuple(train))
-
-
-def stages(links: Links, decided: Decision) -> list[tuple[str, Linearisation, Linearisation]]:
-    """Fits after each effect is added at all its joints, every parameter fitted again; the first as given."""
-    best, noise = decided.best, covariances(decided.found.weighed)
-    found = [("link encoders as given", decided.found.first, decided.before)]
-    names = list(dict.fromkeys(n.placed.effect.name for n in best.names))
-    for k, name in enumerate(names):
-        later = [n.placed.key for n in best.names if n.placed.effect.name in names[k + 1 :]]
-        own, there = best.train, best.held
-        if later:
-            own = fit(links, decided.given, own.at.without(*later), noise)
-            at = links.settled(own.at, links.held)
-            there = Linearisation(at, residuals(links, links.held, at), ())
-        at = [n.placed.at for n in best.names if n.placed.effect.name == name]
-        found.append((f"+ {name} at {', '.join(at)}", own, there))
-    return found
+    return EncoderComparison(links, decided, tuple(stages(links, decided, "link encoders as given")), tuple(train))

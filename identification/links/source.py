@@ -46,7 +46,7 @@ class Links:
     n_train : int
     """
 
-    anew, steps = True, 12
+    anew, bent, steps = True, False, 12
 
     def __init__(
         self,
@@ -175,7 +175,10 @@ class Links:
             for point in product(*axes)
         ]
 
-    def columns(self, i: int, at: ModelPoint, v: GridPoint) -> Array:
+    def columns(self, i: int, at: ModelPoint, many: Sequence[GridPoint]) -> list[Array]:
+        return [self._column(i, v) for v in many]
+
+    def _column(self, i: int, v: GridPoint) -> Array:
         names = [f"{v.placed.key}.{x.name}" for x in v.placed.effect.parameters]
         value, slopes = self.term(i, v.placed, np.array([v.values.get(k, 0.0) for k in names]))
         own = slopes[:, [names.index(k) for k in v.amplitudes]] if v.amplitudes else value[:, None]

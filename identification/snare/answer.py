@@ -1,190 +1,112 @@
-"""The search's findings in captures, in words and numbers: the `Diagnosis` that JSON, report and tests share."""
+"""What a decision says of captures, in words and numbers: the `Diagnosis` that JSON, report and tests share."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...models.model import Model
-from ...models.snare.setup import APPLIED, SnareTree
-from ...report.words import percent
-from ..diagnosis import (
-    Candidate,
-    ChannelFit,
-    Diagnosis,
-    Estimate,
-    Finding,
-    Limit,
-    Misfit,
-    ParameterShift,
-    Rival,
-    Step,
-    Trace,
-)
-from ..reliability import probability as reliability
+from ...models.snare.setup import APPLIED, NUMBERS, SnareTree
+from ..diagnosis import ChannelFit, Diagnosis, Estimate, Finding, ParameterShift, Step, Trace
+from ..evidence.selection import Remainder
+from ..sources.answer import candidates, channel_fits, estimates, finding, limits, not_confirmed, rms
+from ..sources.answer import with_found as with_effects
+from ..sources.decide import Decision
+from ..sources.search import Naming
+from ..sources.source import Linearisation, ModelPoint
+from ..sources.stages import stages
+from ..sources.weigh import covariances
 from ..verdict import verdict
-from ..wording import experiment_sentence, foremost, named, rejection
-from .channels import channel_errors, channels, modelled
-from .comparison import QUARTER, SLOW, variances
-from .fit import CaptureFit, spread
-from .handles import bounds, handle_of, key_of
-from .library import absent
+from ..wording import foremost, listed, named
 from .locate import locate_capture
-from .recording import CaptureRecording
-from .search import CaptureNaming, CaptureSelection
+from .seen import QUARTER, SLOW, shown, times, unit_of
+from .source import Captures
+
+Array = NDArray[np.float64]
 
 BAND = 1 / (2 * QUARTER)
 """[Hz] What means over a quarter of a second hold."""
-LEFT_OVER = 0.25
-"""A model without anything to name that leaves this share of the motion is told to miss something, ..."""
-VISIBLE = 1e-3
-"""... if that is 1 mm, too [m]."""
-LIKELY = 0.005
-"""A rival that is less probable is not listed, where the recordings tell it apart."""
 
 
-def report_on(
-    model: Model,
-    found: CaptureSelection,
-    train: Sequence[CaptureRecording],
-    locked: Sequence[CaptureRecording],
-    seconds: float,
-    runs: int,
-) -> Diagnosis:
-    """Put everything into words and numbers.
-
-    Parameters
-    ----------
-    model : Model
-        As it was.
-    found : CaptureSelection
-    train, locked : sequences of CaptureRecording
-    seconds, runs : float, int
-        What the search took [s], and the simulations in it.
-    """
-    fits = _fits(found, train, locked)
-    findings = tuple(_finding(n, found, train, locked) for n in found.named if n.trial.placed.effect.name in APPLIED)
-    corrected = [
-        f"{p.effect.name} = {found.last.values[key_of(p)]:.4g} {p.effect.parameters[0].unit}"
-        for p in found.last.placed
-        if p.effect.name not in APPLIED
-    ]
-    unexplained = () if findings else _unexplained(fits)
-    description = _unexplained_words(unexplained)
-    notes = [f"{Path(c.path).name}: {note}" for c in (*train, *locked) for note in c.notes]
-    notes += [rejection(p) for p in found.rejected]
+def report_on(source: Captures, decided: Decision, seconds: float) -> Diagnosis:
+    """Put everything into words and numbers; ``seconds``: what the search took."""
+    best, model = decided.best, source.model
+    values = estimates(source, decided.given, best.train, covariances(decided.found.weighed))
+    fits = _fits(source, decided)
+    findings = tuple(_finding(source, decided, n, values) for n in best.names if n.placed.effect.name in APPLIED)
+    description = "" if findings else _left(source, decided)
+    moved = _moved(source, decided, values)
+    notes = [f"{Path(r.path).name}: {note}" for r in source.records for note in r.notes] + not_confirmed(decided)
     notes += [
         "positions and forces are compared as means over 0.25 s, and the force's chatter by its size: "
         "how cables chatter on the pin depends on every detail",
-        f"{runs} captures were simulated in {seconds:.0f} s",
+        f"{source.runs.count} captures were simulated in {seconds:.0f} s",
     ]
-    keys = {n.trial.placed.key for n in found.named}
-    candidates = tuple(
-        Candidate(t.placed.effect.name, t.placed.at, float(t.explained), float(t.score), t.placed.key in keys)
-        for t in sorted(found.opening, key=lambda t: -t.explained)
-        if np.isfinite(t.score)
-    )
+    foremost_fit = _foremost(findings, fits)
     return Diagnosis(
-        verdict(findings, unexplained),
-        _sentence(findings, fits, description) + _corrected(corrected),
+        verdict(findings, () if findings else decided.left),
+        _sentence(findings, foremost_fit, description) + _corrected(moved),
         description,
         model.name,
         findings,
-        locate_capture(found, train),
+        locate_capture(source, decided),
         fits,
-        _steps(found, train, locked),
-        candidates,
-        _moved(model, found, train),
-        _traces(found, train, locked),
-        _limits(model, found, train),
+        _steps(source, decided),
+        candidates(decided),
+        moved,
+        _traces(source, decided),
+        tuple(x for x in limits(source, decided) if x.name in APPLIED),
         tuple(notes),
         BAND,
-        foremost=_foremost(findings, fits).channel,
+        foremost=foremost_fit.channel,
     )
 
 
-def estimates(captures: Sequence[CaptureRecording], found: CaptureFit) -> dict[str, dict[str, Estimate]]:
-    """Parameters by the effect's key and their own name."""
-    low, high = bounds(found.placed)
-    std = spread(captures, found)
-    made: dict[str, dict[str, Estimate]] = {}
-    for p, x, s, a, b in zip(found.placed, found.x, std, low, high, strict=True):
-        (parameter,) = p.effect.parameters
-        bound = bool(min(x - a, b - x) < 1e-6 * handle_of(p).step)
-        made[p.key] = {parameter.name: Estimate(found.values[key_of(p)], float(s), parameter.unit, bound)}
-    return made
+def _fits(source: Captures, decided: Decision) -> tuple[ChannelFit, ...]:
+    units = [unit_of(name) for name in source.channels]
+    noise = source.records[0].noise
+    bodies = {sensor: body for body, sensor in source.records[0].sensors.items()}
+    floors = [noise.get(bodies.get(n.split(".")[1], "position"), 0.0) / SLOW**0.5 for n in source.channels]
+    every = channel_fits(decided, source.channels, units, source.sizes(source.train), source.sizes(source.held), floors)
+    return tuple(every[c] for c in shown(source.channels))
 
 
-def _finding(
-    named: CaptureNaming, found: CaptureSelection, train: Sequence[CaptureRecording], locked: Sequence[CaptureRecording]
-) -> Finding:
-    placed = named.trial.placed
-    right = reliability(named.margin)
-    rivals = tuple(
-        Rival(
-            r.placed.effect.name,
-            r.placed.at,
-            r.probability * right,
-            r.separable,
-            experiment_sentence(placed, r.placed),
-        )
-        for r in named.rivals
-        if r.probability >= LIKELY or not r.separable
-    )
-    pairs = zip(channel_errors(locked, named.held_before), channel_errors(locked, named.held_after), strict=True)
-    before, after = max(pairs, key=lambda e: e[0].relative - e[1].relative)
-    what = placed.effect.sentence
+def _finding(source: Captures, decided: Decision, n: Naming, values: Mapping[str, Mapping[str, Estimate]]) -> Finding:
+    p, held = n.placed, decided.best.held
+    without, size = rms(decided.best.missed[p.key].held), source.sizes(source.held)
+    within = rms(held)
+    c = max(shown(source.channels), key=lambda c: (without[c] - within[c]) / size[c])
+    channel, what = source.channels[c], p.effect.sentence
     evidence = (
-        f"{what[:1].upper()}{what[1:]}: it explains {percent(named.trial.explained)} of the remaining residual. "
-        f"Without it, the error of {before.channel} on the held-out capture rises from "
-        f"{_size(after.rms, after.unit)} to {_size(before.rms, before.unit)}."
+        f"{what[:1].upper()}{what[1:]}: the recordings are e^{n.gain:.0f} times likelier with it. Without it, the "
+        f"error of {channel} on the held-out capture rises from {_size(within[c], unit_of(channel))} to "
+        f"{_size(without[c], unit_of(channel))}."
     )
-    values = estimates(train, found.last)[placed.key]
-    return Finding(placed.effect.name, placed.at, named.margin, named.margin * right, values, evidence, rivals)
+    explained = max(0.0, 1 - float(within[c] / max(without[c], 1e-300)) ** 2)
+    return finding(decided, n, values[p.key], evidence, explained)
 
 
 def _size(value: float, unit: str) -> str:
     return f"{1e3 * value:.3g} mm" if unit == "m" else f"{value:.3g} {unit}"
 
 
-def _fits(
-    found: CaptureSelection, train: Sequence[CaptureRecording], locked: Sequence[CaptureRecording]
-) -> tuple[ChannelFit, ...]:
-    fitted = _misfits(train, found.first, found.last)
-    held = _misfits(locked, found.held_first, found.held_last)
-    made = []
-    for name, (unit, misfit) in fitted.items():
-        if name not in held:
-            continue
-        body = next((b for b, s in train[0].sensors.items() if name.startswith(f"force.{s}.")), "position")
-        noise = train[0].noise[body] / SLOW**0.5
-        made.append(ChannelFit(name, unit, misfit, held[name][1], float(noise)))
-    return tuple(made)
-
-
-def _misfits(
-    captures: Sequence[CaptureRecording], before: CaptureFit, after: CaptureFit
-) -> dict[str, tuple[str, Misfit]]:
-    """Unit and misfits by channel."""
-    pairs = zip(channel_errors(captures, before), channel_errors(captures, after), strict=True)
-    return {a.channel: (a.unit, Misfit(a.rms, b.rms, a.relative, b.relative)) for a, b in pairs}
-
-
-def _unexplained(fits: Sequence[ChannelFit]) -> tuple[ChannelFit, ...]:
-    """Channels of a motion that remains without a name: more than `LEFT_OVER` of the largest, and `VISIBLE`."""
-    positions = [f for f in fits if f.unit == "m"]
-    largest = max(f.holdout.rms_before / max(f.holdout.relative_before, 1e-12) for f in positions)
-    least = max(LEFT_OVER * largest, VISIBLE)
-    return tuple(f for f in positions if f.train.rms_after > least and f.holdout.rms_after > VISIBLE)
-
-
-def _unexplained_words(channels: Sequence[ChannelFit]) -> str:
-    if not channels:
+def _left(source: Captures, decided: Decision) -> str:
+    """What nameless curves say, in words."""
+    if not decided.left:
         return ""
-    sizes = " and ".join(f"{_size(f.train.rms_after, 'm')} of {f.channel}" for f in channels)
-    return f"{sizes} remain that no effect of a capture explains: check the set-up's sizes and masses"
+    left = rms(decided.best.train)
+
+    def told(r: Remainder) -> str:
+        name = source.channels[r.channel]
+        unit = unit_of(name)
+        size = f"a share of e^{left[r.channel]:.2g}" if unit == "1" else _size(left[r.channel], unit)
+        return f"{size} of {name}, over {r.over}"
+
+    return f"{listed([told(r) for r in decided.left])} remain that no effect of a capture explains: check the " \
+        "set-up's sizes and masses"  # fmt: skip
 
 
 def _foremost(findings: Sequence[Finding], fits: Sequence[ChannelFit]) -> ChannelFit:
@@ -194,110 +116,84 @@ def _foremost(findings: Sequence[Finding], fits: Sequence[ChannelFit]) -> Channe
     return max((f for f in fits if f.unit == "m"), key=lambda f: f.holdout.rms_before)
 
 
-def _sentence(findings: Sequence[Finding], fits: Sequence[ChannelFit], description: str) -> str:
-    worst = _foremost(findings, fits)
+def _sentence(findings: Sequence[Finding], worst: ChannelFit, description: str) -> str:
+    before, after = (_size(x, worst.unit) for x in (worst.holdout.rms_before, worst.holdout.rms_after))
     if findings:
         return (
             f"The model leaves out {named(findings)}. With that added, the error of {worst.channel} on the held-out "
-            f"capture falls from {_size(worst.holdout.rms_before, worst.unit)} to "
-            f"{_size(worst.holdout.rms_after, worst.unit)}."
+            f"capture falls from {before} to {after}."
         )
     if description:
         return f"Something is missing that no effect of the vocabulary explains: {description}."
     return (
         "The model is adequate: these captures show nothing that it leaves out. On the held-out capture, "
-        f"the error of {worst.channel} is {_size(worst.holdout.rms_before, worst.unit)}."
+        f"the error of {worst.channel} is {before}."
     )
 
 
-def _corrected(numbers: Sequence[str]) -> str:
-    if not numbers:
+def _corrected(moved: Sequence[ParameterShift]) -> str:
+    own = [
+        f"{m.name.removeprefix('capture.')} = {m.after:.4g} {m.unit}" for m in moved if m.name.startswith("capture.")
+    ]
+    if not own:
         return ""
-    return f" Numbers of the set-up that the model file does not give fit better as {', '.join(numbers)}."
+    return f" Numbers of the set-up that the model file does not give fit better as {', '.join(own)}."
 
 
-def _relative(captures: Sequence[CaptureRecording], found: CaptureFit) -> float:
-    """RMS over motion and force of what is left, each relative to all of its kind."""
-    shares = []
-    errors = channel_errors(captures, found)
-    for unit in {e.unit for e in errors}:
-        left = sum(e.rms**2 for e in errors if e.unit == unit)
-        whole = sum(e.reference**2 for e in errors if e.unit == unit)
-        shares.append(left / max(whole, 1e-300))
-    return float(np.sqrt(np.mean(shares)))
+def _steps(source: Captures, decided: Decision) -> tuple[Step, ...]:
+    def share(linear: Linearisation, numbers: Sequence[int]) -> float:
+        """RMS over motion and force of what is left, each relative to all of its kind."""
+        left, size = rms(linear) ** 2, source.sizes(numbers) ** 2
+        units = [unit_of(name) for name in source.channels]
+        kinds = [[c for c in shown(source.channels) if units[c] == unit] for unit in ("m", "N") if unit in units]
+        return float(np.sqrt(np.mean([left[own].sum() / max(float(size[own].sum()), 1e-300) for own in kinds])))
 
-
-def _steps(
-    found: CaptureSelection, train: Sequence[CaptureRecording], locked: Sequence[CaptureRecording]
-) -> tuple[Step, ...]:
-    lines = [Step("model as given", _relative(train, found.first), _relative(locked, found.held_first))]
-    for n in found.named:
-        label = f"+ {n.trial.placed.effect.name} at {n.trial.placed.at}"
-        lines.append(Step(label, _relative(train, n.trial.fit), _relative(locked, n.held_after)))
-    return tuple(lines)
-
-
-def _moved(model: Model, found: CaptureSelection, train: Sequence[CaptureRecording]) -> tuple[ParameterShift, ...]:
-    after = estimates(train, found.last)
-    made = []
-    for n in found.named:
-        p = n.trial.placed
-        if p.effect.name not in APPLIED:
-            (now,) = after[p.key].values()
-            usual = handle_of(p).value(absent(model, p))
-            made.append(ParameterShift(f"capture.{p.effect.name}", now.unit, usual, now.value, now.std))
-    for p, x in zip(found.first.placed, found.first.x, strict=True):
-        (now,) = after[p.key].values()
-        made.append(ParameterShift(key_of(p), now.unit, handle_of(p).value(float(x)), now.value, now.std))
-    return tuple(made)
-
-
-def _traces(
-    found: CaptureSelection, train: Sequence[CaptureRecording], locked: Sequence[CaptureRecording]
-) -> tuple[Trace, ...]:
-    made = []
-    sets: tuple[tuple[Literal["train", "holdout"], Sequence[CaptureRecording], CaptureFit, CaptureFit], ...] = (
-        ("train", train, found.first, found.last),
-        ("holdout", locked, found.held_first, found.held_last),
+    return tuple(
+        Step(label, share(train, source.train), share(held, source.held))
+        for label, train, held in stages(source, decided)
     )
-    for role, captures, before, after in sets:
-        for c, old, new in zip(captures, before.tracks, after.tracks, strict=True):
-            for channel, a, b in zip(channels(c), modelled(c, old), modelled(c, new), strict=True):
-                known = np.isfinite(channel.measured) & np.isfinite(channel.place)
-                speed = np.gradient(channel.place, channel.times)
-                columns = (x[known] for x in (channel.times, channel.place, speed, channel.measured, a, b))
-                made.append(Trace(Path(c.path).name, role, channel.name, channel.unit, *columns))
-    return tuple(made)
 
 
-def _limits(model: Model, found: CaptureSelection, train: Sequence[CaptureRecording]) -> tuple[Limit, ...]:
-    """Smallest value of each effect that would have been seen: what it changes grows in proportion to its handle."""
-    named = {n.trial.placed.key for n in found.named}
-    by = variances(train, found.last.residuals)
+def _moved(
+    source: Captures, decided: Decision, values: Mapping[str, Mapping[str, Estimate]]
+) -> tuple[ParameterShift, ...]:
+    """Numbers of the set-up that were found to be others, then parameters that the model had."""
     made = []
-    for t in found.opening:
-        if t.placed.key in named or t.placed.effect.name not in APPLIED or not t.fit.residuals:
-            continue
-        handle = handle_of(t.placed)
-        start = absent(model, t.placed)
-        moved = float(t.fit.x[-1]) - start
-        # What it changes, its handle moved so far; what was there stands where it is best with it.
-        pairs = zip(found.first.residuals, t.fit.residuals, strict=True)
-        energy = sum(0.5 * float(np.sum((a[k] - b[k]) ** 2)) / by[k] for a, b in pairs for k in a)
-        if abs(moved) < 1e-9 or energy <= 0:
-            continue
-        x = start + moved * float(np.sqrt(found.bar / energy))
-        if handle.low <= x <= handle.high:
-            effect, value = t.placed.effect, float(handle.value(x))
-            (parameter,) = effect.parameters
-            made.append(Limit(effect.name, t.placed.at, parameter.name, value, parameter.unit))
+    for n in decided.best.names:
+        if n.placed.effect.name in NUMBERS:
+            (now,) = values[n.placed.key].values()
+            made.append(ParameterShift(f"capture.{n.placed.effect.name}", now.unit, source.origin(n.placed), now.value,
+                                       now.std))  # fmt: skip
+    before = decided.given.all_values
+    for p in decided.given.placed:
+        for name, now in values[p.key].items():
+            made.append(ParameterShift(f"{p.key}.{name}", now.unit, before[f"{p.key}.{name}"], now.value, now.std))
     return tuple(made)
 
 
-def with_found(model: Model, found: CaptureFit) -> Model:
+def _traces(source: Captures, decided: Decision) -> tuple[Trace, ...]:
+    made = []
+    sets: tuple[tuple[Literal["train", "holdout"], Sequence[int], Linearisation, Linearisation], ...] = (
+        ("train", source.train, decided.found.first, decided.best.train),
+        ("holdout", source.held, decided.before, decided.best.held),
+    )
+    for role, numbers, before, after in sets:
+        for i, a, b in zip(numbers, before.residuals, after.residuals, strict=True):
+            record, measured = source.records[i], source.measured(i)
+            for c in shown(source.channels):
+                own, place = measured[:, c], measured[:, "xyz".index(source.channels[c][-1])]
+                known = np.isfinite(own) & np.isfinite(place)
+                time = times(record)
+                speed = np.gradient(place, time)
+                columns = (x[known] for x in (time, place, speed, own, own - a[:, c], own - b[:, c]))
+                made.append(Trace(Path(record.path).name, role, source.channels[c], unit_of(source.channels[c]),
+                                  *columns))  # fmt: skip
+    return tuple(made)
+
+
+def with_found(model: Model, at: ModelPoint) -> Model:
     """The model with what was found: effects, their values, and numbers of the set-up."""
     assert isinstance(model.tree, SnareTree)
-    placed = tuple(p for p in found.placed if p.effect.name in APPLIED)
-    values = {key_of(p): found.values[key_of(p)] for p in placed}
-    tree = replace(model.tree, setup=model.tree.setup.corrected(found.values))
-    return replace(model, tree=tree, effects=placed, values={**model.values, **values})
+    tree = replace(model.tree, setup=model.tree.setup.corrected(at.all_values))
+    effects = [p.key for p in at.placed if p.effect.name in NUMBERS]
+    return replace(with_effects(model, at.without(*effects)), tree=tree)

@@ -7,9 +7,10 @@ from pathlib import Path
 from ...models.model import Model
 from ...recordings.part import several
 from ..diagnosis import Diagnosis
+from ..sources.decide import decide
+from ..sources.own import settled
 from .answer import report_on, with_found
-from .search import search
-from .sets import sets_of
+from .source import captures_of, start
 
 
 def diagnose_captures(
@@ -18,7 +19,6 @@ def diagnose_captures(
     holdout: str | Path | Sequence[str | Path],
     *,
     progress: Callable[[str], None] = lambda _: None,
-    seed: int = 0,
     jobs: int | None = None,
 ) -> tuple[Diagnosis, Model]:
     """Find, name, add and confirm the physics that a capture's model leaves out.
@@ -31,8 +31,6 @@ def diagnose_captures(
     holdout : path, or sequence of them
         Looked at for the proof only.
     progress : callable
-    seed : int
-        Of the bootstrap.
     jobs : int or None
         Processes; None: one a core, at most four.
 
@@ -47,7 +45,6 @@ def diagnose_captures(
     """
     begun = time.monotonic()
     progress("reading the recordings")
-    with sets_of(model, recordings, several(holdout), jobs) as (train, locked):
-        found = search(model, train, locked, progress=progress, seed=seed)
-    seconds, count = time.monotonic() - begun, train.runs.count
-    return report_on(model, found, train.captures, locked.captures, seconds, count), with_found(model, found.last)
+    with captures_of(model, recordings, several(holdout), jobs) as source:
+        decided = decide(source, settled(source, model, start(model), progress), progress)
+    return report_on(source, decided, time.monotonic() - begun), with_found(model, decided.best.train.at)

@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 
 from ...models.model import Model
+from ..evidence.arm import WeighedRecordings
 from ..parameter_list import parameter_list
-from .answer import estimates, with_found
-from .channels import channel_errors
-from .fit import CaptureFit, evaluate, fit, normal, with_slopes
-from .recording import CaptureRecording
-from .search import demand_simulated, start_at
-from .sets import sets_of
-
-STEPS = 8
-"""Most steps of the fit."""
+from ..sources.answer import estimates, rms
+from ..sources.fit import deviations, linearised
+from ..sources.own import fitted, known
+from ..sources.source import Linearisation, ModelPoint
+from ..sources.weigh import covariances
+from .answer import with_found
+from .seen import shown, unit_of
+from .source import Captures, captures_of, start
 
 
 @dataclass(frozen=True)
@@ -25,30 +25,31 @@ class CaptureIdentification:
     """A fit of captures, the model with its values, and the recordings."""
 
     model: Model
-    fit: CaptureFit
-    train: tuple[CaptureRecording, ...]
-    holdout: tuple[CaptureRecording, ...]
-    held: CaptureFit | None
+    given: ModelPoint
+    source: Captures
+    weighed: WeighedRecordings
+    fit: Linearisation
+    held: Linearisation | None
 
     def to_json(self) -> dict[str, Any]:
         """The published form."""
-        parameters = parameter_list(self.fit.placed, estimates(self.train, self.fit))
+        source, noise = self.source, covariances(self.weighed)
+        parameters = parameter_list(self.fit.at.placed, estimates(source, self.given, self.fit, noise))
         fits: dict[str, Any] = {}
-        for role, captures, found in (("train", self.train, self.fit), ("holdout", self.holdout, self.held)):
+        for role, numbers, found in (("train", source.train, self.fit), ("holdout", source.held, self.held)):
             if found is not None:
-                for error in channel_errors(captures, found):
-                    entry = fits.setdefault(error.channel, {})
-                    entry[role] = {"rms": error.rms, "relative": error.relative}
-                    entry["unit"] = error.unit
-        matrix = normal(self.train, self.fit)[1] if len(self.fit.x) else np.eye(1)
-        notes = [f"{Path(c.path).name}: {note}" for c in (*self.train, *self.holdout) for note in c.notes]
+                left, size = rms(found), source.sizes(numbers)
+                for c in shown(source.channels):
+                    entry = fits.setdefault(source.channels[c], {})
+                    entry[role] = {"rms": float(left[c]), "relative": float(left[c] / size[c])}
+                    entry["unit"] = unit_of(source.channels[c])
+        _, own = deviations(source, self.given, self.fit, noise)
+        size = np.sqrt(np.maximum(np.diag(own), 1e-300))
+        condition = float(min(np.linalg.cond(own / np.outer(size, size)), 1e300)) if len(own) else 1.0
+        notes = [f"{Path(r.path).name}: {note}" for r in source.records for note in r.notes]
         return {
-            "model": self.model.name,
-            "parameters": parameters,
-            "fit": fits,
-            "condition": float(min(np.linalg.cond(matrix), 1e300)),
-            "notes": notes,
-        }
+            "model": self.model.name, "parameters": parameters, "fit": fits, "condition": condition, "notes": notes
+        }  # fmt: skip
 
 
 def identify_captures(
@@ -61,8 +62,9 @@ def identify_captures(
 ) -> CaptureIdentification:
     """Fit every parameter of a capture's effects; arguments and errors as `diagnose_captures`."""
     progress("reading the recordings")
-    with sets_of(model, recordings, holdout, jobs) as (train, locked):
+    with captures_of(model, recordings, holdout, jobs) as source:
         progress("fitting the effects' parameters with the simulation in the loop")
-        found = with_slopes(train, fit(train, start_at(model, train), STEPS))
-        held = demand_simulated(model, evaluate(locked, found.placed, [found.x])[0]) if holdout else None
-    return CaptureIdentification(with_found(model, found), found, tuple(train.captures), tuple(locked.captures), held)
+        given = known(model, start(model))
+        weighed, found = fitted(source, given, start(model))
+        held = linearised(source, source.held, found.at) if holdout else None
+        return CaptureIdentification(with_found(model, found.at), given, source, weighed, found, held)

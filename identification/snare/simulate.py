@@ -9,7 +9,6 @@ from ...errors import InputError
 from ...models.model import Model
 from ...models.snare.setup import SnareTree
 from ...recordings.signals import QUATERNION
-from .handles import key_of
 from .recording import ON_TARGET, load_captures
 
 SAMPLE = 0.01
@@ -48,7 +47,9 @@ def simulate_capture(model: Model, motion: str | Path | None = None) -> xr.Datas
         (given,) = load_captures(model, [motion])
         setup, drive, duration, zero, body = given.setup, given.drive, float(given.times[-1]), given.zero, given.body
         sensor = given.sensors.get("effector", sensor)
-    setup = setup.with_values({key_of(p): model.values[key_of(p)] for p in model.effects})
+    setup = setup.with_values(
+        {key: model.values[key] for p in model.effects for key in (f"{p.key}.{x.name}" for x in p.effect.parameters)}
+    )
     try:
         history = SnareModel(setup.parameters, setup.target, drive=drive).run(duration, every=SAMPLE)
     except SnareStepError as fault:

@@ -7,6 +7,7 @@ the same rule a nameless curve of the last search stays.
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from ..deciding import DISCREPANCY, GATE, TOLERANCES
 from ..evidence.arm import WeighedRecordings
 from ..evidence.confirm import scatter
 from ..evidence.members import Members
+from ..evidence.pool import Item
 from ..evidence.projected import ProjectedEvidence
 from ..evidence.rounds import as_names, share_of_residual
 from ..evidence.search import MemberOdds, Search
@@ -22,8 +24,8 @@ from ..evidence.selection import Remainder
 from ..evidence.tolerant import searched
 from .fit import fit, linearised, shift_columns
 from .search import Naming, Selection, opened
-from .source import Linearisation, ModelPoint, Source
-from .weigh import covariances, weigh
+from .source import GridPoint, Linearisation, ModelPoint, Source
+from .weigh import covariances, point_key, weigh
 
 Array = NDArray[np.float64]
 
@@ -120,15 +122,24 @@ def _joined(here: Linearisation, there: Linearisation) -> Linearisation:
 
 def remainders(source: Source, given: ModelPoint, best: Confirmation, barred: Collection[str]) -> tuple[Remainder, ...]:
     """Nameless curves beside the confirmed model that the held-out recordings confirm."""
-    train, numbers = range(len(source.train)), [*source.train, *source.held]
+    train, numbers = source.train, [*source.train, *source.held]
     if not source.curves(numbers):
         return ()
-    weighed = opened(source, numbers, given, _joined(best.train, best.held), best.noise)
+    weighed, own = opened(source, given, best.train, replace(best.noise, runs=best.noise.runs[: len(train)]))
     weighed, made, slots, tolerance = searched(weighed, train, barred, range(len(weighed.noises)))
+    kept, items = list(as_names(made, slots)), made.on.evidence.items
+    if not any(_nameless(made, s) for s in kept):
+        return ()
+    # Of the held-out recordings only what was chosen is worked out.
+    only = {point_key(x) for s in kept if isinstance(x := items[s.taken.item].label, GridPoint)}
+    noise = replace(best.noise, noises=weighed.noises)
+    weighed = weigh(source, numbers, given, _joined(best.train, best.held), noise, search=True, alone=own, only=only)
     both = ProjectedEvidence(weighed.evidence, range(len(numbers)), weighed.beside.weight(tolerance))
-    kept = list(as_names(made, slots))
+    there = {_told(x): k for k, x in enumerate(weighed.evidence.items)}
+    at = {k: there[_told(x)] for k, x in enumerate(items) if _told(x) in there}
+    kept = [s for s in kept if s.taken.item in at]
     while True:
-        told = {k: _remainder(source, made, both, kept, k) for k, s in enumerate(kept) if _nameless(made, s)}
+        told = {k: _remainder(source, made, both, at, kept, k) for k, s in enumerate(kept) if _nameless(made, s)}
         weakest = min(told, key=lambda k: told[k].held, default=None)
         if weakest is None or told[weakest].held > GATE:
             break
@@ -148,19 +159,32 @@ def _nameless(made: Search, slot: MemberOdds) -> bool:
     return not made.pool[slot.taken.hypothesis].named
 
 
+def _told(item: Item) -> tuple[Any, int]:
+    """What tells an item from every other: an effect's point or a curve, and how many columns it has there."""
+    return point_key(item.label) if isinstance(item.label, GridPoint) else item.label, len(item.index)
+
+
 def _pairs(slots: Sequence[MemberOdds]) -> list[tuple[int, float]]:
     return [(s.taken.item, s.taken.size) for s in slots]
 
 
-def _remainder(source: Source, made: Search, both: ProjectedEvidence, kept: Sequence[MemberOdds], k: int) -> Remainder:
-    """One curve of a set: what it is, and what the held-out recordings gain by it."""
+def _remainder(
+    source: Source,
+    made: Search,
+    both: ProjectedEvidence,
+    at: Mapping[int, int],
+    kept: Sequence[MemberOdds],
+    k: int,
+) -> Remainder:
+    """One curve of a set: what it is, and what the held-out recordings gain by it; ``at``: numbers in ``both`` of what
+    was searched."""
 
     def beside(some: Sequence[MemberOdds]) -> tuple[float, Array]:
-        own, all_of_it = Members(made.on, _pairs(some)), Members(both, _pairs(some))
-        mean = [(item, own.of(item)) for item, _ in _pairs(some)]
+        own, all_of_it = Members(made.on, _pairs(some)), Members(both, [(at[x], size) for x, size in _pairs(some)])
+        mean = [(at[item], own.of(item)) for item, _ in _pairs(some)]
         # Shifts may be a recording's own: what stands beside is its mean on all of them.
-        always, pairs = both.beside(mean), [(made.on.evidence.items[item], a) for item, a in mean]
-        parts = [source.blocks(i, made.on.evidence.left(i, always, pairs)) for i in source.held]
+        always, pairs = both.beside(mean), [(both.evidence.items[item], a) for item, a in mean]
+        parts = [source.blocks(i, both.evidence.left(i, always, pairs)) for i in source.held]
         return all_of_it.value - own.value, np.concatenate(parts)
 
     density, whole = beside(kept)

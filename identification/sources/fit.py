@@ -42,16 +42,17 @@ def residuals(source: Source, numbers: Sequence[int], at: ModelPoint) -> tuple[A
 
 
 def linearised(
-    source: Source, numbers: Sequence[int], at: ModelPoint, shifted: Sequence[Array] | None = None
+    source: Source, numbers: Sequence[int], at: ModelPoint, known: Sequence[Array] | None = None
 ) -> Linearisation:
-    """Residuals and slopes about a fit; ``shifted``: the shifts' columns (n, c, S) of each recording, where they are
-    known."""
-    columns, left = [], []
+    """Residuals and slopes about a fit; ``known``: columns (n, c, p + S) of each recording that are, of the first p
+    parameters and of the shifts."""
+    columns, left, n_shifts = [], [], len(at.shifts)
     for k, i in enumerate(numbers):
         here = forecast(source, i, at)
         left.append(np.nan_to_num(source.measured(i) - here))
-        beside = source.shift_slopes(i, at, here) if shifted is None else shifted[k]
-        columns.append(np.concatenate([source.slopes(i, at, here), beside], axis=2))
+        there = source.shift_slopes(i, at, here) if known is None else known[k]
+        p = there.shape[2] - n_shifts
+        columns.append(np.concatenate([there[:, :, :p], source.slopes(i, at.held(p), here), there[:, :, p:]], axis=2))
     return Linearisation(at, tuple(left), tuple(columns))
 
 
@@ -115,15 +116,15 @@ def fit(
     given: ModelPoint,
     at: ModelPoint,
     covariances: Covariances,
-    shifted: Sequence[Array] | None = None,
+    known: Sequence[Array] | None = None,
     most: int = 0,
 ) -> Linearisation:
     """Maximise the posterior of the training recordings from a start, in ``most`` steps or as many as the source has;
-    ``shifted`` as in `linearised`.
+    ``known`` as in `linearised`.
     """
     numbers, prior, n = source.train, priors(source, given, at), len(at.values)
-    here = linearised(source, numbers, at, shifted)
-    shifted = shift_columns(here)
+    here = linearised(source, numbers, at, known)
+    known = shift_columns(here) if known is None else known
     now = cost(at, here.residuals, covariances, prior)
     size = np.concatenate([sizes_of(source, at), np.ones(len(at.shifts))])
     low, high = bounds_of(source, at)
@@ -142,14 +143,14 @@ def fit(
             value = cost(tried, left, covariances, prior)
             if value < now:
                 gained, now = now - value, value
-                here = linearised(source, numbers, tried, shifted)
+                here = linearised(source, numbers, tried, known)
                 break
         else:
             break
         if np.all(np.abs(share * move) < STILL * size) or gained < STILL:
             break
     settled = source.settled(here.at, numbers)
-    return here if settled is here.at else linearised(source, numbers, settled, shifted)
+    return here if settled is here.at else linearised(source, numbers, settled, known)
 
 
 def normal(here: Linearisation, covariances: Covariances, prior: tuple[Array, Array]) -> tuple[Array, Array]:

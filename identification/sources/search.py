@@ -79,7 +79,7 @@ def search(
     weighed: WeighedRecordings | None = None
     for number in range(1, ROUNDS + 1):
         progress(f"round {number}: comparing each effect at each place")
-        weighed = opened(source, train, given, here)
+        weighed, _ = opened(source, given, here)
         weighed, made, slots, _ = searched(weighed, range(len(train)), barred, range(len(weighed.noises)))
         trials = trials or _trials(made)
         error = LAW_ERROR**2 * _taken_out(first, here, weighed)
@@ -95,6 +95,10 @@ def search(
             values |= start
         progress("fitting " + ", ".join(f"{p.effect.name} at {p.at}" for p in added))
         here = fit(source, given, here.at.with_effects(added, values), covariances(weighed), shifted)
+        if source.bent:
+            # Beside old columns an effect of the same number would explain what only their change leaves.
+            here = linearised(source, train, here.at)
+            shifted = shift_columns(here)
     assert weighed is not None
     if not names:
         here = fit(source, given, here.at, covariances(weighed), shifted)
@@ -112,20 +116,15 @@ def _taken_out(first: Linearisation, here: Linearisation, weighed: WeighedRecord
 
 
 def opened(
-    source: Source,
-    numbers: Sequence[int],
-    given: ModelPoint,
-    here: Linearisation,
-    known: WeighedRecordings | None = None,
-) -> WeighedRecordings:
-    """Recordings under a fit with every hypothesis; laws without amplitudes are fitted by themselves."""
-    weighed = weigh(source, numbers, given, here, known, search=True)
+    source: Source, given: ModelPoint, here: Linearisation, known: WeighedRecordings | None = None
+) -> tuple[WeighedRecordings, dict[str, GridPoint]]:
+    """The training recordings under a fit with every hypothesis, and the laws without amplitudes, which are fitted by
+    themselves."""
+    weighed = weigh(source, source.train, given, here, known, search=True)
     if not any(h.named and h.items[0].whole for h in weighed.pool):
-        return weighed
-    n = len(source.train)
-    train = Linearisation(here.at, here.residuals[:n], here.columns[:n])
-    own = by_themselves(source, given, train, weighed)
-    return weigh(source, numbers, given, here, known or weighed, search=True, alone=own)
+        return weighed, {}
+    own = by_themselves(source, given, here, weighed)
+    return weigh(source, source.train, given, here, known or weighed, search=True, alone=own), own
 
 
 def _large(made: Search, slot: MemberOdds, error: Array) -> bool:
@@ -172,7 +171,7 @@ def _started(made: Search, slot: MemberOdds, beside: Sequence[MemberOdds]) -> tu
     values = dict(variant.values)
     bounds = {f"{variant.placed.key}.{x.name}": (x.low, x.high) for x in variant.placed.effect.parameters}
     for key, value in zip(variant.amplitudes, amplitude, strict=False):
-        values[key] = float(np.clip(value, *bounds[key]))
+        values[key] = float(np.clip(variant.origin.get(key, 0.0) + value, *bounds[key]))
     return variant.placed, values
 
 
@@ -214,8 +213,8 @@ def _smallest(made: Search, h: int) -> dict[str, float]:
         gain = log_bayes(many, h_of_one[0] * t[:, None], np.tile(item.positive[k : k + 1], (len(t), 1))).max(axis=1)
         enough = np.flatnonzero(gain + x.prior > 0)
         if len(enough):
-            size = float(t[enough[0]] * spread[k])
+            size = v.origin.get(key, 0.0) + float(t[enough[0]] * spread[k])
             if item.whole:
-                size = v.values[key] * size if first.zero == 0 else v.values[key] / size
+                size = v.values[key] / size if first.zero or v.inverse else v.values[key] * size
             found[key.rpartition(".")[2]] = size
     return found

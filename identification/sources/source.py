@@ -5,7 +5,7 @@ Letters: n samples of a recording, c channels, P free parameters of effects, S s
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -61,6 +61,15 @@ class ModelPoint:
         """This model without some effects."""
         return self._with(tuple(p for p in self.placed if p.key not in keys), self.all_values)
 
+    def held(self, count: int) -> "ModelPoint":
+        """This model with the first ``count`` free parameters held at their values."""
+        known = set(self.keys[:count])
+        placed = [
+            replace(p, hold=(*p.hold, *(x.name for x in p.effect.parameters if f"{p.key}.{x.name}" in known)))
+            for p in self.placed
+        ]
+        return self._with(tuple(placed), self.all_values)
+
     def _with(self, placed: tuple[PlacedEffect, ...], every: Mapping[str, float]) -> "ModelPoint":
         held = {f"{p.key}.{h}": every[f"{p.key}.{h}"] for p in placed for h in p.hold}
         empty = ModelPoint(placed, held, np.zeros(0), self.shifts)
@@ -71,13 +80,16 @@ class ModelPoint:
 class GridPoint:
     """An effect at one point of its grid: values by key, and the parameters in which each column is linear; none where
     one column is the whole law. ``size`` is a usual amplitude of the column, where the channels do not give it; of a
-    whole law, its RMS as a share of its channel's.
+    whole law, its RMS as a share of its channel's. ``origin``: the values that amplitudes are counted from, by key;
+    else zero. ``inverse``: a whole law does the less, the larger its parameter is.
     """
 
     placed: PlacedEffect
     values: Mapping[str, float]
     amplitudes: tuple[str, ...]
     size: float = 0.0
+    origin: Mapping[str, float] = field(default_factory=dict)
+    inverse: bool = False
 
 
 @dataclass(frozen=True)
@@ -117,6 +129,11 @@ class Source(Protocol):
     @property
     def anew(self) -> bool:
         """Whether the evidence chooses how well the shifts are known: to a share of their deviations, or not at all."""
+        ...
+
+    @property
+    def bent(self) -> bool:
+        """Whether the derivatives by the shifts are computed again after each fit, since they change over it."""
         ...
 
     @property
@@ -172,8 +189,9 @@ class Source(Protocol):
         """Points of an effect's grid."""
         ...
 
-    def columns(self, i: int, at: ModelPoint, v: GridPoint) -> Array:
-        """What an effect adds to the prediction of the model (n, c, k); not a number where it cannot be predicted."""
+    def columns(self, i: int, at: ModelPoint, many: Sequence[GridPoint]) -> list[Array]:
+        """What each effect by itself adds to the prediction of the model (n, c, k); not a number where it cannot be
+        predicted."""
         ...
 
     def curves(self, numbers: Sequence[int]) -> Mapping[tuple[int, str], list[Array]]:

@@ -1,7 +1,7 @@
 """Recordings under a fit, as the evidence sees them: channels with their noise, and every hypothesis."""
 
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,10 +18,13 @@ from ..evidence.projected import ProjectedEvidence
 from ..evidence.search import Search
 from ..nuisance.curve import SMALL
 from ..nuisance.noise import Noise, learn
-from .fit import Covariances, fit, priors, shift_columns
+from .fit import Covariances, fit, priors
 from .source import GridPoint, Linearisation, ModelPoint, Source
 
 Array = NDArray[np.float64]
+
+PointKey = tuple[str, tuple[tuple[str, float], ...]]
+"""Of a point of an effect's grid: the effect's key, and each parameter's key and value."""
 
 STRONGEST = 10
 """Directions of what could explain a residual beside which its noise is learnt."""
@@ -41,6 +44,7 @@ def weigh(
     *,
     search: bool,
     alone: Mapping[str, GridPoint] | None = None,
+    only: Container[PointKey] | None = None,
 ) -> WeighedRecordings:
     """Recordings under a fit.
 
@@ -59,9 +63,11 @@ def weigh(
         False leaves out all hypotheses: only the evidence of the fit itself is wanted.
     alone : mapping of str to GridPoint, optional
         Laws that were fitted by themselves, by their key: a point more of their grid.
+    only : container, optional
+        Points of the effects' grids (`point_key`), where not all are wanted.
     """
     columns, scale = CandidateColumns([len(r) for r in linear.residuals]), source.scale()
-    named = _named(source, numbers, linear.at, columns, alone or {}) if search else {}
+    named = _named(source, numbers, linear.at, columns, alone or {}, only) if search else {}
     spread = np.concatenate([_spread(source, given, linear.at), np.ones(len(linear.at.shifts))])
     curves = {k: x for k, x in source.curves(numbers).items() if search or k[1] in SMALL}
     sizes = {k: _rms_of_curve(x[: len(source.train)]) for k, x in curves.items()}
@@ -129,24 +135,40 @@ def by_themselves(
     much less.
     """
     on, found = ProjectedEvidence(weighed.evidence, range(len(source.train))), {}
-    best, shifted = Search(on, weighed.pool).scan([]).item, shift_columns(linear)
+    best = Search(on, weighed.pool).scan([]).item
     for h, x in enumerate(weighed.pool):
         if x.named and x.items[0].whole:
             v: GridPoint = weighed.evidence.items[best[h]].label
             at = linear.at.with_effects([v.placed], v.values)
-            fitted = fit(source, given, at, covariances(weighed)[: len(source.train)], shifted)
+            # What is there moves little beside it: its columns are those of its own fit.
+            fitted = fit(source, given, at, covariances(weighed)[: len(source.train)], linear.columns)
             found[x.key] = replace(v, values={k: fitted.at.all_values[k] for k in v.values})
     return found
 
 
+def point_key(v: GridPoint) -> PointKey:
+    """What tells a point of an effect's grid from every other."""
+    return v.placed.key, tuple(sorted(v.values.items()))
+
+
 def _named(
-    source: Source, numbers: Sequence[int], at: ModelPoint, columns: CandidateColumns, alone: Mapping[str, GridPoint]
+    source: Source,
+    numbers: Sequence[int],
+    at: ModelPoint,
+    columns: CandidateColumns,
+    alone: Mapping[str, GridPoint],
+    only: Container[PointKey] | None,
 ) -> dict[str, tuple[PlacedEffect, list[Item]]]:
     """Every effect that is not there, with its columns at each point of its grid."""
+    grids = [(p, [v for v in source.variants(p) if only is None or point_key(v) in only])
+             for p in source.library(at.placed)]  # fmt: skip
+    every = [v for _, grid in grids for v in grid]
+    own = [source.columns(i, at, every) for i in numbers]
+    parts = iter(zip(*own, strict=True))
     found: dict[str, tuple[PlacedEffect, list[Item]]] = {}
-    for p in source.library(at.placed):
-        items = [_item(source, numbers, at, columns, v) for v in source.variants(p)]
-        if p.key in alone:
+    for p, grid in grids:
+        items = [_item(source, columns, v, next(parts)) for v in grid]
+        if p.key in alone and (only is None or point_key(alone[p.key]) in only):
             items.append(_fitted(source, numbers, at, columns, alone[p.key]))
         some = [x for x in items if x is not None]
         if some:
@@ -154,18 +176,15 @@ def _named(
     return found
 
 
-def _item(
-    source: Source, numbers: Sequence[int], at: ModelPoint, columns: CandidateColumns, v: GridPoint
-) -> Item | None:
-    parts = [source.columns(i, at, v) for i in numbers]
+def _item(source: Source, columns: CandidateColumns, v: GridPoint, parts: Sequence[Array]) -> Item | None:
     size = _size(source, parts)
-    if not np.all(np.isfinite(size)) or np.any(size <= 0):
+    if not _finite(parts) or np.any(size <= 0):
         return None
     index = _added(columns, parts)
     if not v.amplitudes:
         return Item(index, np.ones(1), np.ones(1, bool), True, replace(v, size=float(size[0])))
     named = {x.name: x for x in v.placed.effect.parameters}
-    positive = np.array([named[k.rpartition(".")[2]].low >= 0 for k in v.amplitudes])
+    positive = np.array([named[k.rpartition(".")[2]].low >= v.origin.get(k, 0.0) for k in v.amplitudes])
     return Item(index, np.full(len(size), v.size) if v.size else 1 / size, positive, label=v)
 
 
@@ -173,19 +192,23 @@ def _fitted(
     source: Source, numbers: Sequence[int], at: ModelPoint, columns: CandidateColumns, v: GridPoint
 ) -> Item | None:
     """A law where it was fitted by itself, and what each parameter's own size more would add: no more than the law."""
-    there = at.with_effects([v.placed], v.values)
-    parts, n = [], len(at.values)
+    there, parts = at.with_effects([v.placed], v.values).held(len(at.values)), []
     for i in numbers:
         here = source.predicted(i, there)
         if here is None:
             return None
-        slopes = source.slopes(i, there, here)[:, :, n:] * there.values[n:]
-        parts.append(np.concatenate([source.columns(i, at, v), slopes], axis=2))
+        (law,) = source.columns(i, at, [v])
+        parts.append(np.concatenate([law, source.slopes(i, there, here) * there.values], axis=2))
     size = _size(source, parts)
-    if not np.all(np.isfinite(size)) or size[0] <= 0:
+    if not _finite(parts) or size[0] <= 0:
         return None
     index = _added(columns, parts)
     return Item(index, 1 / np.maximum(size, size[0]), np.arange(len(index)) == 0, label=v)
+
+
+def _finite(parts: Sequence[Array]) -> bool:
+    """Can every recording be predicted with an effect?"""
+    return all(bool(np.all(np.isfinite(x))) for x in parts)
 
 
 def _size(source: Source, parts: Sequence[Array]) -> Array:

@@ -19,7 +19,7 @@ EFFECT = Effect(
     sentence="the cables' own vibration decays faster or slower than in the model",
     equation="bending moment time * bending stiffness * rate of the curvature",
     source="Voigt (1892), Kelvin and Voigt's law on curvature",
-    parameters=(Parameter("time", "s", "damping over stiffness in bending", low=0.0, high=1.0),),
+    parameters=(Parameter("time", "s", "damping over stiffness in bending", low=0.0, high=1.0, grid=(3e-3, 1e-2)),),
     law=_law,
     experiment="pluck {at} with the ring at rest, and watch the swing die out",
 )

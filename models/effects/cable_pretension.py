@@ -21,7 +21,14 @@ EFFECT = Effect(
     equation="axial force tension + axial stiffness * strain",
     source="Hooke (1678), with a prestrain",
     parameters=(
-        Parameter("tension", "N", "tension of a cable held straight at its nominal length", low=0.0, high=5e3),
+        Parameter(
+            "tension",
+            "N",
+            "tension of a cable held straight at its nominal length",
+            low=0.0,
+            high=5e3,
+            grid=(200.0, 800.0),
+        ),
     ),
     law=_law,
     experiment="measure the length of {at} between their fittings, unloaded, or the force that draws them straight",

@@ -20,7 +20,16 @@ EFFECT = Effect(
     sentence="cables and pin do not bounce off each other: a contact dissipates energy",
     equation="coefficient * elastic force * rate of the overlap, the whole force never below zero",
     source="Hunt and Crossley (1975)",
-    parameters=(Parameter("coefficient", "s/m", "share of the force per rate of the overlap", low=0.0, high=1e5),),
+    parameters=(
+        Parameter(
+            "coefficient",
+            "s/m",
+            "share of the force per rate of the overlap",
+            low=0.0,
+            high=1e5,
+            grid=(200.0, 2e3),
+        ),
+    ),
     law=_law,
     experiment="let one cable strike {at} at a known speed, and watch how high it bounces",
 )

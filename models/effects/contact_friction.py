@@ -18,7 +18,9 @@ EFFECT = Effect(
     sentence="the cables rub on the pin and drag it along where they slide",
     equation="coefficient * normal force * slip / sqrt(|slip|^2 + slip velocity^2)",
     source="Coulomb (1785); Li et al. (soft capture), section 2",
-    parameters=(Parameter("coefficient", "1", "friction force per normal force", low=0.0, high=1.5),),
+    parameters=(
+        Parameter("coefficient", "1", "friction force per normal force", low=0.0, high=1.5, grid=(0.08, 0.25)),
+    ),
     law=_law,
     experiment="draw one cable slowly across {at} under a known load, and measure the force along it",
 )

@@ -19,7 +19,15 @@ EFFECT = Effect(
     sentence="cables and pin give way under load more than steel on steel does",
     equation="stiffness * overlap^1.5",
     source="Hertz (1882); Li et al. (soft capture), eq. 19",
-    parameters=(Parameter("stiffness", "N/m^1.5", "force per overlap to the power of 1.5", low=0.0),),
+    parameters=(
+        Parameter(
+            "stiffness",
+            "N/m^1.5",
+            "force per overlap to the power of 1.5",
+            low=0.0,
+            grid=(1e7, 2e6, 3e5),
+        ),
+    ),
     law=_law,
     experiment="press one cable on {at} with known loads, and measure how far it sinks in",
 )

@@ -19,7 +19,16 @@ EFFECT = Effect(
     sentence="an extra cable holds the target like a spring",
     equation="force -stiffness * displacement of the pin's foot since the start",
     source="Hooke (1678); Li et al. (soft capture), section 4, name the cable",
-    parameters=(Parameter("stiffness", "N/m", "force per displacement, in every direction", low=0.0, high=1e5),),
+    parameters=(
+        Parameter(
+            "stiffness",
+            "N/m",
+            "force per displacement, in every direction",
+            low=0.0,
+            high=1e5,
+            grid=(20.0, 100.0, 500.0),
+        ),
+    ),
     law=_law,
     experiment="push the {at} aside by hand, snare open, and let it swing: its frequencies rise with an umbilical",
 )

@@ -32,12 +32,16 @@ class SetupField:
     of_target: bool
     absent: float | None
     """The field's value in a model without the effect; None: the set-up's own."""
+    grid: tuple[float, ...] = ()
+    """Where a number of the set-up is tried, in shares of what it is said to be."""
+    inverse: bool = False
+    """Whether it does the less, the larger its parameter is."""
 
 
 APPLIED = {
     "contact_friction": SetupField("pin", "coefficient", "friction", False, 0.0),
     "contact_damping": SetupField("pin", "coefficient", "contact_damping", False, 0.0),
-    "contact_stiffness": SetupField("pin", "stiffness", "hertz_stiffness", False, None),
+    "contact_stiffness": SetupField("pin", "stiffness", "hertz_stiffness", False, None, inverse=True),
     "cable_damping": SetupField("cables", "time", "bending_damping", False, None),
     "cable_pretension": SetupField("cables", "tension", "cable_pretension", False, 0.0),
     "umbilical_stiffness": SetupField("target", "stiffness", "umbilical", True, 0.0),
@@ -46,12 +50,16 @@ APPLIED = {
 """The vocabulary's effects that a capture can have."""
 
 NUMBERS = {
-    "ring_radius": SetupField("capture", "value", "ring_radius", False, None),
-    "pin_radius": SetupField("capture", "value", "pin_radius", False, None),
-    "mass": SetupField("capture", "value", "mass", True, None),
+    "ring_radius": SetupField("capture", "value", "ring_radius", False, None, (0.98, 1.024)),
+    "pin_radius": SetupField("capture", "value", "pin_radius", False, None, (0.8, 1.25)),
+    "mass": SetupField("capture", "value", "mass", True, None, (0.6, 1.6)),
 }
 """Numbers of the set-up that nobody has stated for the built-in one: a diagnosis may find that they are others, where
 the model file does not give them. Cables then lie against the wall of a ring of that radius, as they do by default."""
+
+TOLERANCES = {"cable_damping.cables.time": 1e-3}
+"""How far numbers of the set-up may be from what they are said to be: one standard deviation, in their units; chosen. A
+rope's own damping is nobody's drawing: what is said of it may be off by as much as that is."""
 
 _OF_EFFECTS = {a.field: name for name, a in APPLIED.items() if a.absent is not None}
 _NUMBERS = tuple(f.name for f in fields(SnareParameters) if f.name not in _OF_EFFECTS)

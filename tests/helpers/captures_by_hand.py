@@ -1,27 +1,31 @@
-"""Captures of a few samples, and simulations of them that are straight lines over the effects' handles."""
+"""Captures worked out by hand, and simulations of them that are straight lines over the effects' values."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from snarelab.identification.snare.fit import CaptureFit
-from snarelab.identification.snare.handles import handle_of, key_of
 from snarelab.identification.snare.recording import EVERY, CaptureRecording, Track
-from snarelab.identification.snare.sets import CaptureSet
+from snarelab.identification.snare.source import Captures
 from snarelab.models.effects import get_effect
-from snarelab.models.model import PlacedEffect
+from snarelab.models.model import Model, PlacedEffect
 from snarelab.models.snare.parameters import SnareParameters
-from snarelab.models.snare.setup import CaptureSetup
+from snarelab.models.snare.setup import CaptureSetup, SnareTree
 from snarelab.models.snare.target import Target
 
 FRICTION = PlacedEffect(get_effect("contact_friction"), "pin")
-"""Its handle is the coefficient itself: from 0 to 1.5, differences of 0.03, tried at 0.08 and 0.25."""
+"""Tried at 0.08 and 0.25."""
 PRETENSION = PlacedEffect(get_effect("cable_pretension"), "cables")
-"""Its handle is the tension itself: from 0 to 5000 N, differences of 60 N."""
-CLEARANCE = PlacedEffect(get_effect("hang_point_clearance"), "target")
-"""Its handle is the play itself: from 0 to 0.1 m, differences of 0.4 mm."""
-UMBILICAL = PlacedEffect(get_effect("umbilical_stiffness"), "target")
-"""Its handle is the stiffness' root: from 0 to 100, differences of 1, tried at 20, 100 and 500 N/m."""
+"""Tried at 200 and 800 N."""
+DAMPING = PlacedEffect(get_effect("cable_damping"), "cables")
+"""The set-up's rope has 1 ms; tried at 3 and 10 ms."""
+STIFFNESS = PlacedEffect(get_effect("contact_stiffness"), "pin")
+"""The set-up's steel has 1.66e9; tried at 1e7, 2e6 and 3e5."""
+
+
+def key_of(placed):
+    (x,) = placed.effect.parameters
+    return f"{placed.key}.{x.name}"
 
 
 def track(position, quaternion=None, **force):
@@ -48,32 +52,50 @@ def along(*directions):
 
 
 class Straight:
-    """Simulations in which every handle moves the target along its own course, in proportion or by a given law.
+    """Simulations (K, 3) of the target: a motion that all have, and a course in proportion to each value, or a law of
+    it; the cables touch from a time of the track on. ``asked`` keeps what was asked for, ``numbers`` of which capture;
+    it stands for processes."""
 
-    ``asked`` keeps the handles' values in the order they were asked for.
-    """
-
-    def __init__(self, courses, law=lambda x: x, fails=lambda _: False):
-        self.courses, self.law, self.fails, self.asked = courses, law, fails, []
+    def __init__(self, motion, courses=(), law=None, fails=lambda _: False, touch=0):
+        self.motion, self.courses, self.law = np.asarray(motion, float), dict(courses), law or {}
+        self.fails, self.touch, self.asked, self.numbers = fails, touch, [], []
 
     def __call__(self, asked: Any):
+        self.numbers += [n for n, _ in asked]
         return [self.one(values) for _, values in asked]
 
-    def one(self, values):
-        handles = {p: handle_of(p).x(values[key_of(p)]) for p in self.courses if key_of(p) in values}
-        self.asked.append(tuple(handles.values()))
-        if self.fails(handles):
+    @property
+    def count(self):
+        return len(self.asked)
+
+    def one(self, values) -> Any:
+        self.asked.append(dict(values))
+        if self.fails(values):
             return None
-        still = 0.0 * next(iter(self.courses.values()))
-        return track(sum((self.law(x) * self.courses[p] for p, x in handles.items()), start=still))
+        moved = [self.law.get(k, float)(values[k]) * x for k, x in self.courses.items() if k in values]
+        force = np.where(np.arange(len(self.motion)) < self.touch, 0.0, 1.0)[:, None] * np.ones(3)
+        return track(sum(moved, start=self.motion), target=force, effector=-force)
 
 
-def captures_of(runs, *measured, **options):
-    """A set of captures whose simulations are these runs."""
-    own = [capture(track(position), **options) for position in measured]
-    return CaptureSet(runs, range(len(own)), own)
+def model_of(given=("ring_radius", "pin_radius", "mass"), effects=(), values=None, support: Any = "free") -> Model:
+    """A capture whose file gives these numbers of the set-up."""
+    setup = CaptureSetup(SnareParameters(friction=0.0, contact_damping=0.0), Target(support), dict.fromkeys(given, 1.0))
+    tree = SnareTree("capture", (), (), np.array([-9.81, 0.0, 0.0]), setup)
+    return Model(
+        Path("model.toml"),
+        "capture",
+        "snare_capture",
+        None,
+        tree,
+        "fixed",
+        tuple(effects),
+        {},
+        None,
+        dict(values or {}),
+    )
 
 
-def fit_of(placed, x, likelihood, residuals=(), tracks=(), slopes=None):
-    """A fit as it came."""
-    return CaptureFit(tuple(placed), np.array(x, float), likelihood, tuple(tracks), tuple(residuals), slopes)
+def captures_of(runs, *measured, n_train=1, model=None, noise=1e-4):
+    """Captures whose simulations are these runs."""
+    own = [capture(track(x), path=f"{k}.csv", noise=noise) for k, x in enumerate(measured)]
+    return Captures(model or model_of(), own, n_train, runs)

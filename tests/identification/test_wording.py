@@ -117,27 +117,14 @@ def test_without_a_name_it_is_the_worst_channel_that_is_told():
     )
 
 
-@pytest.mark.parametrize(
-    ("margin", "right"), [(0.0, 0.6), (0.5, 0.6), (0.6, 0.7), (0.75, 0.85), (0.9, 0.9), (1.0, 0.9)]
-)
-def test_reliability_is_linear_between_its_knots_and_level_beyond(margin, right, tmp_path, monkeypatch):
-    (tmp_path / "reliability.json").write_text('{"margin": [0.5, 0.7, 0.8], "probability": [0.6, 0.8, 0.9]}')
-    monkeypatch.setattr(reliability, "__file__", str(tmp_path / "reliability.py"))
-    with forgotten():
-        assert reliability.probability(margin) == pytest.approx(right, rel=1e-12)
-
-
 @contextmanager
 def forgotten():
     """What was read of the stored file is read anew, and not kept."""
-    both = reliability._curve, reliability._stored
-    for cached in both:
-        cached.cache_clear()
+    reliability._stored.cache_clear()
     try:
         yield
     finally:
-        for cached in both:
-            cached.cache_clear()
+        reliability._stored.cache_clear()
 
 
 @pytest.mark.parametrize(

@@ -11,17 +11,16 @@ from refusal import refusal
 from snarelab.cli import main
 from snarelab.errors import InputError
 from snarelab.identification.snare.diagnose import diagnose_captures
-from snarelab.identification.snare.handles import HANDLES
 from snarelab.identification.snare.identify import identify_captures
-from snarelab.identification.snare.library import library
 from snarelab.identification.snare.recording import Track, load_captures, sensed_by
-from snarelab.identification.snare.runs import Job, simulated
+from snarelab.identification.snare.runs import CaptureRuns, Job, simulated
 from snarelab.identification.snare.simulate import simulate_capture
+from snarelab.identification.snare.source import Captures
 from snarelab.models.effects import effects
 from snarelab.models.model import places
 from snarelab.models.model_file import load_model
 from snarelab.models.model_write import save_model
-from snarelab.models.snare.setup import APPLIED, NUMBERS, SnareTree
+from snarelab.models.snare.setup import APPLIED, SnareTree
 
 PLAIN = 'name = "capture"\nsystem = "snare_capture"\n'
 FAR, SPEED, MASS, LINE = np.array([0.6, 0.3, 0.0]), 0.03, 25.0, 2.0
@@ -62,7 +61,6 @@ def test_a_plain_model_is_the_built_in_snare_without_any_effect(tmp_path):
     assert (setup.parameters.friction, setup.parameters.contact_damping, setup.target.umbilical) == (0.0, 0.0, 0.0)
     assert setup.parameters.bending_damping == 1e-3  # no rope has none, no contact is without stiffness
     assert {e.name for e in effects().values() if places(e, model.tree)} == set(APPLIED)
-    assert set(HANDLES) == {*APPLIED, *NUMBERS}
 
 
 def test_set_up_and_effects_come_back_from_a_saved_model(tmp_path):
@@ -293,7 +291,8 @@ def test_a_held_out_capture_that_starts_inside_a_cable_is_refused(tmp_path, use)
 
 def test_a_corrected_number_becomes_part_of_the_set_up(tmp_path):
     model = load_model(written(tmp_path, PLAIN + "[capture]\npin_radius = 0.008\n"))
-    assert {p.effect.name for p in library(model)} == {*APPLIED, "ring_radius", "mass"}  # what is given, is known
+    source = Captures(model, load_captures(model, [swinging(tmp_path, "a.csv")]), 1, CaptureRuns(()))
+    assert {p.effect.name for p in source.library([])} == {*APPLIED, "ring_radius", "mass"}  # what is given, is known
     setup = setup_of(model).corrected({"ring_radius.capture.value": 0.125, "contact_friction.pin.coefficient": 0.3})
     assert setup.parameters.ring_radius == 0.125
     assert setup.parameters.cable_length == pytest.approx(np.hypot(0.1, 2 * np.pi * 0.125 / 3))

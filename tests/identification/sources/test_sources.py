@@ -1,15 +1,21 @@
 """A kind of recording is one class: channels that are linear in two effects, searched and confirmed like any other."""
 
 from dataclasses import dataclass, field
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from snarelab.errors import InputError
+from snarelab.identification.deciding import BASELINE_OWN
 from snarelab.identification.nuisance.noise import NoiseChannel
 from snarelab.identification.sources.answer import rms
 from snarelab.identification.sources.decide import decide
+from snarelab.identification.sources.fit import priors
+from snarelab.identification.sources.own import known, settled
 from snarelab.identification.sources.source import GridPoint, ModelPoint
+from snarelab.identification.sources.stages import stages
 from snarelab.models.effects import get_effect
 from snarelab.models.model import PlacedEffect
 
@@ -27,6 +33,7 @@ class Slide:
     channels: tuple[str, ...] = ("tau.joint1",)
     n_shifts: int = 1
     anew: bool = False
+    bent: bool = False
     steps: int = 4
     train: range = field(default_factory=lambda: range(2))
     held: range = field(default_factory=lambda: range(2, 3))
@@ -74,8 +81,8 @@ class Slide:
     def variants(self, p):
         return [GridPoint(p, {}, (f"{p.key}.{p.effect.parameters[0].name}",))]
 
-    def columns(self, i, at, v):
-        return self.columns_of(i)[v.placed.key][:, None, None]
+    def columns(self, i, at, many):
+        return [self.columns_of(i)[v.placed.key][:, None, None] for v in many]
 
     def curves(self, numbers):
         return {}
@@ -86,6 +93,43 @@ class Slide:
 
     def blocks(self, i, x):
         return np.array([b.sum() for b in np.array_split(x, 5)])
+
+
+def test_only_what_the_model_file_says_has_a_prior():
+    """A start at what hardware usually has says nothing: fitted first, and then the point a search starts from."""
+    model: Any = SimpleNamespace(effects=(VISCOUS, COULOMB), values={f"{VISCOUS.key}.coefficient": 2.1})
+    keys = [f"{p.key}.{p.effect.parameters[0].name}" for p in (VISCOUS, COULOMB)]
+    start = ModelPoint.of((VISCOUS, COULOMB), dict(zip(keys, (2.1, 30.0), strict=True)), 1)
+    mean, spread = priors(Slide(((2.0, 0.7, 0.1),) * 3), known(model, start), start)
+    assert (mean[0], spread[0]) == (2.1, BASELINE_OWN * 2.1)
+    assert np.isinf(spread[1])
+    at = settled(Slide(((2.0, 0.7, 0.1),) * 3), model, start)
+    assert at.all_values == pytest.approx(dict(zip(keys, (2.0, 0.7), strict=True)), rel=0.02)
+    assert at.shifts == pytest.approx([0.0])
+    model.values[keys[1]] = 30.0
+    assert settled(Slide(((2.0, 0.7, 0.1),) * 3), model, start) is start
+
+
+def test_each_name_is_a_stage_and_every_other_is_fitted_again():
+    """Without Coulomb friction the viscous one stands for some of it."""
+    slide = Slide(((2.0, 0.7, 0.1),) * 3)
+    found = decide(slide, NONE)
+    first, second, third = stages(slide, found)
+    names = [n.placed for n in found.best.names]
+    assert [x[0] for x in (first, second, third)] == [
+        "model as given",
+        *(f"+ {p.effect.name} at joint1" for p in names),
+    ]
+    assert second[1].at.keys == found.best.train.at.keys[:1]
+    for _, train, held in (second, third):
+        left = slide.measured(2) - slide.predicted(2, train.at)
+        np.testing.assert_allclose(held.residuals[0], left)
+    alone = np.concatenate([slide.columns_of(i)[names[0].key] for i in slide.train])
+    beside = np.concatenate([slide.measured(i)[:, 0] for i in slide.train])
+    both = np.stack([alone, np.full(len(alone), 0.1)], axis=1)
+    expected = np.linalg.lstsq(both, beside, rcond=None)[0][0]
+    assert second[1].at.values[0] == pytest.approx(expected, rel=0.05)
+    assert rms(third[2])[0] < 0.5 * rms(second[2])[0] < rms(first[2])[0]
 
 
 def named(found):

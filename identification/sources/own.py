@@ -1,0 +1,49 @@
+"""A model's own parameters, fitted to the training recordings before anything is searched."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from ...models.model import Model
+from ..deciding import ROUNDS
+from ..evidence.arm import WeighedRecordings
+from .fit import STILL, fit, linearised, shift_columns, sizes_of
+from .source import Linearisation, ModelPoint, Source
+from .weigh import covariances, weigh
+
+STEPS = 8
+"""Most steps of the fit."""
+
+
+def known(model: Model, start: ModelPoint) -> ModelPoint:
+    """What the model file has a value of; of the rest there is no prior."""
+    return ModelPoint((), {k: x for k, x in start.all_values.items() if k in model.values}, np.zeros(0), start.shifts)
+
+
+def fitted(source: Source, given: ModelPoint, start: ModelPoint) -> tuple[WeighedRecordings, Linearisation]:
+    """The parameters fitted from a start, with the prior of what is ``given``; and the recordings as they were weighed.
+
+    Far from the truth a misfit is taken for noise: where a fit ends the noise is learnt anew, until that moves nothing.
+    """
+    here = linearised(source, source.train, start)
+    weighed = weigh(source, source.train, given, here, search=False)
+    for _ in range(ROUNDS):
+        found = fit(source, given, here.at, covariances(weighed), shift_columns(here), STEPS)
+        moved = np.abs(found.at.values - here.at.values) / sizes_of(source, found.at)
+        here = found
+        if np.all(moved < STILL):
+            break
+        weighed = weigh(source, source.train, given, here, search=False)
+    return weighed, here
+
+
+def settled(
+    source: Source, model: Model, start: ModelPoint, progress: Callable[[str], None] = lambda _: None
+) -> ModelPoint:
+    """Where a search starts: a parameter that the model file has no value of is fitted first."""
+    given = known(model, start)
+    if len(given.all_values) == len(start.all_values):
+        return start
+    progress("fitting what the model file has no value of")
+    return replace(fitted(source, given, start)[1].at, shifts=start.shifts)
