@@ -1,13 +1,15 @@
 """What has no name, modelled all the same: tables for the nameless curves that a diagnosis is left with.
 
 A table's values v have a Gaussian prior with a squared-exponential kernel over its coordinates (Rasmussen and Williams
-2006, chapter 2). Length and size are those of the greatest evidence; every parameter of the model is free beside the
-values, so that a table holds only what no law of the model can. Then the laws are fitted again beside the table, and
-the held-out recordings confirm it, by the density that they have with it and without.
+2006, chapter 2). Length and size are those of the greatest evidence; the baseline's parameters are free beside the
+values, so that a table holds only what no law of the baseline can, and they are fitted again beside the table. What was
+named keeps the values that the recordings confirmed: a table that is nearly a sum of laws must not change them (a cut
+between modules: Liu, Bayarri and Berger 2009). The held-out recordings confirm the table, by the density that they have
+with it and without.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -20,7 +22,7 @@ from ..models.table import MOST, Table, read_words
 from .deciding import GATE
 from .evidence.confirm import blocks, scatter
 from .evidence.diagnose import ArmDecision
-from .fitting.assembly import TorqueModel
+from .fitting.assembly import FreeParameter, TorqueModel
 from .fitting.experiment import Experiment
 from .fitting.fit import Fit, fit
 from .fitting.problem import gather
@@ -62,6 +64,7 @@ def empirical_laws(
     """The fit with a table for each nameless curve that can be one and that the held-out recordings confirm."""
     carriers, joints = final.assembly.tree.carriers, final.assembly.tree.joints
     found: list[EmpiricalLaw] = []
+    named = {n.placed.key for n in decided.best.names}
     for c in sorted({r.channel for r in decided.left.curves if r.channel >= carriers}):
         curves = [r for r in decided.left.curves if r.channel == c]
         wanted = list(dict.fromkeys(x for x in (read_words(r.over) for r in curves) if x))
@@ -69,8 +72,8 @@ def empirical_laws(
         have = [p for p in final.assembly.placed if p.effect.name == NAME and p.at == at]
         if not wanted or have:
             continue
-        tables, values = _tables(decided, final, train, c, wanted)
-        other = _refitted(final, placed_tables(at, tables), values, train)
+        tables, values = _tables(decided, final, train, c, wanted, named)
+        other = _refitted(final, placed_tables(at, tables), values, train, named)
         gain, sure = _confirmed(decided, final, other, train, held, c)
         if sure > GATE:
             final = other
@@ -79,7 +82,12 @@ def empirical_laws(
 
 
 def _tables(
-    decided: ArmDecision, final: Fit, train: Sequence[Experiment], c: int, wanted: Sequence[tuple[tuple[str, ...], str]]
+    decided: ArmDecision,
+    final: Fit,
+    train: Sequence[Experiment],
+    c: int,
+    wanted: Sequence[tuple[tuple[str, ...], str]],
+    named: Collection[str],
 ) -> tuple[tuple[Table, ...], dict[str, float]]:
     """Tables over the coordinates wanted, with their values and deviations by key."""
     assembly, at = final.assembly, final.assembly.tree.joints[c].name
@@ -89,7 +97,9 @@ def _tables(
     for e in train:
         residual, own = assembly.residual(e, final.theta)
         residuals.append(residual[:, c])
-        always.append(gather(own, c)[1].reshape(len(residual), -1))
+        index, columns = gather(own, c)
+        baseline = [k for k, i in enumerate(index) if _effect_of(assembly.slots[i]) not in named]
+        always.append(columns.reshape(len(residual), -1)[:, baseline])
     free = always[0].shape[1]
     chosen: list[_Chosen] = []
     loads = [assembly.evaluate(e, final.theta).load for e in train]
@@ -169,13 +179,34 @@ def _read(assembly: TorqueModel, e: Experiment, load: Array, c: int, over: tuple
     return [np.asarray(x, float).ravel() for x in (*(found[f"x{k}"] for k in range(len(over))), found["factor"])]
 
 
-def _refitted(final: Fit, placed: PlacedEffect, values: Mapping[str, float], train: Sequence[Experiment]) -> Fit:
-    """All laws fitted again beside a table that is held."""
+def _refitted(
+    final: Fit, placed: PlacedEffect, values: Mapping[str, float], train: Sequence[Experiment], named: Collection[str]
+) -> Fit:
+    """The baseline fitted again beside a table and the named laws, which are held."""
     before = final.assembly
     known = before.values(final.theta) | {k: v for k, v in values.items() if not k.startswith("std.")}
-    made = TorqueModel(before.tree, (*before.placed, placed), before.base, before.scales, known)
-    made.phi = before.phi
-    return fit(made, fitted(made, train), start=carry(final, made), multi_start=False)
+
+    def assembled(effects: Sequence[PlacedEffect], values: Mapping[str, float]) -> TorqueModel:
+        made = TorqueModel(before.tree, (*effects, placed), before.base, before.scales, values)
+        made.phi = before.phi
+        return made
+
+    held = [replace(p, hold=tuple(x.name for x in p.effect.parameters)) if p.key in named else p for p in before.placed]
+    part = assembled(held, known)
+    own = fit(part, fitted(part, train), start=carry(final, part), multi_start=False)
+    whole = assembled(before.placed, known | part.values(own.theta))
+    theta, std, at_bound = carry(own, whole), np.zeros(len(whole.slots)), np.zeros(len(whole.slots), bool)
+    covariance = np.zeros((len(theta), len(theta)))
+    for f in (final, own):
+        where = {s.key: i for i, s in enumerate(f.assembly.slots)}
+        rows = [(i, where[s.key]) for i, s in enumerate(whole.slots) if s.key in where]
+        to, of = (np.array(k, int) for k in zip(*rows, strict=True)) if rows else (np.zeros(0, int),) * 2
+        std[to], at_bound[to], covariance[np.ix_(to, to)] = f.std[of], f.at_bound[of], f.covariance[np.ix_(of, of)]
+    return replace(own, assembly=whole, theta=theta, std=std, at_bound=at_bound, covariance=covariance)
+
+
+def _effect_of(of: FreeParameter) -> str:
+    return f"{of.effect}.{of.at}"
 
 
 def _confirmed(

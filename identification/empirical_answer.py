@@ -11,7 +11,7 @@ from ..models.model import Model
 from ..models.table import UNITS
 from ..models.tree import Joint
 from .answer import channel_fits, moved, traces
-from .diagnosis import Diagnosis, EmpiricalTable, Estimate, Finding, Step
+from .diagnosis import Diagnosis, EmpiricalTable, Finding, Step
 from .empirical import EmpiricalLaw
 from .evidence.diagnose import ArmDecision
 from .fitting.experiment import Experiment
@@ -72,9 +72,7 @@ def with_laws(
     return replace(
         diagnosis,
         sentence=" ".join([diagnosis.sentence, *sentences]),
-        effects=tuple(findings)
-        if diagnosis.verdict == "unknown_effect"
-        else tuple(_beside(f, final) for f in diagnosis.effects),
+        effects=tuple(findings) if diagnosis.verdict == "unknown_effect" else diagnosis.effects,
         moved=moved(first, final),
         fit=channel_fits(model, first, final, train, held),
         traces=traces(first, final, train, held),
@@ -88,14 +86,3 @@ def _unit(coordinate: str, at: str, joints: Sequence[Joint]) -> str:
     what, _, other = coordinate.partition(" of ")
     joint = next(j for j in joints if j.name == (other or at))
     return written_unit(UNITS[what], joint.kind)
-
-
-def _beside(finding: Finding, final: Fit) -> Finding:
-    """A name with the values that its parameters have beside the tables, as the saved model has them."""
-    at = {s.key: i for i, s in enumerate(final.assembly.slots)}
-    own = {
-        name: Estimate(float(final.theta[i]), float(final.std[i]), e.unit, bool(final.at_bound[i]))
-        for name, e in finding.parameters.items()
-        if (i := at.get(f"{finding.name}.{finding.at}.{name}")) is not None
-    }
-    return replace(finding, parameters={**finding.parameters, **own})

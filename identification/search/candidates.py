@@ -1,12 +1,15 @@
 """Which effects could be missing, at which places, and the columns each would add to the torque."""
 
+import functools
+from collections import defaultdict
 from dataclasses import dataclass, replace
 from itertools import combinations, product
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.effect import Parameter
+from ...models.effect import Effect, Parameter
 from ...models.effects import effects
 from ...models.model import Model, PlacedEffect, all_places
 from ..fitting.assembly import TorqueEvaluation, TorqueModel
@@ -74,6 +77,8 @@ def library(model: Model) -> list[PlacedEffect]:
     for effect in effects().values():
         if effect.at == "link" and model.inertia == "free":
             continue  # the identified inertia already holds whatever a link effect could add
+        if model.inertia == "free" and len(model.joints) == 1 and _scales(effect):
+            continue  # a factor on the one torque is a factor on all that is identified
         spots = all_places(effect, model.tree)
         if effect.name == "sensor_delay":
             # A torque channel is late or, where the encoder is late, early: one of the two.
@@ -82,6 +87,19 @@ def library(model: Model) -> list[PlacedEffect]:
             spots = tuple(at for at in other if f"{effect.name}.{other[at]}" not in have)
         found += [PlacedEffect(effect, at) for at in spots if f"{effect.name}.{at}" not in have]
     return found
+
+
+@functools.cache
+def _scales(effect: Effect) -> bool:
+    """Does a sensor multiply its reading by a factor, and no more?"""
+    if effect.at != "sensor" or effect.states:
+        return False
+    signals = defaultdict(lambda: ca.SX.sym("another"), {"value": ca.SX.sym("value")})
+    law = effect.law(signals, {p.name: ca.SX(p.zero + 0.1) for p in effect.parameters})
+    if len(signals) > 1:
+        return False
+    read = ca.Function("read", [signals["value"]], [law])
+    return float(read(0)) == 0 and abs(float(read(3)) - 3 * float(read(1))) < 1e-12
 
 
 def _makkar() -> tuple[str, ...]:

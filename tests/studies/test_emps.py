@@ -8,6 +8,7 @@ from made_studies import made_study
 
 import snarelab.studies
 from snarelab.cli import main
+from snarelab.models.model_file import load_model
 from snarelab.studies import emps as study
 
 pytestmark = pytest.mark.slow
@@ -58,12 +59,18 @@ def test_names_what_is_missing_in_order(folder):
     assert found["verdict"] == "missing_physics"
     names = [(e["name"], e["at"].removeprefix("q.").removeprefix("tau.")) for e in found["effects"]]
     # No law beside another that holds it.
-    assert names == [("coulomb_friction", "slide"), ("asymmetric_friction", "slide"), ("sensor_delay", "slide")]
-    assert found["effects"][0]["parameters"]["level"]["value"] == pytest.approx(20.4, abs=3.0)
+    assert names[:3] == [("coulomb_friction", "slide"), ("asymmetric_friction", "slide"), ("sensor_delay", "slide")]
+    assert {name for name, _ in names[3:]} <= {"position_dependent_friction"}
+    assert found["effects"][0]["parameters"]["level"]["value"] == pytest.approx(20.4, abs=1.0)
+    # The table beside them does not change what was confirmed, in the saved model neither.
+    saved = load_model(folder / "model.toml").values
     for e in found["effects"]:
-        # Names that cannot be told apart share a probability; the one that is told has the most of it.
+        for name, p in e["parameters"].items():
+            assert saved[f"{e['name']}.{e['at']}.{name}"] == pytest.approx(p["value"], rel=1e-5)
+    for e in found["effects"]:
+        # Names that cannot be told apart share a probability, a nameless curve has some; the one told has the most.
         alike = [r["probability"] for r in e["rivals"] if not r["separable"]]
-        assert e["probability"] + sum(alike) > 0.8
+        assert e["probability"] + sum(alike) > 0.75
         assert e["probability"] > max(alike, default=0.0)
 
 
@@ -71,7 +78,7 @@ def test_ends_well_below_the_published_cross_test_error(folder):
     found = json.loads((folder / "diagnosis.json").read_text())
     errors = [s["holdout"] for s in found["steps"]]
     assert errors[0] > 0.17
-    assert errors[-1] <= 0.037
+    assert errors[-1] <= 0.032
     holdout = found["fit"]["tau.slide"]["holdout"]
     assert holdout["relative_after"] == pytest.approx(errors[-1])
     assert sum(p["share"] for p in found["location"]) <= 1 + 1e-9

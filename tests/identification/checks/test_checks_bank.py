@@ -96,7 +96,8 @@ def test_a_mend_gives_the_verdict_of_the_sound_recording(tmp_path, mistake):
         verdict, names = diagnosed(folder, made, mended(MODEL, found), kept, held)
         sound_verdict, sound_names = diagnosed(folder, made, lines + MODEL, as_it_should_be, sound_held[:1])
         assert verdict != "data_fault"
-        if verdict != sound_verdict:
+        # A load that is turned is missing physics in either: the same is to be named.
+        if (verdict, names if sound_names else set()) != (sound_verdict, sound_names):
             missed.append((seed, names, sound_names))
         tried += 1
         if tried == ARMS or len(missed) > 1:

@@ -118,19 +118,26 @@ def test_several_masses_have_slopes_of_all_of_them_and_of_each_alone():
     assert found == [[*row, f] for f in (1.0, 2.0) for row in wanted]
 
 
-def arm(*given, inertia="fixed") -> Any:
-    """Two joints, and effects as (name, place, held parameters ...)."""
-    joints = tuple(Joint(f"joint{k + 1}", "revolute", AXIS, k - 1, TURNS, AXIS) for k in range(2))
-    links = tuple(Link(f"link{k + 1}", np.arange(1.0, 11.0)) for k in range(2))
+def arm(*given, inertia="fixed", n=2) -> Any:
+    """Some joints, and effects as (name, place, held parameters ...)."""
+    joints = tuple(Joint(f"joint{k + 1}", "revolute", AXIS, k - 1, TURNS, AXIS) for k in range(n))
+    links = tuple(Link(f"link{k + 1}", np.arange(1.0, 11.0)) for k in range(n))
     tree = Tree("arm", joints, links, np.zeros(3))
     placed = tuple(PlacedEffect(get_effect(name), at, tuple(hold)) for name, at, *hold in given)
-    return Made(effects=placed, joints=("joint1", "joint2"), tree=tree, inertia=inertia)
+    return Made(effects=placed, joints=tuple(j.name for j in joints), tree=tree, inertia=inertia)
 
 
 def keys(model):
     found = [p.key for p in library(model)]
     assert len(found) == len(set(found))
     return set(found)
+
+
+def test_a_factor_on_the_one_torque_is_none_where_the_inertia_is_identified():
+    """It scales the mass and every friction alike; of two joints' torques one is measured against the other."""
+    gain, whole = "sensor_gain.tau.joint1", keys(arm(n=1))
+    assert whole - keys(arm(n=1, inertia="free")) == {gain, *(k for k in whole if k.endswith("link1"))}
+    assert gain in keys(arm(inertia="free"))
 
 
 def test_every_effect_is_tried_at_every_place_that_has_it_not():
