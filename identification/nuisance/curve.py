@@ -99,10 +99,14 @@ def _rates(x: Array, segments: Sequence[slice], step: float) -> Array:
 
 @dataclass(frozen=True)
 class NuisanceCurve:
-    """One curve of the family: its coordinates in words, and its columns (n, k) along a recording."""
+    """One curve of the family: its coordinates in words, and its columns (n, k) along a recording.
+
+    ``missing``: what it explains is physics that the model leaves out; else it is the drive's, which no model has.
+    """
 
     words: str
     columns: Callable[[Coordinates], Array]
+    missing: bool = True
 
 
 def basis(x: Array, low: float, high: float, length: float, order: int) -> Array:
@@ -162,13 +166,14 @@ def family(joint: int, names: Sequence[str], training: Sequence[Coordinates], al
         reach.curve("load by speed", load, 0.25, 6, speed),
         reach.curve("load when driving", load, 0.25, 8, lambda x: x.direction * x.driving),
         reach.curve("load when braking", load, 0.25, 8, lambda x: x.direction * (1 - x.driving)),
-        # What lies between the measured torque and the link answers late, and rings: its frequency response, expanded
-        # in powers of the frequency, adds these to the load (a delay: the first; a mode above the band: the second).
-        NuisanceCurve("rate of load", lambda x: x.rates),
         reach.curve("time by direction", lambda x: x.time, 0.25, 6, forth),
         reach.curve("time by speed", lambda x: x.time, 0.25, 6, speed),
         reach.curve("distance travelled by direction", lambda x: x.path, 0.25, 6, forth),
     ]
+    if not alone:
+        # What lies between the measured torque and the link answers late, and rings: its frequency response, expanded
+        # in powers of the frequency, adds these to the load (a delay: the first; a mode above the band: the second).
+        own.append(NuisanceCurve("rate of load", lambda x: x.rates, missing=False))
     others = sorted((o for o in range(len(names)) if o != joint), key=lambda o: abs(o - joint))[:NEIGHBOURS]
     for o in others if not alone else ():
         if not reach.moves(q(o)):

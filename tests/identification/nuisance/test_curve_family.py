@@ -137,7 +137,7 @@ def test_a_drive_that_rings_is_a_curve_over_the_rates_of_its_load():
     made = exact(("joint1",), 0.005, 5, (t, q, qd, load, load))
     signals = Coordinates.along(made, load[:, 0], 0, float(np.abs(qd).max()), float(np.ptp(q)))
     left = {}
-    for curve in family(0, ("joint1",), [signals], True):
+    for curve in family(0, ("joint1",), [signals], False):
         x, inside = curve.columns(signals), slice(20, -20)
         beside = np.hstack([x, qd, load])[inside]  # a mass and viscous friction are free beside it
         r = (measured - load[:, 0])[inside]
