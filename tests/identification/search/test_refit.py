@@ -1,6 +1,7 @@
 """A fit with more, or with less, starts from everywhere only where it ended in a bad optimum."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,7 +29,8 @@ def fits(monkeypatch):
     return made
 
 
-CASE = SimpleNamespace(assembly=SimpleNamespace(keep=lambda *_: None, placed=()), theta=np.ones(2))
+NONE: Any = None
+CASE: Any = SimpleNamespace(assembly=SimpleNamespace(keep=lambda *_: None, placed=()), theta=np.ones(2))
 
 
 @pytest.mark.parametrize(
@@ -45,15 +47,14 @@ CASE = SimpleNamespace(assembly=SimpleNamespace(keep=lambda *_: None, placed=())
 def test_a_bad_optimum_is_known_by_all_channels_together(fits, left, started):
     """The likelihood of channels whose noise is estimated is the product of what they leave."""
     seen = fits(*left)
-    refit.refitted(CASE, None, [], False, 0)
+    refit.refitted(CASE, NONE, [], False, 0)
     assert seen == started
     seen = fits(*left)
-    case = SimpleNamespace(**vars(CASE))
-    refit.without(SimpleNamespace(**vars(CASE)), ["one"], [], case)
+    refit.without(CASE, ["one"], [], CASE)
     assert seen == started
 
 
 def test_what_rings_starts_from_everywhere_at_once(fits):
     seen = fits(1.0, 1.0)
-    refit.refitted(CASE, None, [], True, 0)
+    refit.refitted(CASE, NONE, [], True, 0)
     assert seen == [True]
