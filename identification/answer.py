@@ -96,11 +96,6 @@ def report_on(
         for c, b in left.bursts.items()
         if not b.again
     ]
-    notes += [
-        f"the drive's response explains {percent(r.explained)} of the residual of {channels[r.channel]} "
-        f"({size(r.channel, r.explained)} of the channel's torque)"
-        for r in left.responses
-    ]
     notes += [f"noise of {c}: {words}" for c, words in noise.items()] + _excitation(train)
     candidates = tuple(
         Candidate(t.placed.effect.name, t.placed.at, t.explained, t.odds, t.placed.key in named)

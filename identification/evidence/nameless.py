@@ -22,11 +22,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class NamelessParts:
-    """Nameless curves, bursts by channel, and what the drives' responses explain, which is no missing physics."""
+    """Nameless curves, and bursts by channel."""
 
     curves: tuple[Remainder, ...]
     bursts: Mapping[int, Bursts]
-    responses: tuple[Remainder, ...] = ()
 
 
 def remainders(found: ArmSelection, train: Sequence[Experiment], held: Sequence[Experiment]) -> tuple[Remainder, ...]:
@@ -94,12 +93,7 @@ def left_over(
             weighed, range(n), barred, {c for x in best.rejected for c in x.channels}
         )
         best = replace(best, found=replace(own, weighed=weighed, search=made, slots=tuple(slots), tolerance=tolerance))
-    found = best.found
-    curves = [x.items[0].label[1] for x in found.weighed.pool if not x.named]
-    drives = {c.words for c in curves if not c.missing}
-    told = remainders(found, train, held)
-    missing, responses = (tuple(r for r in told if (r.over in drives) == k) for k in (False, True))
-    return NamelessParts(missing, _bursts(found, train), responses)
+    return NamelessParts(remainders(best.found, train, held), _bursts(best.found, train))
 
 
 def _bursts(found: ArmSelection, train: Sequence[Experiment]) -> dict[int, Bursts]:

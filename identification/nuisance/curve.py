@@ -26,9 +26,6 @@ TURNING = 0.006
 SHORTEST = 1e-3
 """Share of the travel from which on the distance since a reversal is told apart, on a logarithmic scale."""
 
-ORDERS = 4
-"""Derivatives of the load by time that a drive's response is expanded in: a delay and a mode need two each."""
-
 NEIGHBOURS = 3
 """Other joints, the nearest first, whose coordinates a curve may run over."""
 
@@ -46,8 +43,6 @@ class Coordinates:
     path: Array
     driving: Array
     turned: Array
-    rates: Array
-    """Derivatives of the load by time (n, `ORDERS`), in units of the analysis band [N·m or N]."""
 
     @staticmethod
     def of(experiment: Experiment, state: TorqueEvaluation, joint: int, peak: float, travel: float) -> "Coordinates":
@@ -69,7 +64,6 @@ class Coordinates:
             np.concatenate([np.cumsum(np.abs(speed[s])) * m.period for s in m.segments]),
             0.5 * (1 + np.tanh(3 * power / max(float(np.std(power)), 1e-300))),
             np.log10(1 + _since_turning(speed, m.segments, m.period) / max(SHORTEST * travel, 1e-300)),
-            _rates(load, m.segments, 2 * np.pi * m.band * m.period),
         )
 
 
@@ -86,27 +80,12 @@ def _since_turning(speed: Array, segments: Sequence[slice], period: float) -> Ar
     return found
 
 
-def _rates(x: Array, segments: Sequence[slice], step: float) -> Array:
-    """Derivatives by time (n, `ORDERS`) of a signal; ``step``: of the samples, in the unit of time."""
-    found = np.zeros((len(x), ORDERS))
-    for s in segments:
-        own = x[s]
-        for k in range(ORDERS if len(own) > 2 else 0):
-            own = np.gradient(own, step)
-            found[s, k] = own
-    return found
-
-
 @dataclass(frozen=True)
 class NuisanceCurve:
-    """One curve of the family: its coordinates in words, and its columns (n, k) along a recording.
-
-    ``missing``: what it explains is physics that the model leaves out; else it is the drive's, which no model has.
-    """
+    """One curve of the family: its coordinates in words, and its columns (n, k) along a recording."""
 
     words: str
     columns: Callable[[Coordinates], Array]
-    missing: bool = True
 
 
 def basis(x: Array, low: float, high: float, length: float, order: int) -> Array:
@@ -170,10 +149,6 @@ def family(joint: int, names: Sequence[str], training: Sequence[Coordinates], al
         reach.curve("time by speed", lambda x: x.time, 0.25, 6, speed),
         reach.curve("distance travelled by direction", lambda x: x.path, 0.25, 6, forth),
     ]
-    if not alone:
-        # What lies between the measured torque and the link answers late, and rings: its frequency response, expanded
-        # in powers of the frequency, adds these to the load (a delay: the first; a mode above the band: the second).
-        own.append(NuisanceCurve("rate of load", lambda x: x.rates, missing=False))
     others = sorted((o for o in range(len(names)) if o != joint), key=lambda o: abs(o - joint))[:NEIGHBOURS]
     for o in others if not alone else ():
         if not reach.moves(q(o)):

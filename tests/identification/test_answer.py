@@ -36,18 +36,16 @@ def curve(channel, over, explained) -> Remainder:
     return Remainder(channel, over, 20.0, explained, 3.0)
 
 
-def decided(*, names=(), rest=(), bursting=(), drives=(), rejected=(), missed=None, **found) -> ArmDecision:
+def decided(*, names=(), rest=(), bursting=(), rejected=(), missed=None, **found) -> ArmDecision:
     best: Any = SimpleNamespace(names=tuple(names), missed=missed or {}, found=SimpleNamespace(**found))
-    return ArmDecision(best, NamelessParts(tuple(rest), dict(bursting), tuple(drives)), tuple(rejected))
+    return ArmDecision(best, NamelessParts(tuple(rest), dict(bursting)), tuple(rejected))
 
 
 @pytest.fixture
 def reported(monkeypatch):
     """The report on what was decided; ``relative`` is what is left of each channel's torque."""
 
-    def report(
-        *, names=(), rest=(), bursting=(), drives=(), rejected=(), trials=(), relative: Any = 0.1, train=None, held=()
-    ):
+    def report(*, names=(), rest=(), bursting=(), rejected=(), trials=(), relative: Any = 0.1, train=None, held=()):
         left = np.broadcast_to(relative, 3)
         both = [(Misfit(9, 9, 9, x), Misfit(9, 9, x, x / 2)) for x in left]
         fits = [ChannelFit(f"tau.{n}", u, *own, 0) for n, u, own in zip(NAMES, ("N*m", "N", "N*m"), both, strict=True)]
@@ -68,7 +66,6 @@ def reported(monkeypatch):
             names=names,
             rest=rest,
             bursting=bursting,
-            drives=drives,
             rejected=rejected,
             trials=trials,
             weighed=weighed,
@@ -243,12 +240,4 @@ def test_limits_are_told_by_parameter_with_its_unit():
         ("sling_tension_error", "joint1", "share", 0.2, "1 of sling_tension_error"),
         ("sling_tension_error", "joint1", "lag_loss", 0.3, "N*s/m of sling_tension_error"),
         ("sensor_bias", "joint1", "offset", 4, "U of sensor_bias"),
-    ]
-
-
-def test_what_a_drives_response_explains_is_a_note_and_no_missing_physics(reported):
-    found = reported(drives=[curve(1, "rate of load", 0.25)])
-    assert found.verdict == "adequate"
-    assert f"the drive's response explains 25 % of the residual of tau.{NAMES[1]} (5.0 % of the channel's torque)" in [
-        n.replace("\u202f", " ").replace("\xa0", " ") for n in found.notes
     ]

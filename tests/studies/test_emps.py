@@ -64,8 +64,7 @@ def test_names_what_is_missing_in_order(folder):
     assert found["verdict"] == "missing_physics"
     names = [(e["name"], e["at"].removeprefix("q.").removeprefix("tau.")) for e in found["effects"]]
     # No law beside another that holds it.
-    assert names[:3] == [("coulomb_friction", "slide"), ("asymmetric_friction", "slide"), ("sensor_delay", "slide")]
-    assert {name for name, _ in names[3:]} <= {"position_dependent_friction"}
+    assert names == [("coulomb_friction", "slide"), ("asymmetric_friction", "slide"), ("sensor_delay", "slide")]
     assert found["effects"][0]["parameters"]["level"]["value"] == pytest.approx(20.4, abs=1.0)
     # The table beside them does not change what was confirmed, in the saved model neither.
     saved = load_model(folder / "model.toml").values
@@ -73,9 +72,9 @@ def test_names_what_is_missing_in_order(folder):
         for name, p in e["parameters"].items():
             assert saved[f"{e['name']}.{e['at']}.{name}"] == pytest.approx(p["value"], rel=1e-5)
     for e in found["effects"]:
-        # Names that cannot be told apart share a probability, a nameless curve has some; the one told has the most.
+        # Names that cannot be told apart share a probability; the one that is told has the most of it.
         alike = [r["probability"] for r in e["rivals"] if not r["separable"]]
-        assert e["probability"] + sum(alike) > 0.75
+        assert e["probability"] + sum(alike) > 0.8
         assert e["probability"] > max(alike, default=0.0)
 
 
@@ -83,7 +82,7 @@ def test_ends_well_below_the_published_cross_test_error(folder):
     found = json.loads((folder / "diagnosis.json").read_text())
     errors = [s["holdout"] for s in found["steps"]]
     assert errors[0] > 0.17
-    assert errors[-1] <= 0.032
+    assert errors[-1] <= 0.034
     holdout = found["fit"]["tau.slide"]["holdout"]
     assert holdout["relative_after"] == pytest.approx(errors[-1])
     assert sum(p["share"] for p in found["location"]) <= 1 + 1e-9

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from moving_arm import build, exact, motion, placed, three_joints
+from moving_arm import build, motion, placed, three_joints
 
 from snarelab.identification.fitting.experiment import Experiment
 from snarelab.identification.nuisance.curve import BEYOND, SMALL, Coordinates, basis, family
@@ -107,42 +107,3 @@ def test_distance_travelled_never_falls_and_is_the_integral_of_speed(arm):
     e, x = arm[0][1], arm[2][1]
     assert np.all(np.diff(x.path) >= 0)
     assert x.path[-1] == pytest.approx(np.trapezoid(np.abs(e.motion.qd[:, 1]), e.motion.time), rel=0.01)
-
-
-def test_rates_of_the_load_are_its_derivatives_and_end_at_a_gap():
-    """Of a sine: (w / w_band)^k, each a quarter of a period before the last; a run's first samples see no other run."""
-    t = np.arange(0.0, 12.0, 0.005)
-    one = np.zeros((len(t), 1))
-    runs = (slice(0, 1200), slice(1300, 2400))
-    made = exact(("joint1",), 0.005, 5, (t, one, one + 1, one, one), runs)
-    w, w_band = 2 * np.pi * 1.3, 2 * np.pi * made.band
-    rates = Coordinates.along(made, np.sin(w * t), 0, 1.0, 1.0).rates
-    for run in runs:
-        inside = slice(run.start + 8, run.stop - 8)
-        for k, own in enumerate(rates[inside].T, 1):
-            wanted = (w / w_band) ** k * np.sin(w * t[inside] + k * np.pi / 2)
-            np.testing.assert_allclose(own, wanted, atol=0.01 * (w / w_band) ** k)
-    np.testing.assert_array_equal(rates[1200:1300], 0.0)
-
-
-def test_a_drive_that_rings_is_a_curve_over_the_rates_of_its_load():
-    """The torque that is measured is that of the motor; the link gets it through a mode of 9 Hz, in a band of 20 Hz. No
-    other coordinate's curve says what that adds."""
-    t, rng = np.arange(0.0, 20.0, 0.005), np.random.default_rng(0)
-    w = 2 * np.pi * np.array([0.13, 0.41, 0.93, 1.9, 3.1])
-    turn = np.array([1.0, 0.5, 0.25, 0.12, 0.08]) / w * np.exp(1j * (w * t[:, None] + rng.uniform(0, 2 * np.pi, 5)))
-    q, qd, load = (x.imag.sum(axis=1)[:, None] for x in (turn, turn * 1j * w, -turn * w**2))
-    mode = 2 * np.pi * 9.0
-    measured = (-turn * w**2 * (1 + 0.3j * w / mode - (w / mode) ** 2)).imag.sum(axis=1)
-    made = exact(("joint1",), 0.005, 5, (t, q, qd, load, load))
-    signals = Coordinates.along(made, load[:, 0], 0, float(np.abs(qd).max()), float(np.ptp(q)))
-    left = {}
-    for curve in family(0, ("joint1",), [signals], False):
-        x, inside = curve.columns(signals), slice(20, -20)
-        beside = np.hstack([x, qd, load])[inside]  # a mass and viscous friction are free beside it
-        r = (measured - load[:, 0])[inside]
-        known = np.hstack([qd, load])[inside]
-        best, alone = (a @ np.linalg.lstsq(a, r, rcond=None)[0] - r for a in (beside, known))
-        left[curve.words] = float(np.linalg.norm(best) / np.linalg.norm(alone))
-    assert left.pop("rate of load") < 0.02
-    assert min(left.values()) > 0.5
