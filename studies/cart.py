@@ -68,7 +68,7 @@ def sections(answer: Answer) -> list[Section]:
                 alike(answer),
                 "The drive is a relay: it reverses its force at the same distance from where a run starts. So would a "
                 "force that repeats with position: beside it a free mass can be anything. The diagnosis therefore "
-                "takes the makers' mass. A wrong mass and a wrong constant of the motor, a gain of its channel, are one. "
+                "takes the makers' mass. A wrong mass and a wrong motor constant, a gain of its channel, are one. "
                 "Identified beside viscous friction alone, the mass is as good as the constant that the makers give.",
             ],
         ),
