@@ -1,6 +1,6 @@
 """A cart on a belt whose makers name friction by direction and place: do the recordings say so?
 
-Four runs of one test are fitted, one of another is held out. Recordings: N. Skov, masterThesisMatlab (commit
+Four runs of one test are fitted, those of another held out. Recordings: N. Skov, masterThesisMatlab (commit
 0e2c7253), looked for in ``$SNARELAB_RECORDINGS``, beside the project, and at their publisher.
 """
 
@@ -22,8 +22,7 @@ from .page import Section
 HERE = Path(__file__).parent
 MODEL = HERE / "cart" / "cart.toml"
 RUNS = tuple(f"0m{k}5.csv" for k in (0, 1, 3, 6))
-"""Their starts are no multiple of one step apart: a force that repeats with position is not in step with them."""
-HELD = "cartTest3/0m25.csv"
+"""Their starts are 0.1, 0.2 and 0.3 m apart; all files start a multiple of 0.1 m apart."""
 MASS = 6.28
 """[kg] The makers'."""
 
