@@ -1,0 +1,185 @@
+"""Recordings of a servo as a source: its position, simulated in closed loop, with derivatives by finite differences.
+
+No set-up's number has a stated tolerance, so there are no shifts: the motor's numbers are parameters like a law's.
+"""
+
+from collections.abc import Mapping, Sequence
+from itertools import product
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...models.effect import Effect, Parameter, written_unit
+from ...models.model import PlacedEffect
+from ..deciding import BLOCK, LEAST_LEVEL, SETTLES, STICKS
+from ..evidence.confirm import FEWEST_BLOCKS
+from ..evidence.hypotheses import parts_of
+from ..fitting.experiment import Scales
+from ..nuisance.noise import NoiseChannel
+from ..sources.fit import differences
+from ..sources.source import GridPoint, Linearisation, ModelPoint
+from .closed_loop import DRIVE, GRAVITY, LEAST, ROTOR, ServoRun, laws, simulate
+
+Array = NDArray[np.float64]
+
+EVERY = 0.02
+"""[s] Windows over which positions are averaged."""
+SHARE = 0.1
+"""A usual size of a parameter is what changes the torque by so much [share of the load's RMS]: so much friction more
+moves where the servo stops by more than single instants of sticking."""
+
+
+class Servos:
+    """Recordings of a servo, the training recordings first; ``joint`` is what its place is called."""
+
+    n_shifts, anew, bent, steps = 0, False, False, 8
+
+    def __init__(self, joint: str, train: Sequence[ServoRun], held: Sequence[ServoRun] = ()) -> None:
+        """Simulate nothing yet."""
+        if not train:
+            raise InputError("recordings: none is given; give one or more")
+        self.joint, self.runs = joint, (*train, *held)
+        self.train, self.held = range(len(train)), range(len(train), len(self.runs))
+        self.channels = (f"q.{joint}",)
+        self._measured = [_means(r, r.position)[:, None] for r in self.runs]
+        self._known: dict[tuple[int, tuple[tuple[str, float], ...]], Array | None] = {}
+        own = [self.runs[i] for i in self.train]
+        self._q, self._qd = (np.concatenate(x) for x in ([r.position for r in own], [_speed(r) for r in own]))
+        self._load = np.concatenate([r.mass * GRAVITY * r.length * np.sin(r.position) for r in own])
+        self._volts = np.concatenate([np.clip(r.gain * (r.goal - r.position), -1, 1) * r.volts * r.on for r in own])
+        travel = max(float(np.ptp(r.position)) for r in own)
+        self._scales = Scales(*(max(x, LEAST) for x in (float(np.abs(self._qd).max()), travel,
+                                                        float(np.abs(self._load).max()))))  # fmt: skip
+
+    def measured(self, i: int) -> Array:
+        return self._measured[i]
+
+    def predicted(self, i: int, at: ModelPoint) -> Array | None:
+        return self._seen(i, at.all_values)
+
+    def _seen(self, i: int, values: Mapping[str, float]) -> Array | None:
+        """Positions of a simulation (n, 1), each worked out once."""
+        key = i, tuple(sorted(values.items()))
+        if key not in self._known:
+            q = simulate(self.runs[i], {k.replace(f".{self.joint}.", "."): x for k, x in values.items()})
+            self._known[key] = _means(self.runs[i], q)[:, None] if np.all(np.isfinite(q)) else None
+        return self._known[key]
+
+    def refused(self, i: int) -> InputError:
+        return InputError(f"{self.runs[i].name}: the servo cannot be simulated; check its gain, mass and length")
+
+    def slopes(self, i: int, at: ModelPoint, here: Array) -> Array:
+        return differences(self, i, at, here)
+
+    def shift_slopes(self, i: int, at: ModelPoint, here: Array) -> Array:
+        return np.zeros((*here.shape, 0))
+
+    def settled(self, at: ModelPoint, numbers: Sequence[int]) -> ModelPoint:
+        return at
+
+    def scale(self) -> Array:
+        """RMS about the mean: where zero is says nothing of the motion."""
+        return np.maximum(np.std(np.concatenate([self._measured[i] for i in self.train]), axis=0), LEAST)
+
+    def bounds(self, p: PlacedEffect, x: Parameter) -> tuple[float, float]:
+        scale = self._scales.of(x.relative_to)
+        return x.low * scale, x.high * scale
+
+    def size(self, p: PlacedEffect, x: Parameter) -> float:
+        """As much as changes the torque by `SHARE` of the load, along the recorded motion."""
+        if x.grid:
+            return min(abs(g) for g in x.grid) * self._scales.of(x.relative_to)
+        return SHARE * _rms(self._load) / max(self._torque(p.effect, x), LEAST)
+
+    def _torque(self, effect: Effect, x: Parameter) -> float:
+        """RMS torque for a unit of an amplitude."""
+        r = self.runs[0]
+        if effect == ROTOR:
+            return _rms(self._load) / (r.mass * r.length**2)
+        if x.name == "zero":
+            return r.mass * GRAVITY * r.length
+        if effect == DRIVE:
+            torque_per_volt = _rms(self._load) / _rms(self._volts)
+            return _rms(self._volts) if x.name == "torque_per_volt" else torque_per_volt * _rms(self._qd)
+        rows = {"q": self._q, "qd": self._qd, "load": self._load, "speed_scale": np.full_like(self._q, LEAST)}
+        own = {y.name: float(y is x) if not y.grid else y.zero * self._scales.of(y.relative_to)
+               for y in effect.parameters}  # fmt: skip
+        return _rms(np.array(effect.law({k: ca.DM(v) for k, v in rows.items()}, own)))
+
+    def unit(self, p: PlacedEffect, x: Parameter) -> str:
+        return written_unit(x.unit)
+
+    def library(self, placed: Sequence[PlacedEffect]) -> list[PlacedEffect]:
+        """A whole law is another way to write the sum of its parts, and no candidate beside one."""
+        have = {p.key for p in placed}
+        every = [PlacedEffect(e, self.joint) for e in laws()]
+        return [p for p in every if p.key not in have and not have & parts_of(p)]
+
+    def variants(self, p: PlacedEffect) -> list[GridPoint]:
+        """A parameter without a grid is an amplitude."""
+        shapes = [x for x in p.effect.parameters if x.grid]
+        amplitudes = tuple(f"{p.key}.{x.name}" for x in p.effect.parameters if not x.grid)
+        axes = [[g * self._scales.of(x.relative_to) for g in x.grid] for x in shapes]
+        return [
+            GridPoint(p, {f"{p.key}.{x.name}": v for x, v in zip(shapes, point, strict=True)}, amplitudes)
+            for point in product(*axes)
+        ]
+
+    def columns(self, i: int, at: ModelPoint, many: Sequence[GridPoint]) -> list[Array]:
+        return [self._column(i, at, v) for v in many]
+
+    def _column(self, i: int, at: ModelPoint, v: GridPoint) -> Array:
+        """Change of the simulation for each amplitude, from zero."""
+        none, own = self.predicted(i, at), []
+        assert none is not None
+        for x in (x for x in v.placed.effect.parameters if not x.grid):
+            step = self.size(v.placed, x)
+            others = dict.fromkeys(v.amplitudes, 0.0) | {f"{v.placed.key}.{x.name}": step}
+            seen = self._seen(i, {**at.all_values, **v.values, **others})
+            own.append((np.full_like(none, np.nan) if seen is None else seen - none) / step)
+        return np.stack(own, axis=2)
+
+    def curves(self, numbers: Sequence[int]) -> Mapping[tuple[int, str], list[Array]]:
+        return {}
+
+    def noise_channels(
+        self, numbers: Sequence[int], linear: Linearisation, could: Sequence[Sequence[Array]]
+    ) -> list[list[NoiseChannel]]:
+        """Where the servo stands, friction holds it anywhere about its goal: what nothing explains there, in the RMS,
+        and `LEAST_LEVEL` of the channel at least."""
+        speeds = [np.abs(np.gradient(self._measured[i][:, 0], EVERY)) / self._scales.speed for i in numbers]
+        rest = [x < STICKS[0][0] for x in speeds]
+        left = np.concatenate([r[k, 0] for r, k in zip(linear.residuals, rest, strict=True)])
+        beside = np.concatenate([x[k] for x, k in zip(could[0], rest, strict=True)])
+        level = LEAST_LEVEL * float(self.scale()[0])
+        if len(left) > 2 * beside.shape[1]:
+            left = left - beside @ np.linalg.lstsq(beside, left, rcond=1e-6)[0]
+            level = max(level, float(np.sqrt(left @ left / (len(left) - beside.shape[1]))))
+        return [
+            [NoiseChannel(EVERY, (slice(0, len(x)),), np.zeros(len(x)),
+                          tuple((x < width).astype(float) for width, _ in STICKS),
+                          (x < SETTLES[0]).astype(float), level)]
+            for x in speeds
+        ]  # fmt: skip
+
+    def blocks(self, i: int, x: Array) -> Array:
+        return np.array([b.sum() for b in np.array_split(x, max(int(len(x) * EVERY / BLOCK), FEWEST_BLOCKS))])
+
+
+def _means(run: ServoRun, x: Array) -> Array:
+    """Mean over each whole window (n,)."""
+    number = ((run.time - run.time[0]) / EVERY).astype(int)
+    n = number[-1]
+    return np.bincount(number, x)[:n] / np.bincount(number)[:n]
+
+
+def _speed(run: ServoRun) -> Array:
+    """Speed at the samples, of the windows' means [rad/s]."""
+    q = _means(run, run.position)
+    return np.interp(run.time - run.time[0], EVERY * (np.arange(len(q)) + 0.5), np.gradient(q, EVERY))
+
+
+def _rms(x: Array) -> float:
+    return float(np.sqrt(np.mean(x**2)))
