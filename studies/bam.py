@@ -1,14 +1,13 @@
 """A position servo with a pendulum (BAM, XL330): what Coulomb and viscous friction leave out, from its positions alone.
 
-Twelve recordings at controller gains of 100, 200 and 800 are fitted; the four at gain 400 are locked away, and the
+Twelve recordings at controller gains of 100, 200 and 800 are fitted; the four at gain 400 are held out, and the
 position is predicted there in closed loop. Recordings: Duclusaud et al. (2025), looked for in ``$SNARELAB_RECORDINGS``,
 beside the project, and at their publisher.
 """
 
 import sys
 import time
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,35 +15,44 @@ import numpy as np
 
 from ..errors import InputError
 from ..exit_status import status_of
-from ..models.effect import written_unit
-from ..models.effects import effects
-from ..models.model import PlacedEffect
+from ..identification.diagnosis import Estimate, Finding
+from ..identification.servo.source import Servos, start
+from ..identification.sources.answer import estimates, finding, with_found
+from ..identification.sources.decide import Decision, decide
+from ..identification.sources.own import settled
+from ..identification.sources.source import ModelPoint
+from ..identification.sources.stages import stages
+from ..identification.sources.weigh import covariances
 from ..models.model_file import load_model
 from ..models.model_write import save_model
-from ..recordings import find_recording
-from ..recordings.find import SHA256
+from ..models.servo_loop import DRIVE
 from ..report.words import percent
 from .bam_figures import explained, positions
-from .bam_naming import START, LawTrial, Round, ServoFit, Values, fit, name_missing, rms
-from .bam_servo import DUTY, MOTOR, ServoRun, position_error, read_run
-from .outcome import FOLDER, Quantity, table, write_result
+from .bam_recordings import BamRun, duty_error, position_error, read_all
+from .outcome import FOLDER, Quantity, interval, table, write_result
 from .page import Picture, Section, write_page
 
-HERE = Path(__file__).parent
-HELD_OUT = 400.0
-"""Controller gain whose recordings are held out, as in the publication."""
+MODEL = Path(__file__).parent / "bam" / "servo.toml"
+JOINT = "servo"
 
-PROVED = 0.05
-"""A step is confirmed if without it the held-out recordings' squared error is so much higher."""
+START = {
+    "servo_drive.torque_per_volt": 0.08,
+    "servo_drive.back_emf": 0.36,
+    "servo_drive.zero": 0.02,
+    "rotor_inertia.inertia": 1.5e-3,
+    "viscous_friction.coefficient": 0.01,
+    "coulomb_friction.level": 0.01,
+}
+"""Where the fit of Coulomb and viscous friction and of the motor starts."""
 
 CHECK = {"coulomb_and_viscous": 0.0623, "load_dependent_friction": 0.0476, "stribeck_friction": 0.0425}
 """[rad] Held-out error of an independent check; each line has what stands above it."""
 
 PUBLISHED = {
-    "torque_per_volt": 0.32321138819018436 / 4.7636501514851926,
-    "back_emf": 0.32321138819018436,
-    "rotor_inertia": 0.001643216859746982,
-    "zero": 0.01795252374733891,
+    "servo_drive.torque_per_volt": 0.32321138819018436 / 4.7636501514851926,
+    "servo_drive.back_emf": 0.32321138819018436,
+    "servo_drive.zero": 0.01795252374733891,
+    "rotor_inertia.inertia": 0.001643216859746982,
     "coulomb_friction.level": 0.0069659724474934286,
     "viscous_friction.coefficient": 0.010494765451601431,
 }
@@ -58,170 +66,149 @@ def main() -> int:
     """Run the study; leaves report, numbers and a model file in ``build/studies/bam``."""
     begun = time.monotonic()
     try:
-        runs = [read_run(find_recording(name)) for name in sorted(SHA256) if name.endswith(".json")]
+        train, held = read_all()
     except InputError as error:
         print(f"The servo's recordings cannot be had: {error}", file=sys.stderr)
         return 2
-    train, held = ([r for r in runs if (r.gain == HELD_OUT) == locked] for locked in (False, True))
-    print("  Coulomb and viscous friction", flush=True)
-    base = fit(train, START)
-    rounds: list[Round] = []
-    named: list[LawTrial] = []
-    final, refused = base, None
-    for r in name_missing(train, base, lambda text: print(f"  {text}", flush=True)):
-        rounds.append(r)
-        if r.named and not confirmed(final, r.named.fit, held):
-            refused = r.named
-            break
-        if r.named:
-            named.append(r.named)
-            final = r.named.fit
-    found = sentence(base, named, held)
-    quantities = numbers(train, held, base, rounds, named)
-    write_page("bam", "XL330 servo with a pendulum", found, quantities, sections(held, base, final, rounds, refused))
-    extra = {"steps": steps(train, held, base, named), "rounds": [as_lines(r) for r in rounds]}
+    source, decided = decided_on(train, held, lambda text: print(f"  {text}", flush=True))
+    lines = steps(source, decided)
+    found = sentence(decided, lines)
+    quantities = numbers(source, decided, lines)
+    write_page("bam", "XL330 servo with a pendulum", found, quantities, sections(held, decided))
+    extra = {"steps": lines, "candidates": candidates(decided), "not_confirmed": [
+        n.placed.effect.name for n in decided.rejected]}  # fmt: skip
     write_result("bam", quantities, time.monotonic() - begun, extra)
-    save(final.values, found)
+    save(decided.best.train.at, found)
     print(f"{table(quantities)}\n\n{found}\nReport: {(FOLDER / 'bam' / 'report.html').resolve()}")
     return 0
 
 
-def confirmed(before: ServoFit, after: ServoFit, held: Sequence[ServoRun]) -> bool:
-    """Whether a step makes the held-out recordings better too: without it, their squared error is 5 % higher."""
-    return rms(held, before.values) ** 2 >= (1 + PROVED) * rms(held, after.values) ** 2
+def decided_on(
+    train: Sequence[BamRun], held: Sequence[BamRun], progress: Callable[[str], None] = lambda _: None
+) -> tuple[Servos, Decision]:
+    """What Coulomb and viscous friction, fitted first, leave out of the recordings."""
+    model, source = load_model(MODEL), Servos(JOINT, train, held)
+    given = settled(source, model, start(JOINT, model.effects, START), progress)
+    return source, decide(source, given, progress)
 
 
-def sentence(base: ServoFit, named: Sequence[LawTrial], held: Sequence[ServoRun]) -> str:
+def values_of(at: ModelPoint) -> dict[str, float]:
+    """Values by ``effect.parameter``, as a simulation takes them."""
+    return {k.replace(f".{JOINT}.", "."): x for k, x in at.all_values.items()}
+
+
+def estimated(source: Servos, decided: Decision) -> dict[str, dict[str, Estimate]]:
+    """Every parameter with its deviation, by the effect's key."""
+    return estimates(source, decided.given, decided.best.train, covariances(decided.found.weighed))
+
+
+def findings(source: Servos, decided: Decision) -> list[Finding]:
+    """The names with their probabilities."""
+    own, found = estimated(source, decided), []
+    for n in decided.best.names:
+        with_, without = (
+            np.concatenate(x.residuals) for x in (decided.best.held, decided.best.missed[n.placed.key].held)
+        )
+        share = max(0.0, 1 - float(np.mean(with_**2) / np.mean(without**2)))
+        found.append(finding(decided, n, own[n.placed.key], n.placed.effect.sentence, share))
+    return found
+
+
+def steps(source: Servos, decided: Decision) -> list[dict[str, Any]]:
+    """Mean absolute position error [rad] after each law, fitted and held out."""
+    train, held = ([source.runs[i] for i in some] for some in (source.train, source.held))
+    return [
+        {"label": label, "train": position_error(train, v), "holdout": position_error(held, v)}
+        for label, own, _ in stages(source, decided, "Coulomb and viscous")
+        for v in [values_of(own.at)]
+    ]
+
+
+def sentence(decided: Decision, lines: Sequence[Mapping[str, Any]]) -> str:
     """The verdict."""
-    before = position_error(held, base.values)
-    if not named:
+    before, after = (lines[k]["holdout"] for k in (0, -1))
+    if not decided.best.names:
         return f"Coulomb and viscous friction are adequate: the held-out position error is {1e3 * before:.1f} mrad."
-    after = position_error(held, named[-1].fit.values)
-    names = " and ".join(t.name.replace("_", " ") for t in named)
+    names = " and ".join(n.placed.effect.name.replace("_", " ") for n in decided.best.names)
     return (
         f"The model leaves out {names}. With that added, the position error at the gain that the fit never saw falls "
         f"from {1e3 * before:.1f} to {1e3 * after:.1f} mrad, by {percent(1 - after / before)}."
     )
 
 
-def numbers(
-    train: Sequence[ServoRun],
-    held: Sequence[ServoRun],
-    base: ServoFit,
-    rounds: Sequence[Round],
-    named: Sequence[LawTrial],
-) -> list[Quantity]:
+def numbers(source: Servos, decided: Decision, lines: Sequence[Mapping[str, Any]]) -> list[Quantity]:
     """Held-out position errors beside the check's, and what was named.
 
-    The rule of naming was settled with all recordings in sight: what follows from it counts as calibrated.
+    The source was built with all recordings in sight: what was named counts as calibrated.
     """
-    final = named[-1].fit if named else base
-    before, after = position_error(held, base.values), position_error(held, final.values)
+    runs = [r for r in source.runs if isinstance(r, BamRun)]
+    names = [n.placed.effect.name for n in decided.best.names]
+    first, last = lines[0], lines[-1]
+    publishers = position_error([source.runs[i] for i in source.held], PUBLISHED)
     quantities = [
-        Quantity("named", "", ", ".join(t.name for t in named) or "nothing", "calibrated"),
-        Quantity("documented", "", ", ".join(t.name for t in named if t.name in DOCUMENTED) or "nothing", "reference"),
-        Quantity("error.publishers_parameters", "rad", position_error(held, PUBLISHED), "reference"),
-        Quantity("error.coulomb_and_viscous", "rad", before, "predicted", CHECK["coulomb_and_viscous"]),
+        Quantity("named", "", ", ".join(names) or "nothing", "calibrated"),
+        Quantity("documented", "", ", ".join(x for x in names if x in DOCUMENTED) or "nothing", "reference"),
+        Quantity("error.publishers_parameters", "rad", publishers, "reference"),
+        Quantity("error.coulomb_and_viscous", "rad", first["holdout"], "predicted", CHECK["coulomb_and_viscous"]),
     ]
-    for t in named:
-        error = position_error(held, t.fit.values)
-        quantities.append(Quantity(f"error.{t.name}", "rad", error, "predicted", CHECK.get(t.name)))
-    for t in rounds[min(len(named), len(rounds) - 1)].tried:
-        if t.name in DOCUMENTED and t.name not in [x.name for x in named]:
-            error = position_error(held, t.fit.values)
-            quantities.append(Quantity(f"error.{t.name}_not_named", "rad", error, "predicted", CHECK.get(t.name)))
+    for name, line in zip(dict.fromkeys(names), lines[1:], strict=True):
+        quantities.append(Quantity(f"error.{name}", "rad", line["holdout"], "predicted", CHECK.get(name)))
     quantities += [
-        Quantity("error_reduction", "1", 1 - after / before, "calibrated"),
-        Quantity("fitted_error.coulomb_and_viscous", "rad", position_error(train, base.values), "reference"),
-        Quantity("fitted_error.named", "rad", position_error(train, final.values), "reference"),
-        Quantity("duty_law_rms", "1", duty_error([*train, *held]), "reference"),
+        Quantity(f"probability.{f.name}", "1", f.probability, "calibrated") for f in findings(source, decided)
     ]
-    quantities += [Quantity(name, unit(name), value, "reference") for name, value in final.values.items()]
+    quantities += [
+        Quantity("error_reduction", "1", 1 - last["holdout"] / first["holdout"], "calibrated"),
+        Quantity("fitted_error.coulomb_and_viscous", "rad", first["train"], "reference"),
+        Quantity("fitted_error.named", "rad", last["train"], "reference"),
+        Quantity("duty_law_rms", "1", duty_error(runs), "reference"),
+    ]
+    for key, own in estimated(source, decided).items():
+        for name, e in own.items():
+            at = f"{key.partition('.')[0]}.{name}"
+            quantities.append(Quantity(at, e.unit, e.value, "reference", None, *interval(e.value, e.std)))
     return quantities
 
 
-def duty_error(runs: Sequence[ServoRun]) -> float:
-    """RMS of recorded duty less what the firmware's law makes of goal and position, while the drive is on [1]."""
-    parts = [(np.clip(DUTY * r.gain * (r.goal - r.position), -1, 1) - r.duty)[r.on > 0.5] for r in runs]
-    return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
+def candidates(decided: Decision) -> list[dict[str, Any]]:
+    """Each law by itself on top of Coulomb and viscous friction: log posterior odds, share of the whitened residual."""
+    return [{"name": t.placed.effect.name, "log_odds": t.odds, "explained": t.explained} for t in decided.found.trials]
 
 
-def unit(name: str) -> str:
-    """Unit of one of the servo's values."""
-    effect, _, own = name.partition(".")
-    if not own:
-        return ("N*m/V", "V*s/rad", "kg*m^2", "rad")[MOTOR.index(name)]
-    (text,) = [p.unit for p in effects()[effect].parameters if p.name == own]
-    return written_unit(text)
-
-
-def steps(
-    train: Sequence[ServoRun], held: Sequence[ServoRun], base: ServoFit, named: Sequence[LawTrial]
-) -> list[dict[str, str | float]]:
-    """Mean absolute position error [rad] after each law, fitted and held out."""
-    lines = [("Coulomb and viscous", base), *((f"+ {t.name}", t.fit) for t in named)]
-    return [
-        {"label": label, "train": position_error(train, f.values), "holdout": position_error(held, f.values)}
-        for label, f in lines
-    ]
-
-
-def as_lines(r: Round) -> list[dict[str, Any]]:
-    """A round's candidates for scripts; predicted shares and score are null where a law explained too little to try."""
-    return [
-        {
-            "name": t.name,
-            "explained": t.explained,
-            "foretold": {f"{gain:g}": share for gain, share in t.forecast.items()} or None,
-            "score": t.score if t.forecast else None,
-            "passes": t.passes,
-        }
-        for t in r.tried
-    ]
-
-
-def sections(
-    held: Sequence[ServoRun], base: ServoFit, final: ServoFit, rounds: Sequence[Round], refused: LawTrial | None
-) -> list[Section]:
+def sections(held: Sequence[BamRun], decided: Decision) -> list[Section]:
     """What is drawn, and what was not named."""
+    before, after = values_of(decided.found.first.at), values_of(decided.best.train.at)
     words = [
-        "Bars: share of the squared position error at gains 100, 200 and 800. Dots: the same at one of these gains, "
-        "predicted by fits to the other two. A law is named when it explains at least 5 %, predicts more than chance "
-        "over all gains, and no dot is below -5 %; of several, the one that predicts most for its number of "
-        "parameters, and where that is a tie, the simplest."
+        f"{t.placed.effect.name.replace('_', ' ').capitalize()}: log posterior odds {t.odds:.0f}."
+        for t in decided.found.trials
     ]
-    for t in rounds[0].tried:
-        if t.forecast and not (rounds[0].named and t.name == rounds[0].named.name):
-            worst = min(t.forecast, key=lambda gain: t.forecast[gain])
-            words.append(
-                f"{t.name.replace('_', ' ').capitalize()} explains {percent(t.explained)} of what is fitted; at "
-                f"gain {worst:.0f}, predicted from the others, {percent(t.forecast[worst])}; score {t.score:.0f}."
-            )
-    if rounds[0].named:
-        words.append(
-            f"{rounds[0].named.name.replace('_', ' ').capitalize()} has the score {rounds[0].named.score:.0f}."
-        )
-    if refused:
-        words.append(
-            f"{refused.name.replace('_', ' ').capitalize()} passed next, but the held-out gain's error did not fall."
-        )
+    names = {n.placed.key for n in decided.best.names}
+    words += [
+        f"{n.placed.effect.name.replace('_', ' ').capitalize()} was found as well; the held-out gain did not confirm it."
+        for n in decided.rejected
+        if n.placed.key not in names
+    ]
+    words += [
+        f"Without {n.placed.effect.name.replace('_', ' ')} the held-out gain loses "
+        f"{decided.best.missed[n.placed.key].sure:.1f} standard errors."
+        for n in decided.best.names
+    ]
     by_run = [
-        f"{run.trajectory.replace('_', ' ')}: {1e3 * position_error([run], base.values):.0f} to "
-        f"{1e3 * position_error([run], final.values):.0f} mrad"
+        f"{run.trajectory.replace('_', ' ')}: {1e3 * position_error([run], before):.0f} to "
+        f"{1e3 * position_error([run], after):.0f} mrad"
         for run in held
     ]
     pictures = [
         Picture(
-            positions(held, base.values, final.values),
+            positions(held, before, after),
             "Position over time of four recordings at gain 400: measured, with Coulomb and viscous friction, and with "
             "what was named.",
             "Gain 400, which is held out. Simulated in closed loop from the first position; only goals and supply "
             "are taken from the recording.",
         ),
         Picture(
-            explained(rounds[0].tried),
-            "Share of the squared position error that each law explains.",
-            "First round: each law alone beside Coulomb and viscous friction, everything fitted again.",
+            explained(decided.found.trials, [n.placed.effect.name for n in decided.best.names]),
+            "Share of the whitened residual that each law explains.",
+            "First round: each law alone beside Coulomb and viscous friction.",
         ),
     ]
     return [
@@ -230,16 +217,9 @@ def sections(
     ]
 
 
-def save(values: Values, note: str) -> None:
-    """Write the model file with what was found; motor constants and the encoder's zero have no place in it."""
-    model = load_model(HERE / "bam" / "servo.toml")
-    placed = list(model.effects)
-    for name in dict.fromkeys(key.partition(".")[0] for key in values if "." in key):
-        if name not in [p.effect.name for p in placed]:
-            placed.append(PlacedEffect(effects()[name], "servo"))
-    own = {key.replace(".", ".servo."): float(value) for key, value in values.items() if "." in key}
-    own["rotor_inertia.servo.inertia"] = float(values["rotor_inertia"])
-    save_model(replace(model, effects=tuple(placed), values=own), FOLDER / "bam" / "model.toml", note)
+def save(at: ModelPoint, note: str) -> None:
+    """Write the model file with what was found; the motor's constants and the encoder's zero have no place in it."""
+    save_model(with_found(load_model(MODEL), at.without(f"{DRIVE.name}.{JOINT}")), FOLDER / "bam" / "model.toml", note)
 
 
 if __name__ == "__main__":

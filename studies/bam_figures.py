@@ -1,17 +1,20 @@
 """Pictures of the servo study: positions on the held-out gain, and what each law explains."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from ..identification.sources.search import Trial
+from ..models.servo_loop import simulate
 from ..report.drawing import AFTER, BEFORE, GREY, MEASURED, drawing, line, margins, svg
 from ..report.time_axes import over_time
-from .bam_naming import LawTrial, Values
-from .bam_servo import ServoRun, simulate
+from .bam_recordings import BamRun
+
+Values = Mapping[str, float]
 
 
-def positions(runs: Sequence[ServoRun], before: Values, after: Values) -> bytes:
+def positions(runs: Sequence[BamRun], before: Values, after: Values) -> bytes:
     """Position of every run: measured, and as two models predict it in closed loop."""
     with drawing():
         figure = Figure(figsize=(10.0, 6.2))
@@ -31,21 +34,16 @@ def positions(runs: Sequence[ServoRun], before: Values, after: Values) -> bytes:
         return svg(figure)
 
 
-def explained(tried: Sequence[LawTrial]) -> bytes:
-    """Share of the squared position error that each law explains, fitted to all gains and predicted for each."""
+def explained(trials: Sequence[Trial], named: Sequence[str]) -> bytes:
+    """Share of the whitened residual that each law by itself explains; those that were named are told apart."""
     with drawing():
-        figure = Figure(figsize=(8.0, 0.9 + 0.42 * len(tried)))
+        figure = Figure(figsize=(8.0, 0.9 + 0.42 * len(trials)))
         axes = figure.subplots()
-        figure.subplots_adjust(**margins(figure, 2.2, 0.3, 0.5, 0.35))
-        places = np.arange(len(tried))
-        axes.barh(places, [100 * t.explained for t in tried], 0.6, color=GREY, label="fitted to all gains")
-        for place, t in zip(places, tried, strict=True):
-            forecast = [100 * x for x in t.forecast.values()]
-            axes.plot(forecast, [place] * len(forecast), "o", color=AFTER, markersize=5)
-        axes.plot([], [], "o", color=AFTER, markersize=5, label="a gain predicted from the others")
-        axes.set_yticks(places, [t.name.replace("_", " ") for t in tried])
+        figure.subplots_adjust(**margins(figure, 2.2, 0.3, 0.5, 0.15))
+        places = np.arange(len(trials))
+        colours = [AFTER if t.placed.effect.name in named else GREY for t in trials]
+        axes.barh(places, [100 * t.explained for t in trials], 0.6, color=colours)
+        axes.set_yticks(places, [t.placed.effect.name.replace("_", " ") for t in trials])
         axes.invert_yaxis()
-        axes.axvline(0, color=GREY, linewidth=0.6)
-        axes.set_xlabel("share of the squared position error explained [%]")
-        figure.legend(loc="upper right", ncols=2)
+        axes.set_xlabel("share of the whitened residual explained [%]")
         return svg(figure)

@@ -1,1 +1,1 @@
-"""A position servo under a command: its simulation in closed loop, and its recordings as a source."""
+"""Recordings of a position servo under a command as a source."""

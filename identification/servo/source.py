@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...models.effect import Effect, Parameter, written_unit
+from ...models.effects import get_effect
 from ...models.model import PlacedEffect
+from ...models.servo_loop import DRIVE, GRAVITY, LEAST, ROTOR, ServoRun, laws, simulate
 from ..deciding import BLOCK, LEAST_LEVEL, SETTLES, STICKS
 from ..evidence.confirm import FEWEST_BLOCKS
 from ..evidence.hypotheses import parts_of
@@ -20,15 +22,14 @@ from ..fitting.experiment import Scales
 from ..nuisance.noise import NoiseChannel
 from ..sources.fit import differences
 from ..sources.source import GridPoint, Linearisation, ModelPoint
-from .closed_loop import DRIVE, GRAVITY, LEAST, ROTOR, ServoRun, laws, simulate
 
 Array = NDArray[np.float64]
 
-EVERY = 0.02
+EVERY = 0.05
 """[s] Windows over which positions are averaged."""
-SHARE = 0.1
-"""A usual size of a parameter is what changes the torque by so much [share of the load's RMS]: so much friction more
-moves where the servo stops by more than single instants of sticking."""
+WIDE = 0.03
+"""A usual size of a parameter changes the torque by so much [share of the load's RMS]: a law's column, the change of the
+simulation for so much of it, sees past single instants of sticking."""
 
 
 class Servos:
@@ -45,6 +46,7 @@ class Servos:
         self.channels = (f"q.{joint}",)
         self._measured = [_means(r, r.position)[:, None] for r in self.runs]
         self._known: dict[tuple[int, tuple[tuple[str, float], ...]], Array | None] = {}
+        self._sizes: dict[tuple[str, str], float] = {}
         own = [self.runs[i] for i in self.train]
         self._q, self._qd = (np.concatenate(x) for x in ([r.position for r in own], [_speed(r) for r in own]))
         self._load = np.concatenate([r.mass * GRAVITY * r.length * np.sin(r.position) for r in own])
@@ -52,6 +54,7 @@ class Servos:
         travel = max(float(np.ptp(r.position)) for r in own)
         self._scales = Scales(*(max(x, LEAST) for x in (float(np.abs(self._qd).max()), travel,
                                                         float(np.abs(self._load).max()))))  # fmt: skip
+        self._laws = [e for e in laws() if not self._alias(e)]
 
     def measured(self, i: int) -> Array:
         return self._measured[i]
@@ -88,25 +91,46 @@ class Servos:
         return x.low * scale, x.high * scale
 
     def size(self, p: PlacedEffect, x: Parameter) -> float:
-        """As much as changes the torque by `SHARE` of the load, along the recorded motion."""
+        """As much as changes the torque by `WIDE`, along the recorded motion."""
         if x.grid:
             return min(abs(g) for g in x.grid) * self._scales.of(x.relative_to)
-        return SHARE * _rms(self._load) / max(self._torque(p.effect, x), LEAST)
+        key = p.effect.name, x.name
+        if key not in self._sizes:
+            self._sizes[key] = WIDE * _rms(self._load) / max(self._torque(p.effect, x), LEAST)
+        return self._sizes[key]
 
     def _torque(self, effect: Effect, x: Parameter) -> float:
-        """RMS torque for a unit of an amplitude."""
+        """RMS torque for a unit of a parameter."""
         r = self.runs[0]
         if effect == ROTOR:
             return _rms(self._load) / (r.mass * r.length**2)
         if x.name == "zero":
             return r.mass * GRAVITY * r.length
         if effect == DRIVE:
-            torque_per_volt = _rms(self._load) / _rms(self._volts)
-            return _rms(self._volts) if x.name == "torque_per_volt" else torque_per_volt * _rms(self._qd)
-        rows = {"q": self._q, "qd": self._qd, "load": self._load, "speed_scale": np.full_like(self._q, LEAST)}
-        own = {y.name: float(y is x) if not y.grid else y.zero * self._scales.of(y.relative_to)
-               for y in effect.parameters}  # fmt: skip
-        return _rms(np.array(effect.law({k: ca.DM(v) for k, v in rows.items()}, own)))
+            volts = max(_rms(self._volts), LEAST)
+            return volts if x.name == "torque_per_volt" else _rms(self._load) / volts * _rms(self._qd)
+        return _rms(self._along(effect)[x.name])
+
+    def _along(self, effect: Effect) -> dict[str, Array]:
+        """Torque for a unit of each amplitude of a law, along the recorded motion."""
+        moving = np.where(self._qd < 0, -1, 1) * np.maximum(np.abs(self._qd), LEAST)
+        rows = {"q": self._q, "qd": moving, "load": self._load, "speed_scale": np.full_like(self._q, LEAST)}
+        signals = {k: ca.DM(v) for k, v in rows.items()}
+        shapes = {x.name: x.zero * self._scales.of(x.relative_to) for x in effect.parameters if x.grid}
+        names = [x.name for x in effect.parameters if not x.grid]
+        units = [shapes | {other: float(other == name) for other in names} for name in names]
+        return {k: np.array(effect.law(signals, x)).ravel() for k, x in zip(names, units, strict=True)}
+
+    def _alias(self, effect: Effect) -> bool:
+        """Is a law, with another torque per volt, its own special case? No recording has a torque: a share of the load
+        may as well be the motor's."""
+        parts = [get_effect(name) for name in effect.contains]
+        if not parts:
+            return False
+        own, known = [np.stack([self._load, *(x for e in some for x in self._along(e).values())])
+                      for some in ([*parts, effect], parts)]  # fmt: skip
+        return bool(np.linalg.matrix_rank(own, 1e-6 * np.linalg.norm(own)) ==
+                    np.linalg.matrix_rank(known, 1e-6 * np.linalg.norm(known)))  # fmt: skip
 
     def unit(self, p: PlacedEffect, x: Parameter) -> str:
         return written_unit(x.unit)
@@ -114,7 +138,7 @@ class Servos:
     def library(self, placed: Sequence[PlacedEffect]) -> list[PlacedEffect]:
         """A whole law is another way to write the sum of its parts, and no candidate beside one."""
         have = {p.key for p in placed}
-        every = [PlacedEffect(e, self.joint) for e in laws()]
+        every = [PlacedEffect(e, self.joint) for e in self._laws]
         return [p for p in every if p.key not in have and not have & parts_of(p)]
 
     def variants(self, p: PlacedEffect) -> list[GridPoint]:
@@ -183,3 +207,11 @@ def _speed(run: ServoRun) -> Array:
 
 def _rms(x: Array) -> float:
     return float(np.sqrt(np.mean(x**2)))
+
+
+def start(joint: str, placed: Sequence[PlacedEffect], values: Mapping[str, float]) -> ModelPoint:
+    """A model's effects with its drive and rotor, at values by ``effect.parameter`` to start a fit from."""
+    have = {p.effect.name for p in placed}
+    every = [*(PlacedEffect(e, joint) for e in (DRIVE, ROTOR) if e.name not in have), *placed]
+    return ModelPoint.of(every, {f"{p.key}.{x.name}": values[f"{p.effect.name}.{x.name}"]
+                                 for p in every for x in p.effect.parameters}, 0)  # fmt: skip

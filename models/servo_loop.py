@@ -17,10 +17,10 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.compiled import SampleFunction
-from ...models.effect import Effect, Parameter, Symbols
-from ...models.effects import effects, get_effect
-from ...models.hidden_state import reads
+from .compiled import SampleFunction
+from .effect import Effect, Parameter, Symbols
+from .effects import effects, get_effect
+from .hidden_state import reads
 
 Array = NDArray[np.float64]
 
@@ -37,8 +37,8 @@ LEAST = 1e-9
 
 @dataclass(frozen=True)
 class ServoRun:
-    """One recording: time [s], position and goal [rad], whether the drive is on, supply [V], duty as measured, each
-    (n,); the controller's gain [1/rad], the pendulum's mass [kg] and length [m]."""
+    """One recording: time [s], position and goal [rad], whether the drive is on and supply [V], each (n,); the
+    controller's gain [1/rad], duty for a position error; the pendulum's mass [kg] and length [m]."""
 
     name: str
     gain: float
@@ -49,7 +49,6 @@ class ServoRun:
     goal: Array
     on: Array
     volts: Array
-    duty: Array
 
 
 def _drive(s: Symbols, p: Symbols) -> ca.SX:
