@@ -1,6 +1,7 @@
-"""A position servo by an engine of its own: bristles (Canudas de Wit et al. 1995) and explicit Runge-Kutta steps."""
+"""A position servo by an engine of its own: bristles (Canudas de Wit et al. 1995) and leapfrog steps."""
 
 from dataclasses import dataclass
+from math import copysign, exp, pi, sin
 
 import numpy as np
 
@@ -10,8 +11,8 @@ MASS, LENGTH, VOLTS, GRAVITY = 0.49, 0.1, 7.4, 9.80665
 ARM = MASS * LENGTH**2
 PERIOD, STEP, SUBSTEPS = 0.005, 2 * np.pi / 4096, 25
 """[s], [rad] Of the samples and of the encoder."""
-BRISTLE = 1e-3
-"""[rad] Travel over which friction builds up."""
+BRISTLE = 2e-4
+"""[rad] Travel over which friction builds up: less than the encoder's step, so that no law without memory misses it."""
 
 
 @dataclass(frozen=True)
@@ -30,9 +31,9 @@ class LugreServo:
 
     def acceleration(self, q, v, z, volts):
         """[rad/s²] With bristles bent by a share z of where they slip."""
-        weight = MASS * GRAVITY * LENGTH * np.sin(q)
+        weight = MASS * GRAVITY * LENGTH * sin(q)
         drive = self.torque_per_volt * (volts - self.back_emf * v) - weight - self.level * z
-        drive -= self.viscous * v + self.drag * v * abs(v) + self.ripple * np.sin(4 * np.pi * q)
+        drive -= self.viscous * v + self.drag * v * abs(v) + self.ripple * sin(4 * pi * q)
         # The gear's loss goes by the torque it carries, which the loss itself changes: one of two signs holds.
         for sign in (1.0, -1.0):
             a = (drive - sign * self.load_share * z * weight) / (ARM * (1 + sign * self.load_share * z) + self.rotor)
@@ -40,23 +41,18 @@ class LugreServo:
                 break
         return a
 
-    def rate(self, x, goal, gain):
-        """Of position, speed and bristles."""
-        q, v, z = x
-        duty = min(max(gain * (goal - q), -1.0), 1.0)
-        return np.array([v, self.acceleration(q, v, z, duty * VOLTS), (v - abs(v) * z) / BRISTLE])
-
     def recorded(self, goal, gain, seed=0, duration=5.0):
         """A recording; ``goal`` is a function of time [rad], ``gain`` [1/rad] duty for an error."""
         time = np.arange(0.0, duration, PERIOD)
-        goals, x, h, seen = goal(time), np.zeros(3), PERIOD / SUBSTEPS, []
-        for target in goals:
-            seen.append(x[0])
+        goals, (q, v, z), h, seen = goal(time), (0.0, 0.0, 0.0), PERIOD / SUBSTEPS, []
+        for target in goals.tolist():
+            seen.append(q)
             for _ in range(SUBSTEPS):
-                k1 = self.rate(x, target, gain)
-                k2 = self.rate(x + h / 2 * k1, target, gain)
-                k3 = self.rate(x + h / 2 * k2, target, gain)
-                x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + self.rate(x + h * k3, target, gain))
+                v += 0.5 * h * self.acceleration(q, v, z, VOLTS * min(max(gain * (target - q), -1.0), 1.0))
+                q += h * v
+                way = copysign(1.0, v)
+                z = way + (z - way) * exp(-abs(v) * h / BRISTLE)
+                v += 0.5 * h * self.acceleration(q, v, z, VOLTS * min(max(gain * (target - q), -1.0), 1.0))
         noise = np.random.default_rng(seed).standard_normal(len(time))
         position = STEP * np.round((np.array(seen) + 0.3 * STEP * noise) / STEP)
         ones = np.ones(len(time))
