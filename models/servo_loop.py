@@ -104,7 +104,10 @@ def simulate(run: ServoRun, values: Mapping[str, float]) -> Array:
     """
     given = np.array([values.get(name, usual) for name, usual in zip(parameters(), _absent(), strict=True)])
     step = np.repeat(np.diff(run.time) / SUBSTEPS, SUBSTEPS)
-    held = [np.repeat(x[:-1], SUBSTEPS) for x in (run.goal, run.on, run.volts)]
+    held = [
+        np.repeat(x[:-1], SUBSTEPS)
+        for x in (run.goal, run.on, run.volts, np.zeros_like(run.time) if beside is None else beside)
+    ]
     inputs = np.stack([*held, step], axis=1)
     start = np.array([run.position[0], 0.0, 0.0])
     constants = np.concatenate([given, [run.gain, run.mass, run.length]])
@@ -121,7 +124,7 @@ def _step() -> SampleFunction:
     """One step of state (q, v, a)."""
     x, u, c = ca.SX.sym("x", 3), ca.SX.sym("u", 4), ca.SX.sym("c", len(parameters()) + 3)
     q, v, before = x[0], x[1], x[2]
-    goal, on, volts, h = u[0], u[1], u[2], u[3]
+    goal, on, volts, h = ca.vertsplit(u)
     p = dict(zip(parameters(), ca.vertsplit(c), strict=False))
     gain, mass, length = c[-3], c[-2], c[-1]
     inertia = mass * length**2 + p["rotor_inertia.inertia"]

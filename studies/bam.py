@@ -16,7 +16,7 @@ import numpy as np
 from ..errors import InputError
 from ..exit_status import status_of
 from ..identification.diagnosis import Estimate, Finding
-from ..identification.servo.source import Servos, start
+from ..identification.servo.source import Servos, plain, start
 from ..identification.sources.answer import estimates, finding, with_found
 from ..identification.sources.decide import Decision, decide
 from ..identification.sources.own import settled
@@ -87,14 +87,10 @@ def decided_on(
     train: Sequence[BamRun], held: Sequence[BamRun], progress: Callable[[str], None] = lambda _: None
 ) -> tuple[Servos, Decision]:
     """What Coulomb and viscous friction, fitted first, leave out of the recordings."""
-    model, source = load_model(MODEL), Servos(JOINT, train, held)
-    given = settled(source, model, start(JOINT, model.effects, START), progress)
-    return source, decide(source, given, progress)
-
-
-def values_of(at: ModelPoint) -> dict[str, float]:
-    """Values by ``effect.parameter``, as a simulation takes them."""
-    return {k.replace(f".{JOINT}.", "."): x for k, x in at.all_values.items()}
+    model = load_model(MODEL)
+    begin = start(JOINT, model.effects, START)
+    source = Servos(JOINT, train, held)
+    return source, decide(source, settled(source, model, begin, progress), progress)
 
 
 def estimated(source: Servos, decided: Decision) -> dict[str, dict[str, Estimate]]:
@@ -120,7 +116,7 @@ def steps(source: Servos, decided: Decision) -> list[dict[str, Any]]:
     return [
         {"label": label, "train": position_error(train, v), "holdout": position_error(held, v)}
         for label, own, _ in stages(source, decided, "Coulomb and viscous")
-        for v in [values_of(own.at)]
+        for v in [plain(own.at.all_values)]
     ]
 
 
@@ -176,14 +172,14 @@ def candidates(decided: Decision) -> list[dict[str, Any]]:
 
 def sections(held: Sequence[BamRun], decided: Decision) -> list[Section]:
     """What is drawn, and what was not named."""
-    before, after = values_of(decided.found.first.at), values_of(decided.best.train.at)
+    before, after = (plain(x.at.all_values) for x in (decided.found.first, decided.best.train))
     words = [
         f"{t.placed.effect.name.replace('_', ' ').capitalize()}: log posterior odds {t.odds:.0f}."
         for t in decided.found.trials
     ]
     names = {n.placed.key for n in decided.best.names}
     words += [
-        f"{n.placed.effect.name.replace('_', ' ').capitalize()} was found as well; the held-out gain did not confirm it."
+        f"{n.placed.effect.name.replace('_', ' ').capitalize()} was found too; the held-out gain did not confirm it."
         for n in decided.rejected
         if n.placed.key not in names
     ]

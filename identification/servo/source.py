@@ -28,8 +28,8 @@ Array = NDArray[np.float64]
 EVERY = 0.05
 """[s] Windows over which positions are averaged."""
 WIDE = 0.03
-"""A usual size of a parameter changes the torque by so much [share of the load's RMS]: a law's column, the change of the
-simulation for so much of it, sees past single instants of sticking."""
+"""A usual size of a parameter changes the torque by so much [share of the load's RMS]: a law's column, the change
+of the simulation for so much of it, sees past single instants of sticking."""
 
 
 class Servos:
@@ -43,7 +43,7 @@ class Servos:
             raise InputError("recordings: none is given; give one or more")
         self.joint, self.runs = joint, (*train, *held)
         self.train, self.held = range(len(train)), range(len(train), len(self.runs))
-        self.channels = (f"q.{joint}",)
+        self.channels = (f"q.{self.joint}",)
         self._measured = [_means(r, r.position)[:, None] for r in self.runs]
         self._known: dict[tuple[int, tuple[tuple[str, float], ...]], Array | None] = {}
         self._sizes: dict[tuple[str, str], float] = {}
@@ -51,6 +51,8 @@ class Servos:
         self._q, self._qd = (np.concatenate(x) for x in ([r.position for r in own], [_speed(r) for r in own]))
         self._load = np.concatenate([r.mass * GRAVITY * r.length * np.sin(r.position) for r in own])
         self._volts = np.concatenate([np.clip(r.gain * (r.goal - r.position), -1, 1) * r.volts * r.on for r in own])
+        moves = [np.abs(np.diff(r.position)) for r in own]
+        self._step = min((float(x[x > 0].min()) for x in moves if np.any(x > 0)), default=0.0)
         travel = max(float(np.ptp(r.position)) for r in own)
         self._scales = Scales(*(max(x, LEAST) for x in (float(np.abs(self._qd).max()), travel,
                                                         float(np.abs(self._load).max()))))  # fmt: skip
@@ -66,7 +68,7 @@ class Servos:
         """Positions of a simulation (n, 1), each worked out once."""
         key = i, tuple(sorted(values.items()))
         if key not in self._known:
-            q = simulate(self.runs[i], {k.replace(f".{self.joint}.", "."): x for k, x in values.items()})
+            q = simulate(self.runs[i], plain(values))
             self._known[key] = _means(self.runs[i], q)[:, None] if np.all(np.isfinite(q)) else None
         return self._known[key]
 
@@ -172,7 +174,7 @@ class Servos:
         self, numbers: Sequence[int], linear: Linearisation, could: Sequence[Sequence[Array]]
     ) -> list[list[NoiseChannel]]:
         """Where the servo stands, friction holds it anywhere about its goal: what nothing explains there, in the RMS,
-        and `LEAST_LEVEL` of the channel at least."""
+        and `LEAST_LEVEL` of the channel at least. Everywhere the encoder's steps hold their error."""
         speeds = [np.abs(np.gradient(self._measured[i][:, 0], EVERY)) / self._scales.speed for i in numbers]
         rest = [x < STICKS[0][0] for x in speeds]
         left = np.concatenate([r[k, 0] for r, k in zip(linear.residuals, rest, strict=True)])
@@ -181,15 +183,21 @@ class Servos:
         if len(left) > 2 * beside.shape[1]:
             left = left - beside @ np.linalg.lstsq(beside, left, rcond=1e-6)[0]
             level = max(level, float(np.sqrt(left @ left / (len(left) - beside.shape[1]))))
+        step = min(self._step / np.sqrt(12) / level, 1.0)
         return [
             [NoiseChannel(EVERY, (slice(0, len(x)),), np.zeros(len(x)),
-                          tuple((x < width).astype(float) for width, _ in STICKS),
+                          tuple(np.where(x < width, 1.0, step) for width, _ in STICKS),
                           (x < SETTLES[0]).astype(float), level)]
             for x in speeds
         ]  # fmt: skip
 
     def blocks(self, i: int, x: Array) -> Array:
         return np.array([b.sum() for b in np.array_split(x, max(int(len(x) * EVERY / BLOCK), FEWEST_BLOCKS))])
+
+
+def plain(values: Mapping[str, float]) -> dict[str, float]:
+    """Values by ``effect.parameter``, as a simulation takes them, from those by ``effect.place.parameter``."""
+    return {f"{effect}.{name}": x for key, x in values.items() for effect, _, name in [key.split(".")]}
 
 
 def _means(run: ServoRun, x: Array) -> Array:
