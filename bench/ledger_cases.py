@@ -22,13 +22,12 @@ from proof.drives.cases import draw, planned
 from snarelab import studies
 from snarelab.identification.diagnose import diagnose
 from snarelab.identification.diagnosis import Diagnosis
+from snarelab.identification.sources.answer import rms
 from snarelab.models.model_file import load_model
 from snarelab.models.model_write import save_model
 from snarelab.recordings import find_recording
-from snarelab.recordings.find import SHA256
 from snarelab.studies import bam
-from snarelab.studies.bam_naming import START, fit, name_missing, rms
-from snarelab.studies.bam_servo import read_run
+from snarelab.studies.bam_recordings import read_all
 from snarelab.studies.zero_g_rig.concealed import KINDS
 from snarelab.studies.zero_g_rig.recordings import make_recordings
 from snarelab.studies.zero_g_rig.study import MODEL
@@ -124,28 +123,19 @@ def _kuka(folder: Path) -> Said:
 
 def _bam(folder: Path) -> Said:
     """As the study does; held-out errors are of the position [rad]."""
-    runs = [read_run(find_recording(name)) for name in sorted(SHA256) if name.endswith(".json")]
-    train, held = ([r for r in runs if (r.gain == bam.HELD_OUT) == locked] for locked in (False, True))
-    base = final = fit(train, START)
-    named = []
-    for r in name_missing(train, base, lambda _: None):
-        if not r.named or not bam.confirmed(final, r.named.fit, held):
-            break
-        named.append(r.named)
-        final = r.named.fit
+    source, decided = bam.decided_on(*read_all())
     effects = [
         {
-            "name": t.name,
-            "at": "servo",
-            "probability": 1.0,
-            "values": {key: [_short(x), None] for key, x in final.values.items() if key.startswith(t.name + ".")},
+            "name": f.name,
+            "at": f.at,
+            "probability": round(f.probability, 3),
+            "values": {f"{f.name}.{k}": [_short(e.value), _short(e.std)] for k, e in f.parameters.items()},
             "not_told_apart": [],
         }
-        for t in named
+        for f in bam.findings(source, decided)
     ]
-    errors = [_short(rms(held, f.values)) for f in (base, final)]
-    verdict = "missing_physics" if named else "adequate"
-    return {"verdict": verdict, "effects": effects, "location": {}, "held_out": errors}
+    errors = [_short(float(rms(x)[0])) for x in (decided.before, decided.best.held)]
+    return {"verdict": decided.verdict, "effects": effects, "location": {}, "held_out": errors}
 
 
 def _rig(folder: Path, kind: str, seed: int) -> Said:

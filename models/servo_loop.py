@@ -104,10 +104,7 @@ def simulate(run: ServoRun, values: Mapping[str, float]) -> Array:
     """
     given = np.array([values.get(name, usual) for name, usual in zip(parameters(), _absent(), strict=True)])
     step = np.repeat(np.diff(run.time) / SUBSTEPS, SUBSTEPS)
-    held = [
-        np.repeat(x[:-1], SUBSTEPS)
-        for x in (run.goal, run.on, run.volts, np.zeros_like(run.time) if beside is None else beside)
-    ]
+    held = [np.repeat(x[:-1], SUBSTEPS) for x in (run.goal, run.on, run.volts)]
     inputs = np.stack([*held, step], axis=1)
     start = np.array([run.position[0], 0.0, 0.0])
     constants = np.concatenate([given, [run.gain, run.mass, run.length]])
