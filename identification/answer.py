@@ -91,8 +91,7 @@ def report_on(
     notes = [f"{Path(e.motion.path).name}: {note}" for e in (*train, *held) for note in e.motion.notes]
     notes += [rejection(n.placed) for n in decided.rejected if n.placed.key not in named]
     notes += [
-        f"on {channels[c]}, {percent(b.share)} of the residual lies in one window and does not recur: a knock, "
-        "or an outlier"
+        f"on {channels[c]}, {percent(b.share)} of the residual comes in bursts that do not recur: a knock, or outliers"
         for c, b in left.bursts.items()
         if not b.again
     ]

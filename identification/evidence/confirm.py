@@ -29,10 +29,14 @@ FEWEST_BLOCKS = 4
 
 @dataclass(frozen=True)
 class PredictiveDensity:
-    """Log density of the held-out recordings given the training ones, and the part of each block of time."""
+    """Log density of the held-out recordings given the training ones, and the part of each block of time; what the
+    training recordings say of the parameters, about their fit: mean (P,) and covariance (P, P).
+    """
 
     density: float
     blocks: Array
+    mean: Array
+    covariance: Array
 
 
 @dataclass(frozen=True)
@@ -120,7 +124,7 @@ def confirm(
                 f"confirming on the held-out recordings: {out.placed.key} is not confirmed, {len(left)} names left"
             )
     names = tuple(sorted(left.values(), key=lambda n: -missed[n.placed.key].size))
-    return ArmConfirmation(found, names, tuple(rejected), weak, missed, model, final, whole)
+    return ArmConfirmation(found, names, tuple(rejected), weak, missed, model, known_to(final, whole), whole)
 
 
 def forecast(
@@ -148,11 +152,25 @@ def forecast(
     )
     weight = weighed.beside.weight(found.tolerance)
     fitted_by = ProjectedEvidence(weighed.evidence, range(n), weight)
-    known = fitted_by.posterior(len(own.theta))
+    mean, covariance = known = fitted_by.posterior(len(own.theta))
+    unit = weighed.beside.spread
     on = ProjectedEvidence(weighed.evidence, range(n, n + len(held)), weight, known)
     always = on.beside([])
     parts = [weighed.evidence.left(n + i, always, []) for i in range(len(held))]
-    return PredictiveDensity(on.null, np.concatenate([blocks(x, e) for x, e in zip(parts, held, strict=True)]))
+    by_block = np.concatenate([blocks(x, e) for x, e in zip(parts, held, strict=True)])
+    return PredictiveDensity(on.null, by_block, unit * mean, covariance * np.outer(unit, unit))
+
+
+def known_to(fit: Fit, told: PredictiveDensity) -> Fit:
+    """A fit with the deviations that the evidence gives its values: the posterior's second moment about them, C + m m'.
+
+    The posterior has the memory of the noise, sticking, and the tolerances of masses and laws; the fit has none of
+    these, and how far its values are from the posterior's mean m is part of how well they are known. What the fit
+    cannot determine stays undetermined.
+    """
+    covariance = told.covariance + np.outer(told.mean, told.mean)
+    std = np.where(np.isfinite(fit.std), np.sqrt(np.diag(covariance)), np.inf)
+    return replace(fit, covariance=covariance, std=std)
 
 
 def blocks(x: Array, e: Experiment) -> Array:

@@ -93,11 +93,11 @@ def left_over(
             weighed, range(n), barred, {c for x in best.rejected for c in x.channels}
         )
         best = replace(best, found=replace(own, weighed=weighed, search=made, slots=tuple(slots), tolerance=tolerance))
-    return NamelessParts(remainders(best.found, train, held), _bursts(best.found, train))
+    return NamelessParts(remainders(best.found, train, held), _bursts(best.found, train, held))
 
 
-def _bursts(found: ArmSelection, train: Sequence[Experiment]) -> dict[int, Bursts]:
-    """Of every channel of the training recordings, beside all that was found.
+def _bursts(found: ArmSelection, train: Sequence[Experiment], held: Sequence[Experiment]) -> dict[int, Bursts]:
+    """Of every channel, beside all that was found.
 
     On a suspension or a floating base every joint moves what carries the others, which rings as it likes: nothing is
     said there.
@@ -111,7 +111,7 @@ def _bursts(found: ArmSelection, train: Sequence[Experiment]) -> dict[int, Burst
     told: dict[int, Bursts] = {}
     for c in range(len(evidence.channels[0])):
         parts = []
-        for i, e in enumerate(train):
+        for i, e in enumerate([*train, *held]):
             own = evidence.channels[i][c]
             left = own.residual - own.columns @ always[own.index]
             for item, amplitudes in mean:
@@ -120,7 +120,7 @@ def _bursts(found: ArmSelection, train: Sequence[Experiment]) -> dict[int, Burst
             parts.append(
                 ChannelResidual(left, left * own.covariance.solve(left), found.weighed.runs[i][c].settles == 0, step)
             )
-        one = bursts(parts)
+        one = bursts(parts[: len(train)], parts[len(train) :])
         if one is not None:
             told[c] = one
     return told

@@ -32,6 +32,8 @@ class NuisanceColumns:
     tolerant: slice
     baseline: list[list[Part]]
     """The baseline's own columns, in units of the parameters."""
+    spread: Array
+    """Prior deviation of each of the baseline's parameters about its fit (P,), the first columns' unit."""
     more: tuple[float, ...] = ()
     """Tolerances beyond `TOLERANCES` that may be chosen."""
 
@@ -90,7 +92,7 @@ def beside(
                 row[c].append((count + np.arange(2), columns.some(i, c, item.index) * size))
         count += 2
     joined = [[_joined(own) for own in row] for row in parts]
-    return NuisanceColumns(joined, count, tolerant, baseline)
+    return NuisanceColumns(joined, count, tolerant, baseline, spread)
 
 
 def _small(found: Fit, baseline: Sequence[Sequence[Part]], scale: Array) -> dict[tuple[int, str], float]:

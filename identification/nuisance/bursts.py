@@ -38,20 +38,34 @@ class ChannelResidual:
 
 @dataclass(frozen=True)
 class Bursts:
-    """The share of the residual's energy that is out of the ordinary [0 to 1], its frequency [Hz], and whether it comes
-    again."""
+    """The share of the residual's energy that is out of the ordinary [0 to 1], its frequency [Hz], and whether bursts
+    come again, in the held-out recordings too."""
 
     share: float
     frequency: float
     again: bool
 
 
-def bursts(channel: Sequence[ChannelResidual]) -> Bursts | None:
+def bursts(train: Sequence[ChannelResidual], held: Sequence[ChannelResidual]) -> Bursts | None:
     """Whether one channel's residual comes in bursts: `BURST_SHARE` of it above `BURST_LOUD` times the median window.
 
-    A window is weighted by its time in motion. A burst recurs if as much is left without the loudest window: what
-    occurs once, as a knock does, follows no law of the arm.
+    A window is weighted by its time in motion. Bursts recur if as much is left without the loudest window, and if the
+    held-out recordings have them too: what occurs once, as a knock does, follows no law of the arm.
     """
+    over, whole, parts = _windows(train)
+    if (share := _share(over, whole)) <= BURST_SHARE:
+        return None
+    once = int(np.argmax(over))
+    f, power = periodogram(parts[once][0], parts[once][1], window="hann", nfft=1024)
+    if f[np.argmax(power)] < 1 / BURST_WINDOW:
+        return None  # no window holds a period of it
+    again = _share(np.delete(over, once), np.delete(whole, once)) > BURST_SHARE
+    return Bursts(share, float(f[np.argmax(power)]), again and _share(*_windows(held)[:2]) > BURST_SHARE)
+
+
+def _windows(channel: Sequence[ChannelResidual]) -> tuple[Array, Array, list[tuple[Array, float]]]:
+    """What every window has above the ordinary, and its whole energy, both (w,), and its residual and rate [Hz]; none
+    where there are too few."""
     strength, weight, parts = [], [], []
     for own in channel:
         length = max(round(BURST_WINDOW / own.step), 2)
@@ -62,18 +76,9 @@ def bursts(channel: Sequence[ChannelResidual]) -> Bursts | None:
                 weight.append(float(np.mean(moves)))
                 parts.append((own.residual[k : k + length], 1 / own.step))
     if len(strength) < FEWEST:
-        return None
-    z, weight = np.maximum(np.array(strength), 0.0), np.array(weight)
-    over = weight * np.maximum(z - BURST_LOUD * np.median(z), 0.0)
-    whole = weight * z
-    if (share := _share(over, whole)) <= BURST_SHARE:
-        return None
-    once = int(np.argmax(over))
-    f, power = periodogram(parts[once][0], parts[once][1], window="hann", nfft=1024)
-    if f[np.argmax(power)] < 1 / BURST_WINDOW:
-        return None  # no window holds a period of it
-    again = _share(np.delete(over, once), np.delete(whole, once)) > BURST_SHARE
-    return Bursts(share, float(f[np.argmax(power)]), again)
+        return np.zeros(0), np.zeros(0), []
+    z = np.maximum(np.array(strength), 0.0)
+    return np.array(weight) * np.maximum(z - BURST_LOUD * np.median(z), 0.0), np.array(weight) * z, parts
 
 
 def _share(over: Array, strength: Array) -> float:

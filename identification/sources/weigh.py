@@ -123,7 +123,7 @@ def weigh(
     items = [item for h in hypotheses for item in h.items]
     evidence = Evidence(channels, columns, items, total)
     tolerant = slice(placed.start, placed.stop if source.anew else placed.start)
-    others = NuisanceColumns([], total, tolerant, [], (1.0,))
+    others = NuisanceColumns([], total, tolerant, [], spread, (1.0,))
     bare = functools.cache(lambda c: noise(c, could(c, False)))
     return WeighedRecordings(evidence, hypotheses, tuple(noises), others, scale, len(source.train), runs, bare)
 

@@ -4,6 +4,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 BENCH = Path(__file__).resolve().parents[2] / "bench"
 
 START = """
@@ -18,6 +20,7 @@ for script in sys.argv[1:]:
 """
 
 
+@pytest.mark.slow
 def test_every_bench_finds_what_it_imports(tmp_path: Path) -> None:
     scripts = [str(f) for f in sorted(BENCH.glob("*.py")) if "__main__" in f.read_text(encoding="utf-8")]
     assert len(scripts) > 10

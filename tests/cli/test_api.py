@@ -33,6 +33,7 @@ def fitted():
     return snarelab.identify(BUNDLED / "arm3.toml", [BUNDLED / "train.csv"], holdout=BUNDLED / "holdout.csv")
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("each_diagnosis_once")
 def test_examples_in_docstrings_run(tmp_path, monkeypatch):
     """The example of `diagnose` leaves a model file and a result that the rest is read from."""

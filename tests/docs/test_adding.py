@@ -141,6 +141,7 @@ def exact(time):
     return np.array([scipy.linalg.expm(a * t) @ [1.0, 0.0, 0.0] for t in time])
 
 
+@pytest.mark.slow
 def test_a_participant_is_one_file(copied, tmp_path):
     package, run = copied
     (source,) = blocks("adding-a-participant.md", "python")

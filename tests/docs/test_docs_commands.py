@@ -161,6 +161,7 @@ TOGETHER = ("README.md", "own-robot.md")  # they diagnose the same recordings: o
 GROUPS = [[p for p in WITH_COMMANDS if p.name in TOGETHER], *([p] for p in WITH_COMMANDS if p.name not in TOGETHER)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pages", GROUPS, ids=lambda pages: "+".join(page.name for page in pages))
 def test_every_command_runs(pages, bench, capsys):
     for page in pages:

@@ -132,6 +132,7 @@ def test_nothing_is_fetched_from_elsewhere(site):
         assert not re.search(r"(fetch|importScripts|\.src\s*=)\s*\(?\s*['\"`](https?:)?//", text), script.name
 
 
+@pytest.mark.slow
 def test_broken_links_fail_the_build(tmp_path):
     """What the build is trusted with, tried on a page of two links."""
     pytest.importorskip("sphinx", reason="no Sphinx: pip install '.[dev]'")

@@ -16,17 +16,7 @@ def motion(speed, segments=None, noise=0.0) -> Any:
     t = PERIOD * np.arange(len(qd))
     made = exact(("joint1",), PERIOD, 1, (t, np.cumsum(qd, axis=0) * PERIOD, qd, 0 * qd, 0 * qd), segments)
     made.encoder_noise[1] = noise
-
-    class Same:
-        """The motion, with a low-pass that lets everything pass."""
-
-        def __getattr__(self, name):
-            return getattr(made, name)
-
-        def to_band(self, x):
-            return x
-
-    return Same()
+    return made
 
 
 def near_rest(speed, zone, travel=1.0, **given):

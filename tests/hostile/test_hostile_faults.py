@@ -139,6 +139,7 @@ def test_an_interrupted_diagnosis_says_so_and_leaves_nothing(folder):
     assert files(folder) == before
 
 
+@pytest.mark.slow
 def test_an_interrupted_tolerance_study_keeps_its_cases_and_goes_on(folder):
     paths = {"PYTHONPATH": os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")])}
     process = start(folder, words("tolerance", "."), env=os.environ | paths | {"CASE_SECONDS": "0.3"})

@@ -178,7 +178,7 @@ def test_bursts_have_no_name_unless_they_came_once(reported, again, curves):
     smooth = [words("joint2", "speed", "49 %", "7.0 %")] * len(curves)
     assert made.description == "; ".join([*smooth, *[text] * again])
     assert made.verdict == ("unknown_effect" if again or curves else "adequate")
-    knock = "on tau.joint3, 36 % of the residual lies in one window and does not recur: a knock, or an outlier"
+    knock = "on tau.joint3, 36 % of the residual comes in bursts that do not recur: a knock, or outliers"
     assert (knock in made.notes) is not again
     (residual,) = cast(Any, made.location)
     assert np.flatnonzero(residual[0]).tolist() == [1] * len(curves) + [2] * again

@@ -1,6 +1,7 @@
 """What noise of coarse encoders, sampled slowly, must not be read as; what knocks once, and what keeps coming back."""
 
 import numpy as np
+import pytest
 from pendulum import diagnosed
 
 from bench.arm import random_arm
@@ -15,6 +16,7 @@ JOINTS = tuple(f"joint{k}" for k in range(1, 7))
 LEVELS = dict(zip(JOINTS, (8.0, 5.0, 2.0, 0.6, 0.3, 0.2), strict=True))
 
 
+@pytest.mark.slow
 def test_a_clean_arm_at_100_hz_and_16_bits_is_adequate(tmp_path):
     """Noise of the encoders stands in the torque of the heavy joints, and is far stronger in some poses than in others:
     it was bursts."""

@@ -78,7 +78,7 @@ def test_a_payload_is_named_beyond_what_masses_are_known_to(monkeypatch):
         )
         made = Explained(made.pieces, made.columns, made.items[:1], 1)
         payload = Hypothesis("payload", True, (made.items[0],), -6.0)
-        masses = NuisanceColumns([], 1, slice(0, 1), [])
+        masses = NuisanceColumns([], 1, slice(0, 1), [], np.ones(1))
         weighed: Any = SimpleNamespace(beside=masses, evidence=made.evidence(), pool=(payload,), noises=())
         return bool(tolerant.searched(weighed, (0,), (), range(len(weighed.noises)))[2])
 

@@ -86,7 +86,7 @@ def test_how_loud_and_how_much_makes_bursts(monkeypatch, constant, told):
     """One window of 5 beside eleven of 1 is none: 2 of 16 beyond three times the median; of 7 it is: 4 of 18."""
 
     def heard(loud):
-        return bursts([windows(*11 * [1], loud)]) is not None
+        return bursts([windows(*11 * [1], loud)], []) is not None
 
     assert [heard(5), heard(told)] == [False, True]
     for factor in FACTORS:
@@ -101,7 +101,7 @@ def test_how_long_the_windows_of_bursts_are(monkeypatch):
     many whole seconds, otherwise."""
 
     def heard(count):
-        return bursts([windows(*(count - 1) * [1], 16)]) is not None
+        return bursts([windows(*(count - 1) * [1], 16)], []) is not None
 
     assert [heard(11), heard(12), heard(23)] == [False, True, True]
     for factor in FACTORS:

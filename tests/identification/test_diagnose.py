@@ -86,12 +86,14 @@ def test_nothing_missing_is_adequate(tmp_path, seed):
         assert {x["at"] for x in found["limits"] if x["name"] == name} == set(JOINTS), name
 
 
+@pytest.mark.slow
 def test_payload_is_weighed(tmp_path):
     found = diagnosed(tmp_path, 103, payload=Payload(1.5, (0.0, 0.0, 0.1)))
     assert named(found) == {("payload_mass", "link3")}
     assert parameters(found, "payload_mass", "link3")["mass"] == pytest.approx(1.5, rel=0.05)
 
 
+@pytest.mark.slow
 def test_harness_bias_and_late_sensor_are_told_apart(tmp_path):
     found = diagnosed(
         tmp_path, 104, harness={"joint2": Harness(6.0, 0.1)}, tau_bias={"joint1": 2.0}, tau_delay={"joint3": 0.006}

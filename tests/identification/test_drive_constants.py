@@ -68,6 +68,7 @@ def test_a_constant_stands_as_a_number_in_the_saved_model(found, currents):
     assert run["tau.joint1"].std() > 10 * LEVEL  # torques, not currents
 
 
+@pytest.mark.slow
 def test_physics_is_named_beside_a_constant_that_nobody_knows(currents):
     folder, _ = currents
     lines = "[signals]\n" + "".join(f'"tau.{j}" = {{ column = "current.{j}", gain = "free" }}\n' for j in GAINS)

@@ -21,6 +21,7 @@ def record(path, seed, seconds, bump):
     np.savetxt(path, table, delimiter=",", header="time,q.joint1,tau.joint1", comments="", fmt="%.9g")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("bump", "verdict"), [(0.0, "adequate"), (8.0, "missing_physics")])
 def test_a_change_of_shape_is_named(tmp_path, bump, verdict):
     own = f'<inertial><mass value="1"/><inertia ixx="5" ixy="0" ixz="0" iyy="5" iyz="0" izz="{INERTIA}"/></inertial>'

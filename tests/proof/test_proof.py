@@ -298,6 +298,7 @@ def test_no_oracle_where_the_twin_cannot_be_recorded(monkeypatch):
 # Rivals
 
 
+@pytest.mark.slow
 def test_rivals_answer_in_the_same_form(harness):
     case, folder = harness
     found = rivals.run(folder)

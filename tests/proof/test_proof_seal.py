@@ -14,6 +14,7 @@ from proof.seal import BrokenSeal
 SEED = 90500
 
 
+@pytest.mark.slow
 def test_answers_are_sealed_before_the_tool_runs_and_nowhere_to_be_read(tmp_path, monkeypatch):
     monkeypatch.setattr(cases, "TRAIN", 8.0)
     monkeypatch.setattr(cases, "HOLDOUT", 5.0)

@@ -201,6 +201,7 @@ def test_a_crowded_answer_is_whole_on_a_phone(browser: Browser, pages: dict[str,
         assert [x["id"] for x in found["violations"] if x["impact"] in ("serious", "critical")] == []
 
 
+@pytest.mark.slow
 def test_without_scripts_the_plots_are_plain(browser: Browser, pages: dict[str, Path]) -> None:
     with opened(browser, pages["missing_physics"], scripts=False) as page:
         sentence = unbroken(VERDICTS["missing_physics"]().sentence)

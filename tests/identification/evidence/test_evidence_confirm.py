@@ -10,7 +10,16 @@ from decided import names as named
 from pendulum import record, recorded
 
 from snarelab.identification.evidence import confirm as module
-from snarelab.identification.evidence.confirm import FEWEST_BLOCKS, ArmLoss, PredictiveDensity, blocks, confirm, scatter
+from snarelab.identification.evidence.confirm import (
+    FEWEST_BLOCKS,
+    ArmLoss,
+    PredictiveDensity,
+    blocks,
+    confirm,
+    known_to,
+    scatter,
+)
+from snarelab.identification.fitting.fit import Fit
 from snarelab.models.effects import get_effect
 from snarelab.models.model import PlacedEffect
 
@@ -41,7 +50,9 @@ def eager(rise) -> set[int]:
 def confirmed(monkeypatch, some, missed, told=None):
     """`confirm` with a fit that is the set of names it has, and what is missed of each given by a function."""
     densities = iter(range(100))
-    monkeypatch.setattr(module, "forecast", lambda *_: PredictiveDensity(float(next(densities)), np.zeros(4)))
+    nothing = np.zeros(0), np.zeros((0, 0))
+    monkeypatch.setattr(module, "forecast", lambda *_: PredictiveDensity(float(next(densities)), np.zeros(4), *nothing))
+    monkeypatch.setattr(module, "known_to", lambda fit, _: fit)
     monkeypatch.setattr(module, "_missed", missed)
     model: Any = SimpleNamespace(effects=tuple(n.placed for n in some))
     monkeypatch.setattr(module, "_without", lambda m, key: SimpleNamespace(
@@ -129,3 +140,15 @@ def test_what_only_the_training_recording_has_is_not_named(tmp_path):
     assert named(both) == ["quadratic_friction.joint1"]
     assert "quadratic_friction.joint1" not in named(one)
     assert "quadratic_friction.joint1" in [n.placed.key for n in one.rejected]
+
+
+def test_deviations_are_about_the_reported_value():
+    """Those of a posterior that is 0.3 and -0.4 off the fit; what the fit cannot determine stays so."""
+    told = PredictiveDensity(0.0, np.zeros(4), np.array([0.3, -0.4, 0.0]), np.diag([0.16, 0.09, 0.01]))
+    fit: Any = Fit(
+        cast(Any, None), np.ones(3), np.array([0.1, 9.0, np.inf]), np.eye(3), np.ones(1), 1.0, np.zeros(3, bool), 1, 1
+    )
+    known = known_to(fit, told)
+    assert known.std == pytest.approx([0.5, 0.5, np.inf])
+    assert known.covariance[0, 1] == pytest.approx(-0.12)
+    assert known.theta is fit.theta

@@ -56,6 +56,7 @@ def diagnosis(folder, recordings, holdout, *more):
     return json.loads(out.read_text())
 
 
+@pytest.mark.slow
 def test_the_motion_designed_parts_what_small_motions_could_not(folder, capsys):
     motion = str(folder / "next.csv")
     first = diagnosis(folder, [str(folder / "small.csv")], str(folder / "hold.csv"), "--next-experiment", motion)

@@ -264,6 +264,7 @@ def test_a_pendulum_alone_is_told_well_and_what_would_have_shown(tmp_path):
     assert "adequate" in page.read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_identify_finds_a_listed_effect(tmp_path):
     text = PLAIN + 'effects = ["umbilical_stiffness"]\n[capture]\ntarget = "pendulum"\nline_length = 2.0\n'
     model = load_model(written(tmp_path, text))

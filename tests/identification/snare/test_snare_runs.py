@@ -37,6 +37,7 @@ def positions(tracks):
     return np.stack([t.position for t in tracks])
 
 
+@pytest.mark.slow
 def test_processes_give_what_one_gives_and_replace_one_that_died():
     with CaptureRuns(CAPTURES, workers=1) as alone:
         expected = positions(alone(ASKED))

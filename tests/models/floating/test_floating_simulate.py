@@ -55,6 +55,7 @@ def test_base_goes_where_drakes_goes(tmp_path, name):
         np.testing.assert_allclose(found[f"tau.{joint}"], truth[f"tau.{joint}"], atol=2e-2)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("compiler")
 def test_what_is_written_reads_back(tmp_path, capsys):
     motion, out = record(tmp_path / "motion.csv", 1), tmp_path / "out.csv"

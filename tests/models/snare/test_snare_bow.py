@@ -63,6 +63,7 @@ def rest_energy(n_elements, bowed):
     return total
 
 
+@pytest.mark.slow
 def test_energy_at_rest_is_that_of_the_elastica():
     """Of sixth order in the element's length with ΔU, of fourth without; ten elements are then as good as fifty."""
     exact = rest_energy(24, True)
