@@ -125,23 +125,25 @@ def _step() -> SampleFunction:
     p = dict(zip(parameters(), ca.vertsplit(c), strict=False))
     gain, mass, length = c[-3], c[-2], c[-1]
     inertia = mass * length**2 + p["rotor_inertia.inertia"]
-    weight = mass * GRAVITY * length * ca.sin(q + p["servo_drive.zero"])
-    duty = ca.fmin(ca.fmax(gain * (goal - q), -1), 1)
-    tau = -on * _law(DRIVE, {"volts": duty * volts, "qd": v}, p)
-    free = v + h / inertia * (tau - weight)
-    later, acceleration = free, before
+    # Forces at the middle of the step: its error is of second order.
+    middle = q + h / 2 * v
+    weight = mass * GRAVITY * length * ca.sin(middle + p["servo_drive.zero"])
+    duty = ca.fmin(ca.fmax(gain * (goal - middle), -1), 1)
+    later, acceleration = v, before
     for _ in range(PASSES):
+        mean = (v + later) / 2
+        tau = -on * _law(DRIVE, {"volts": duty * volts, "qd": mean}, p)
         load = mass * length**2 * acceleration + weight
-        later = _stopped(free, h / inertia, q, load, p)
+        later = _stopped(v + h / inertia * (tau - weight), h / inertia, {"q": middle, "qd": mean, "load": load}, p)
         acceleration = (later - v) / h
-    state = ca.vertcat(q + h * later, later, acceleration)  # symplectic: no energy comes from the steps
+    state = ca.vertcat(q + h * (v + later) / 2, later, acceleration)
     return SampleFunction(ca.Function("servo", [x, u, c], [state], ["x", "u", "c"], ["next"]))
 
 
-def _stopped(free: ca.SX, mobility: ca.SX, q: ca.SX, load: ca.SX, p: Mapping[str, ca.SX]) -> ca.SX:
+def _stopped(free: ca.SX, mobility: ca.SX, at: Symbols, p: Mapping[str, ca.SX]) -> ca.SX:
     """Velocity after friction: zero where friction's level is enough for that."""
     sense = ca.if_else(free < 0, -1, 1)
-    signals = {"q": q, "qd": sense * ca.fmax(ca.fabs(free), LEAST), "load": load, "speed_scale": ca.SX(LEAST)}
+    signals = {**at, "qd": sense * ca.fmax(ca.fabs(at["qd"]), LEAST), "speed_scale": ca.SX(LEAST)}
     slipped = free - mobility * sum((_law(e, signals, p) for e in laws()), ca.SX(0))
     return ca.if_else(slipped * sense > 0, slipped, 0)
 

@@ -11,8 +11,9 @@ MASS, LENGTH, VOLTS, GRAVITY = 0.49, 0.1, 7.4, 9.80665
 ARM = MASS * LENGTH**2
 PERIOD, STEP, SUBSTEPS = 0.005, 2 * np.pi / 4096, 25
 """[s], [rad] Of the samples and of the encoder."""
-BRISTLE = 2e-4
-"""[rad] Travel over which friction builds up: less than the encoder's step, so that no law without memory misses it."""
+BRISTLE = 2e-5
+"""[rad] Travel over which friction builds up. At a tenth of the encoder's step the servo stops 0.8 mrad elsewhere than one with
+dry friction: physics that no law without memory has."""
 
 
 @dataclass(frozen=True)
