@@ -12,8 +12,8 @@ ARM = MASS * LENGTH**2
 PERIOD, STEP, SUBSTEPS = 0.005, 2 * np.pi / 4096, 25
 """[s], [rad] Of the samples and of the encoder."""
 BRISTLE = 2e-5
-"""[rad] Travel over which friction builds up. At a tenth of the encoder's step the servo stops 0.8 mrad elsewhere than one with
-dry friction: physics that no law without memory has."""
+"""[rad] Travel over which friction builds up. At a tenth of the encoder's step the servo would stop 0.8 mrad
+elsewhere than with dry friction, which no law without memory tells."""
 
 
 @dataclass(frozen=True)
