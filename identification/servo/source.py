@@ -5,6 +5,7 @@ No set-up's number has a stated tolerance, so there are no shifts: the motor's n
 
 from collections.abc import Mapping, Sequence
 from itertools import product
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -117,10 +118,11 @@ class Servos:
         """Torque for a unit of each amplitude of a law, along the recorded motion."""
         moving = np.where(self._qd < 0, -1, 1) * np.maximum(np.abs(self._qd), LEAST)
         rows = {"q": self._q, "qd": moving, "load": self._load, "speed_scale": np.full_like(self._q, LEAST)}
-        signals = {k: ca.DM(v) for k, v in rows.items()}
+        # A law of symbols is one of numbers too.
+        signals: Any = {k: ca.DM(v) for k, v in rows.items()}
         shapes = {x.name: x.zero * self._scales.of(x.relative_to) for x in effect.parameters if x.grid}
         names = [x.name for x in effect.parameters if not x.grid]
-        units = [shapes | {other: float(other == name) for other in names} for name in names]
+        units: list[Any] = [shapes | {other: float(other == name) for other in names} for name in names]
         return {k: np.array(effect.law(signals, x)).ravel() for k, x in zip(names, units, strict=True)}
 
     def _alias(self, effect: Effect) -> bool:
