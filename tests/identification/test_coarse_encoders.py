@@ -45,8 +45,8 @@ def test_a_clean_arm_at_100_hz_and_16_bits_is_adequate(tmp_path):
 def test_what_knocks_once_is_noted_and_what_comes_again_has_no_name(tmp_path):
     once = diagnosed(tmp_path, 1, knocks=(7.3,))
     assert once.verdict == "adequate", once.sentence
-    assert any("does not recur" in note and "tau.joint1" in note for note in once.notes)
+    assert any("do not recur" in note and "tau.joint1" in note for note in once.notes)
     again = diagnosed(tmp_path, 1, knocks=(3.3, 7.3, 10.9))
     assert again.verdict == "unknown_effect", again.sentence
     assert "comes in bursts, at 6.8 Hz" in again.description or "comes in bursts, at 7 Hz" in again.description
-    assert not any("does not recur" in note for note in again.notes)
+    assert not any("do not recur" in note for note in again.notes)

@@ -19,6 +19,7 @@ from snarelab.models.model import PlacedEffect
 def confirmed(monkeypatch, sure: float) -> bool:
     name: Any = SimpleNamespace(placed=PlacedEffect(get_effect("sensor_bias"), "tau.joint1"))
     monkeypatch.setattr(confirming, "forecast", lambda *_: None)
+    monkeypatch.setattr(confirming, "known_to", lambda fit, _: fit)
     monkeypatch.setattr(confirming, "_without", lambda model, _: model)
     monkeypatch.setattr(
         confirming, "_missed", lambda *_: confirming.ArmLoss(sure, 1.0, 0.2, (0.1, 0.2), 0.75, cast(Any, None))
