@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.signal import fftconvolve
 
 from ..errors import InputError, nearest
-from .filters import derivative_half, derivative_kernels, low_pass, thin, thin_half, thinned_length, thinned_reach
+from .filters import derivative_half, derivative_kernels, low_pass, thin, thin_half, thinned_length
 from .uniform_clock import uniform
 
 Array = NDArray[np.float64]
@@ -104,10 +104,6 @@ class Motion:
     def to_band(self, x: Array) -> Array:
         """Low-pass and thin an array (n_samples, ...) segment by segment: (n_band, ...)."""
         return np.concatenate([thin(x[s], self.thinning) for s in self.segments])
-
-    def reach_in_band(self, x: Array) -> Array:
-        """Most that samples as large as x (n_samples, ...), of either sign, may be in the band: (n_band, ...)."""
-        return np.concatenate([thinned_reach(x[s], self.thinning) for s in self.segments])
 
     def band_segments(self) -> tuple[slice, ...]:
         """Where each segment stands in the output of `to_band`."""

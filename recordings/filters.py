@@ -63,19 +63,12 @@ def thinned_length(n: int, thinning: int) -> int:
 
 def thin(x: Array, thinning: int) -> Array:
     """Kaiser-windowed sinc, half amplitude at half the thinned rate, evaluated at the kept samples only."""
-    return x if thinning == 1 else _filtered(x, thinning, _group_taps(thinning))
-
-
-def thinned_reach(x: Array, thinning: int) -> Array:
-    """Most that samples of either sign, as large as x (n, ...), may be in each sample that `thin` keeps: the low-pass
-    has lobes of either sign, which may cancel in a sum of x and not in what x bounds."""
-    return x if thinning == 1 else _filtered(x, thinning, np.abs(_group_taps(thinning)))
-
-
-def _filtered(x: Array, thinning: int, taps: Array) -> Array:
+    if thinning == 1:
+        return x
     n = thinned_length(len(x), thinning)
     if n == 0:
         return x[:0]
+    taps = _group_taps(thinning)
     columns = x.reshape(len(x), -1).T
     groups = -(-n // GROUP)
     windows = np.zeros((len(columns), groups, len(taps)))

@@ -48,4 +48,5 @@ def share(motion: Motion, joint: int, zone: Zone, peak: float, travel: float) ->
         gone = np.concatenate([[0.0], np.cumsum(np.abs(speed[s]))]) * motion.period
         for t in np.flatnonzero(slow[s][:-1] & ~slow[s][1:]) + 1:
             slow[s.start + t : s.start + int(np.searchsorted(gone[: s.stop - s.start], gone[t] + reach))] = True
-    return np.minimum(motion.reach_in_band(slow.astype(float)), 1.0)
+    # The low-pass has lobes of either sign: what is held at rest leaks as far as they go.
+    return np.minimum(np.abs(motion.to_band(slow.astype(float))), 1.0)
