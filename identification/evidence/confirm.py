@@ -166,9 +166,11 @@ def known_to(fit: Fit, told: PredictiveDensity) -> Fit:
 
     The posterior has the memory of the noise, sticking, and the tolerances of masses and laws; the fit has none of
     these, and how far its values are from the posterior's mean m is part of how well they are known. What the fit
-    cannot determine stays undetermined.
+    cannot determine stays undetermined, and what the evidence holds keeps the fit's deviation.
     """
     covariance = told.covariance + np.outer(told.mean, told.mean)
+    held = np.flatnonzero(np.diag(covariance) == 0)
+    covariance[np.ix_(held, held)] = fit.covariance[np.ix_(held, held)]
     std = np.where(np.isfinite(fit.std), np.sqrt(np.diag(covariance)), np.inf)
     return replace(fit, covariance=covariance, std=std)
 

@@ -143,12 +143,14 @@ def test_what_only_the_training_recording_has_is_not_named(tmp_path):
 
 
 def test_deviations_are_about_the_reported_value():
-    """Those of a posterior that is 0.3 and -0.4 off the fit; what the fit cannot determine stays so."""
-    told = PredictiveDensity(0.0, np.zeros(4), np.array([0.3, -0.4, 0.0]), np.diag([0.16, 0.09, 0.01]))
-    fit: Any = Fit(
-        cast(Any, None), np.ones(3), np.array([0.1, 9.0, np.inf]), np.eye(3), np.ones(1), 1.0, np.zeros(3, bool), 1, 1
-    )
+    """Those of a posterior that is 0.3 and -0.4 off the fit; what the fit cannot determine stays so, and what the
+    evidence holds, the fourth, is known as well as the fit knows it."""
+    mean, variance = np.array([0.3, -0.4, 0.0, 0.0]), np.diag([0.16, 0.09, 0.01, 0.0])
+    told = PredictiveDensity(0.0, np.zeros(4), mean, variance)
+    own = np.diag([0.01, 81.0, 0.0, 4.0])
+    at_bound, std = np.zeros(4, bool), np.array([0.1, 9.0, np.inf, 2.0])
+    fit = Fit(cast(Any, None), np.ones(4), std, own, np.ones(1), 1.0, at_bound, 1, 1)
     known = known_to(fit, told)
-    assert known.std == pytest.approx([0.5, 0.5, np.inf])
+    assert known.std == pytest.approx([0.5, 0.5, np.inf, 2.0])
     assert known.covariance[0, 1] == pytest.approx(-0.12)
     assert known.theta is fit.theta
