@@ -79,11 +79,16 @@ def curves(
 def names(
     along: ColumnSource, by_words: Curves, columns: CandidateColumns
 ) -> dict[str, tuple[PlacedEffect, list[Item]]]:
-    """Every effect at every place that the model does not have yet, with all its shapes, by its key."""
+    """Every effect at every place that the model does not have yet, with all its shapes, by its key.
+
+    A part without a shape of its own is in a whole law of the model, amplitude and all; one with a shape may be another
+    of its kind.
+    """
     have = {p.key for p in along.model.effects}
+    in_whole = frozenset().union(*(parts_of(p) for p in along.model.effects))
     found = {}
     for p in library(along.model):
-        if have & parts_of(p):
+        if have & parts_of(p) or (p.key in in_whole and not any(x.grid for x in p.effect.parameters)):
             continue
         items = _items(along, p, by_words, columns)
         if items:

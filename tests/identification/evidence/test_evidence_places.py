@@ -1,11 +1,14 @@
 """Prior odds of places: they add up, and rise where the effect is at other joints already."""
 
 from math import comb
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from explained import white
 
+from snarelab.identification.evidence import hypotheses as module
 from snarelab.identification.evidence.hypotheses import log_share_of_places, pool
 from snarelab.identification.evidence.pool import Hypothesis
 from snarelab.models.effects import get_effect
@@ -42,3 +45,21 @@ def test_what_the_model_has_counts():
 def test_a_sensors_fault_is_an_accident_of_one_place():
     several = hypotheses("sensor_bias", ("tau.joint1", "tau.joint2"), there=("tau.joint3",))
     assert [np.exp(h.prior_beside(k)) for h in several for k in (0, 1)] == pytest.approx([0.5 / 3] * 4)
+
+
+def test_a_whole_law_has_its_parts_amplitudes(monkeypatch):
+    """Beside Makkar friction a second Stribeck peak may be missing; Coulomb and viscous friction are in it already."""
+    laws = ("viscous_friction", "coulomb_friction", "stribeck_friction", "makkar_friction")
+
+    def offered(*given: str) -> set[str]:
+        every = [PlacedEffect(get_effect(x), at) for x in laws for at in ("joint1", "joint2")]
+        effects = [PlacedEffect(get_effect(x), "joint1") for x in given]
+        monkeypatch.setattr(module, "library", lambda _: [p for p in every if p.key not in {x.key for x in effects}])
+        monkeypatch.setattr(module, "_items", lambda *_: ["columns"])
+        along: Any = SimpleNamespace(model=SimpleNamespace(effects=effects))
+        columns: Any = None
+        return {key.split("_")[0] for key in module.names(along, {}, columns) if key.endswith("joint1")}
+
+    assert offered() == {"viscous", "coulomb", "stribeck", "makkar"}
+    assert offered("makkar_friction") == {"stribeck"}
+    assert offered("coulomb_friction") == {"viscous", "stribeck"}
