@@ -124,7 +124,9 @@ def confirm(
                 f"confirming on the held-out recordings: {out.placed.key} is not confirmed, {len(left)} names left"
             )
     names = tuple(sorted(left.values(), key=lambda n: -missed[n.placed.key].size))
-    return ArmConfirmation(found, names, tuple(rejected), weak, missed, model, known_to(final, whole), whole)
+    # A nameless curve is what the names leave: their values do not wait for it.
+    told = forecast(model, final, replace(found, slots=()), train, held, scales) if found.nameless else whole
+    return ArmConfirmation(found, names, tuple(rejected), weak, missed, model, known_to(final, told), whole)
 
 
 def forecast(

@@ -30,7 +30,7 @@ SETTLES = Zone(*deciding.SETTLES)
 
 
 def share(motion: Motion, joint: int, zone: Zone, peak: float, travel: float) -> Array:
-    """Share of each sample in the analysis band that may come from samples near rest (n_band,), 0 to 1.
+    """Share of each sample in the analysis band that is near rest (n_band,), 0 to 1.
 
     Parameters
     ----------
@@ -48,5 +48,4 @@ def share(motion: Motion, joint: int, zone: Zone, peak: float, travel: float) ->
         gone = np.concatenate([[0.0], np.cumsum(np.abs(speed[s]))]) * motion.period
         for t in np.flatnonzero(slow[s][:-1] & ~slow[s][1:]) + 1:
             slow[s.start + t : s.start + int(np.searchsorted(gone[: s.stop - s.start], gone[t] + reach))] = True
-    # The low-pass has lobes of either sign: what is held at rest leaks as far as they go.
-    return np.minimum(np.abs(motion.to_band(slow.astype(float))), 1.0)
+    return np.clip(motion.to_band(slow.astype(float)), 0.0, 1.0)

@@ -24,7 +24,7 @@ def confirmed(monkeypatch, sure: float) -> bool:
     monkeypatch.setattr(
         confirming, "_missed", lambda *_: confirming.ArmLoss(sure, 1.0, 0.2, (0.1, 0.2), 0.75, cast(Any, None))
     )
-    found: Any = SimpleNamespace(names=(name,), model=None, fit=None)
+    found: Any = SimpleNamespace(names=(name,), model=None, fit=None, nameless={})
     return bool(confirming.confirm(found, [], [], {}, lambda _: None).names)
 
 

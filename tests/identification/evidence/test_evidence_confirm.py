@@ -57,7 +57,7 @@ def confirmed(monkeypatch, some, missed, told=None):
     model: Any = SimpleNamespace(effects=tuple(n.placed for n in some))
     monkeypatch.setattr(module, "_without", lambda m, key: SimpleNamespace(
         effects=tuple(p for p in m.effects if p.key != key)))  # fmt: skip
-    found: Any = SimpleNamespace(names=some, model=model, fit=frozenset(n.number for n in some))
+    found: Any = SimpleNamespace(names=some, model=model, fit=frozenset(n.number for n in some), nameless={})
     return confirm(found, [], [], {}, (told if told is not None else []).append)
 
 

@@ -44,23 +44,6 @@ def test_a_joint_in_motion_never_stands():
     assert near_rest(1 + 0.5 * np.sin(np.arange(100) / 10), Zone(0.04, 0.01)) == []
 
 
-@pytest.mark.parametrize("thinning", [2, 5, 12])
-def test_what_a_joint_holds_at_rest_leaks_no_further_than_the_share_says(thinning):
-    """A torque that is the same through every rest, through the conditioning's own low-pass, whose lobes have either
-    sign."""
-    n = 240 * thinning
-    t = PERIOD * np.arange(n)
-    qd = (np.sin(2 * np.pi * 6.0 * t / t[-1]) ** 3)[:, None]
-    made = exact(("joint1",), PERIOD, thinning, (t, np.cumsum(qd, axis=0) * PERIOD, qd, 0 * qd, 0 * qd))
-    rest = np.abs(qd[:, 0]) < 0.04
-    found = share(made, 0, Zone(0.04, 0.0), 1.0, 1.0)
-    moves = found < 1
-    assert np.mean(moves) > 0.3
-    leak = made.to_band(rest.astype(float))[moves]
-    assert leak.min() < -0.01
-    assert np.all(np.abs(leak) <= found[moves] + 1e-12)
-
-
 def test_thinned_samples_hold_a_share():
     """Through the conditioning's own low-pass: between 0 and 1, one deep inside a rest and none far from it."""
     n = 1200
