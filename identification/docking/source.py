@@ -17,7 +17,7 @@ from ...models.effects import get_effect
 from ...models.model import Model, PlacedEffect
 from ..deciding import BLOCK
 from ..nuisance.noise import NoiseChannel
-from ..sources.fit import differences, shift_differences
+from ..sources.fit import changes, differences, shift_differences
 from ..sources.source import GridPoint, Linearisation, ModelPoint
 from .noise import noise_channels
 from .recording import EVERY, load_records
@@ -101,12 +101,10 @@ class Dockings(DockingRuns):
     def _column(self, i: int, at: ModelPoint, v: GridPoint) -> Array:
         """Change of the simulation for each amplitude, from zero."""
         shape = {k: x for k, x in v.values.items() if k not in v.amplitudes}
-        none, own = self.predicted(i, at), []
+        none = self.predicted(i, at)
         assert none is not None
-        for key in v.amplitudes:
-            seen = self(i, {**at.all_values, **shape, key: v.values[key]}, at.shifts)
-            own.append((np.full_like(none, np.nan) if seen is None else seen - none) / v.values[key])
-        return np.stack(own, axis=2)
+        steps = {key: v.values[key] for key in v.amplitudes}
+        return changes(none, ((self(i, {**at.all_values, **shape, k: x}, at.shifts), x) for k, x in steps.items()))
 
     def curves(self, numbers: Sequence[int]) -> Mapping[tuple[int, str], list[Array]]:
         return {}

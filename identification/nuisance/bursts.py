@@ -64,7 +64,7 @@ def bursts(train: Sequence[ChannelResidual], held: Sequence[ChannelResidual]) ->
 
 
 def _windows(channel: Sequence[ChannelResidual]) -> tuple[Array, Array, list[tuple[Array, float]]]:
-    """what every window has above the ordinary, and its whole energy, both (n,), and its residual and rate [Hz]; none
+    """What every window has above the ordinary, and its whole energy, both (n,), and its residual and rate [Hz]; none
     where there are too few."""
     strength, weight, parts = [], [], []
     for own in channel:

@@ -21,7 +21,7 @@ from ..evidence.confirm import FEWEST_BLOCKS
 from ..evidence.hypotheses import parts_of
 from ..fitting.experiment import Scales
 from ..nuisance.noise import NoiseChannel
-from ..sources.fit import differences
+from ..sources.fit import changes, differences
 from ..sources.source import GridPoint, Linearisation, ModelPoint
 
 Array = NDArray[np.float64]
@@ -160,14 +160,11 @@ class Servos:
 
     def _column(self, i: int, at: ModelPoint, v: GridPoint) -> Array:
         """Change of the simulation for each amplitude, from zero."""
-        none, own = self.predicted(i, at), []
+        none = self.predicted(i, at)
         assert none is not None
-        for x in (x for x in v.placed.effect.parameters if not x.grid):
-            step = self.size(v.placed, x)
-            others = dict.fromkeys(v.amplitudes, 0.0) | {f"{v.placed.key}.{x.name}": step}
-            seen = self._seen(i, {**at.all_values, **v.values, **others})
-            own.append((np.full_like(none, np.nan) if seen is None else seen - none) / step)
-        return np.stack(own, axis=2)
+        steps = {f"{v.placed.key}.{x.name}": self.size(v.placed, x) for x in v.placed.effect.parameters if not x.grid}
+        base = {**at.all_values, **v.values, **dict.fromkeys(steps, 0.0)}
+        return changes(none, ((self._seen(i, {**base, k: x}), x) for k, x in steps.items()))
 
     def curves(self, numbers: Sequence[int]) -> Mapping[tuple[int, str], list[Array]]:
         return {}

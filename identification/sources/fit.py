@@ -3,7 +3,7 @@
 Gauss and Newton's steps on the posterior, r' K⁻¹ r + shifts' shifts + the prior of what the model file says.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -54,6 +54,12 @@ def linearised(
         p = there.shape[2] - n_shifts
         columns.append(np.concatenate([there[:, :, :p], source.slopes(i, at.held(p), here), there[:, :, p:]], axis=2))
     return Linearisation(at, tuple(left), tuple(columns))
+
+
+def changes(none: Array, seen: Iterable[tuple[Array | None, float]]) -> Array:
+    """Change of a simulation from ``none`` (n, c) for a unit of each amplitude (n, c, k): what is seen with each, None
+    where that cannot be predicted, and the amplitude."""
+    return np.stack([(np.full_like(none, np.nan) if x is None else x - none) / step for x, step in seen], axis=2)
 
 
 def differences(source: Source, i: int, at: ModelPoint, here: Array) -> Array:
