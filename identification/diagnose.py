@@ -6,12 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ..models.docking.bench_setup import DockingTree
 from ..models.effects import effects
 from ..models.hidden_state import prepare
 from ..models.model import Model
 from ..models.rigid_body import RigidBody
-from ..models.snare.setup import SnareTree
 from .answer import report_on
 from .checks.run import early_checks, run_checks
 from .data_fault import contradict, data_fault
@@ -26,11 +24,12 @@ from .fitting.fit import Fit, channel_rms
 from .fitting.friction_curve import friction_curves
 from .fitting.held_out import demand_apart
 from .fitting.recorded import read_all, with_recorded_joints
-from .identify import demand_one_process, inertial_values, physical
+from .identify import inertial_values, physical
 from .links.answer import with_links
 from .links.diagnose import diagnose_links
 from .search.refit import without
 from .search.rest import fitted
+from .simulated import demand_one_process, simulated_kind
 
 
 @dataclass(frozen=True)
@@ -75,16 +74,10 @@ def diagnose(
         Whatever is wrong with the recordings, a holdout that is one of them, or ``jobs`` for another system.
     """
     held = demand_apart(recordings, holdout)
-    if isinstance(model.tree, SnareTree):
-        # Loaded here: numba takes longer to load than a short arm to fit.
-        from .snare.diagnose import diagnose_captures
-
-        return Answer(*diagnose_captures(model, recordings, held, progress=progress, jobs=jobs))
+    simulated = simulated_kind(model.tree)
+    if simulated is not None:
+        return Answer(*simulated.diagnose(model, recordings, held, progress=progress, jobs=jobs))
     demand_one_process(model, jobs)
-    if isinstance(model.tree, DockingTree):
-        from .docking.diagnose import diagnose_dockings
-
-        return Answer(*diagnose_dockings(model, recordings, held, progress=progress))
     progress("reading and conditioning the recordings")
     prepare(effects().values())
     read = read_all(model, [*recordings, *held])

@@ -3,17 +3,15 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
-from ..models.docking.bench_setup import DockingTree
 from ..models.floating.tree import channel
 from ..models.inertia import Array
 from ..models.model import Model
 from ..models.rigid_body import RigidBody
-from ..models.snare.setup import SnareTree
 from .checks.finding import CheckFinding
 from .checks.run import early_checks, run_checks
 from .fitting.assembly import TorqueModel
@@ -25,10 +23,7 @@ from .fitting.fit import Fit, channel_rms, fit
 from .fitting.friction_curve import friction_curves, identifiable
 from .fitting.held_out import demand_apart
 from .fitting.recorded import read_all, with_recorded_joints
-
-if TYPE_CHECKING:
-    from .docking.identify import DockingIdentification
-    from .snare.identify import CaptureIdentification
+from .simulated import SimulatedIdentification, demand_one_process, simulated_kind
 
 
 @dataclass(frozen=True)
@@ -115,7 +110,7 @@ def identify(
     progress: Callable[[str], None] = lambda _: None,
     seed: int = 0,
     jobs: int | None = None,
-) -> "Identification | CaptureIdentification | DockingIdentification":
+) -> "Identification | SimulatedIdentification":
     """Fit all parameters of a model to all recordings jointly.
 
     Parameters
@@ -139,16 +134,10 @@ def identify(
     """
     for recording in holdout:
         demand_apart(recordings, recording)
-    if isinstance(model.tree, SnareTree):
-        # Loaded here: numba takes longer to load than a short arm to fit.
-        from .snare.identify import identify_captures
-
-        return identify_captures(model, recordings, holdout, progress=progress, jobs=jobs)
+    simulated = simulated_kind(model.tree)
+    if simulated is not None:
+        return simulated.identify(model, recordings, holdout, progress=progress, jobs=jobs)
     demand_one_process(model, jobs)
-    if isinstance(model.tree, DockingTree):
-        from .docking.identify import identify_dockings
-
-        return identify_dockings(model, recordings, holdout, progress=progress)
     progress("reading and conditioning the recordings")
     read = read_all(model, [*recordings, *holdout])
     model = with_recorded_joints(model, read)
@@ -171,15 +160,6 @@ def identify(
     model = settled(replace(model, values=values))
     notes = (*said, *notes_on(found))
     return Identification(model, found, tuple(train), tuple(locked), base, inertia, checks, notes)
-
-
-def demand_one_process(model: Model, jobs: int | None) -> None:
-    """Raise InputError where a number of processes is asked for and nothing is simulated in them."""
-    if jobs is not None:
-        raise InputError(
-            f"{model.path}: jobs = {jobs}; only captures are simulated in several processes, and system = "
-            f"{model.system!r} is computed in one; leave it out"
-        )
 
 
 def physical(found: Fit, experiments: Sequence[Experiment]) -> tuple[Fit, ConsistentInertia | None]:

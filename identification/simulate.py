@@ -7,16 +7,14 @@ import numpy as np
 import xarray as xr
 
 from ..errors import InputError
-from ..models.docking.bench_setup import DockingTree
-from ..models.floating.tree import FloatingTree
 from ..models.model import Model
 from ..models.rigid_body import RigidBody
-from ..models.snare.setup import SnareTree
 from .empirical import beyond
 from .fitting.assembly import TorqueModel
 from .fitting.base_parameters import INERTIAL
 from .fitting.experiment import load_experiments, scales
 from .simulate_floating import simulate_floating
+from .simulated import simulated_kind
 
 
 def simulate(model: Model, motion: str | Path | None) -> xr.Dataset:
@@ -28,7 +26,7 @@ def simulate(model: Model, motion: str | Path | None) -> xr.Dataset:
         Its file must hold values of all parameters that its effects have; `identify` or `diagnose` saves such a file.
     motion : path or None
         Recording with the position of every joint; a recorded torque is not used. A capture needs none
-        (`simulate_capture`).
+        (`identification.snare.simulate`).
 
     Returns
     -------
@@ -42,22 +40,16 @@ def simulate(model: Model, motion: str | Path | None) -> xr.Dataset:
         A parameter without a value, or whatever is wrong with the recording.
     """
     tree = model.tree
-    if isinstance(tree, SnareTree):
-        # Loaded here: numba takes longer to load than a short arm to fit.
-        from .snare.simulate import simulate_capture
-
-        return simulate_capture(model, motion)
-    if isinstance(tree, DockingTree):
-        from .docking.simulate import simulate_docking
-
-        return simulate_docking(model, motion)
+    simulated = simulated_kind(tree)
+    if simulated is not None:
+        return simulated.simulate(model, motion)
     if motion is None:
         raise InputError(f"{model.path}: system = {model.system!r} follows a motion; give --motion RECORDING")
-    read = [] if isinstance(tree, FloatingTree) else load_experiments(model, [motion], RigidBody(tree), torque=False)
+    read = [] if tree.carriers else load_experiments(model, [motion], RigidBody(tree), torque=False)
     inertial = [f"inertia.{link.name}.{name}" for link in model.tree.links for name in INERTIAL]
     model.demand_values(*(inertial if model.inertia == "free" else ()))
-    if isinstance(tree, FloatingTree):
-        return simulate_floating(model, tree, motion)
+    if tree.carriers:
+        return simulate_floating(model, motion)
     (experiment,) = read
     assembly = TorqueModel(model.tree, model.effects, None, scales([experiment]), model.values)
     recorded = experiment.motion

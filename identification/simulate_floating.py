@@ -30,15 +30,13 @@ from .fitting.recorded import read_motion
 Array = NDArray[np.float64]
 
 
-def simulate_floating(model: Model, tree: FloatingTree, motion: str | Path) -> xr.Dataset:
+def simulate_floating(model: Model, motion: str | Path) -> xr.Dataset:
     """Motion of the base and torque of the joints along a recorded motion of the joints.
 
     Parameters
     ----------
     model : Model
-        With values of all parameters.
-    tree : FloatingTree
-        Its tree.
+        Of a floating base, with values of all parameters.
     motion : path
         Recording with the position of every joint; torque is not used.
 
@@ -53,6 +51,7 @@ def simulate_floating(model: Model, tree: FloatingTree, motion: str | Path) -> x
     InputError
         An effect that displaces links, a recording with a gap, or no finite motion.
     """
+    tree = model.tree_as(FloatingTree)
     for p in model.effects:
         if p.effect.acts_on == "position":
             raise InputError(

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TypeVar
 
 from ..errors import InputError
 from ..recordings.cuts import Cuts
@@ -18,6 +19,8 @@ from .servo import Servo
 from .snare.setup import SnareTree, snare_places
 from .transmission import Transmission
 from .tree import Tree
+
+OfTree = TypeVar("OfTree", bound=Tree)
 
 
 @dataclass(frozen=True)
@@ -96,6 +99,12 @@ class Model:
         """The model with more effects, and with a fit's parameters."""
         return replace(self, effects=(*self.effects, *added), values={**self.values, **values})
 
+    def tree_as(self, kind: type[OfTree]) -> OfTree:
+        """The tree, one of a kind; raises InputError where the model is of another system."""
+        if not isinstance(self.tree, kind):
+            raise InputError(f"{self.path}: system = {self.system!r} has no {kind.__name__}; give a model that has one")
+        return self.tree
+
     def demand_values(self, *more: str) -> None:
         """Raise InputError where a parameter of the effects, or one of ``more``, has no value."""
         wanted = [*more, *(f"{p.key}.{x.name}" for p in self.effects for x in p.effect.parameters)]
@@ -133,7 +142,7 @@ def places(effect: Effect, tree: Tree) -> tuple[str, ...]:
 def all_places(effect: Effect, tree: Tree) -> tuple[str, ...]:
     """`places`, and axes of several joints: there an effect acts only if the model file names the axis."""
     own = places(effect, tree)
-    if effect.at != "joint" or effect.acts_on != "torque" or isinstance(tree, SnareTree | DockingTree):
+    if effect.at != "joint" or effect.acts_on != "torque" or tree.simulated_as:
         return own
     unasked = neighbours(tree, tree.carriers) if effect.neighbours == "too" else ()
     stated = [axis for axis in tree.axes if len(axis.along) > 1]

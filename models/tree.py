@@ -137,6 +137,11 @@ class Tree:
         return 0
 
     @property
+    def simulated_as(self) -> str:
+        """Kind of recording that only a simulation of everything predicts; "" where a motion gives the torques."""
+        return ""
+
+    @property
     def balanced(self) -> bool:
         """Whether its weight is taken wherever it stands, by what moves with it."""
         return False

@@ -6,11 +6,9 @@ from pathlib import Path
 import xarray as xr
 
 from ...errors import InputError
-from ...models.docking.bench_setup import DockingTree
 from ...models.model import Model
 from ...models.model_file import load_model
 from ...models.rigid_body import RigidBody
-from ...models.snare.setup import SnareTree
 from ..fitting.constants import with_constants
 from ..fitting.experiment import Experiment, load_experiments, with_silence
 from ..fitting.recorded import read_all, with_recorded_joints
@@ -28,7 +26,7 @@ def check(
     For a recording that cannot be conditioned, only the checks before conditioning are made."""
     if not recordings:
         raise InputError("recordings: none is given; give one or more")
-    if isinstance(model.tree, SnareTree | DockingTree):
+    if model.tree.simulated_as:
         raise InputError(f"{model.path}: system = {model.system!r} has no joints that could be checked")
     progress("reading and conditioning the recordings")
     datasets = read_all(model, recordings)

@@ -7,6 +7,7 @@ from pathlib import Path
 from ...models.model import Model
 from ...recordings.part import several
 from ..diagnosis import Diagnosis
+from ..simulated import demand_one_process
 from ..sources.answer import with_found
 from ..sources.decide import decide
 from ..sources.own import settled
@@ -20,6 +21,7 @@ def diagnose_dockings(
     holdout: str | Path | Sequence[str | Path],
     *,
     progress: Callable[[str], None] = lambda _: None,
+    jobs: int | None = None,
 ) -> tuple[Diagnosis, Model]:
     """Find, name, add and confirm the physics that a docking's model leaves out.
 
@@ -31,6 +33,8 @@ def diagnose_dockings(
     holdout : path, or sequence of them
         Looked at for the proof only.
     progress : callable
+    jobs : None
+        Dockings are simulated in one process.
 
     Returns
     -------
@@ -41,6 +45,7 @@ def diagnose_dockings(
     InputError
         Whatever is wrong with a recording, or a model that cannot be simulated from where it starts.
     """
+    demand_one_process(model, jobs)
     begun = time.monotonic()
     progress("reading the recordings")
     source = Dockings(model, recordings, several(holdout))

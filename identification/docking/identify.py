@@ -10,6 +10,7 @@ import numpy as np
 from ...models.model import Model
 from ..evidence.arm import WeighedRecordings
 from ..parameter_list import parameter_list
+from ..simulated import demand_one_process
 from ..sources.answer import estimates, rms, with_found
 from ..sources.fit import deviations, linearised
 from ..sources.own import fitted, known
@@ -55,8 +56,10 @@ def identify_dockings(
     holdout: Sequence[str | Path] = (),
     *,
     progress: Callable[[str], None] = lambda _: None,
+    jobs: int | None = None,
 ) -> DockingIdentification:
     """Fit every parameter of a docking's effects; arguments and errors as `diagnose_dockings`."""
+    demand_one_process(model, jobs)
     progress("reading the recordings")
     source, given = Dockings(model, recordings, holdout), known(model, start(model))
     progress("fitting the effects' parameters with the simulation in the loop")

@@ -37,13 +37,13 @@ def simulate_docking(model: Model, motion: str | Path | None = None) -> xr.Datas
     InputError
         A parameter without a value, no motion, or whatever is wrong with it.
     """
-    assert isinstance(model.tree, DockingTree)
+    setup = model.tree_as(DockingTree).setup
     model.demand_values()
     if motion is None:
         raise InputError(f"{model.path}: system = 'docking' follows a test; give --motion RECORDING")
     (record,) = load_records(model, [motion])
     m = record.motion
-    seen = DockingRuns(model.tree.setup, [record]).seen(0, start(model).all_values, np.zeros(len(SHIFTS)))
+    seen = DockingRuns(setup, [record]).seen(0, start(model).all_values, np.zeros(len(SHIFTS)))
     if seen is None:
         raise InputError(f"{model.path}: the docking cannot be simulated from where {motion} starts; check [docking]")
     columns = {name: seen[:, c] for c, name in enumerate(SEEN) if not name.startswith("turn.")}

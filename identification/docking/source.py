@@ -33,10 +33,10 @@ class Dockings(DockingRuns):
 
     def __init__(self, model: Model, train: Sequence[str | Path], held: Sequence[str | Path] = ()) -> None:
         """Read the recordings; raises InputError for whatever is wrong with one."""
-        assert isinstance(model.tree, DockingTree)
+        setup = model.tree_as(DockingTree).setup
         if not train:
             raise InputError("recordings: none is given; give one or more")
-        super().__init__(model.tree.setup, load_records(model, [*train, *held]))
+        super().__init__(setup, load_records(model, [*train, *held]))
         self.train, self.held = range(len(train)), range(len(train), len(self.records))
         self.channels = self.records[0].channels
 

@@ -10,6 +10,7 @@ the channel into N·m, which bounds, grids and weights refer to, and drops out o
 model's masses: were these, and the friction with them, larger by a factor, it would be larger by the same.
 """
 
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
@@ -179,7 +180,19 @@ def _unknown(model: Model) -> tuple[str, ...]:
 
 
 def _viscous(model: Model, joint: str) -> bool:
-    return any(p.effect.name == "viscous_friction" and p.at == joint and not p.hold for p in model.effects)
+    return any(_damps(p.effect) and p.at == joint and not p.hold for p in model.effects)
+
+
+@cache
+def _damps(effect: Effect) -> bool:
+    """Is a law in proportion to the joint's speed, and no more?"""
+    if effect.at != "joint" or effect.states or effect.others or effect.acts_on != "torque":
+        return False
+    speed = ca.SX.sym("qd")
+    signals = defaultdict(lambda: ca.SX.sym("another"), {"qd": speed})
+    law = effect.law(signals, {p.name: ca.SX(p.grid[0] if p.grid else 1.0) for p in effect.parameters})
+    slope = ca.simplify(ca.jacobian(law, speed))
+    return len(signals) == 1 and not ca.symvar(slope) and float(slope) != 0.0
 
 
 def _held(model: Model, joint: str, servo: Servo) -> tuple[str, ...]:

@@ -25,8 +25,8 @@ def friction_curves(found: Fit, experiments: list[Experiment] | tuple[Experiment
     assembly = found.assembly
     places: dict[tuple[str, str], list[tuple[int, PlacedEffect]]] = {}
     for k, p in enumerate(assembly.placed):
-        friction = p.effect.family == "joint friction" or p.effect.at == "slide"
-        if friction and not p.effect.states and set(reads(p.effect)) <= {"qd", "speed_scale"}:
+        opposes = p.effect.at in ("joint", "slide") and p.effect.acts_on == "torque"
+        if opposes and not p.effect.states and "qd" in (own := set(reads(p.effect))) and own <= {"qd", "speed_scale"}:
             places.setdefault((p.effect.at, p.at), []).append((k, p))
     curves = []
     for (kind, at), members in places.items():

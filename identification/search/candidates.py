@@ -25,8 +25,6 @@ MOST_VARIANTS = 36
 MOST_OF_WHOLE = 1.6
 """Most that a law's whole contribution at a point of its grid is multiplied by: beyond, another point is meant."""
 
-SLIDE = "slide_friction"
-
 MOST_COMBINED = 4
 """Most columns of a link effect of which every combination is tried."""
 
@@ -70,9 +68,10 @@ class EffectVariant:
 def library(model: Model) -> list[PlacedEffect]:
     """Every effect at every place that the model does not have and that its kind of inertia allows."""
     have = {p.key for p in model.effects}
-    if f"{SLIDE}.{model.joints[0]}" in have:
-        # The first joint's slides act on it alone, so that the same law at the joint is the same column.
-        have |= {f"{name}.{model.joints[0]}" for name in _makkar()}
+    for p in model.effects:
+        if p.effect.at == "slide" and p.at == model.joints[0]:
+            # The first joint's slides act on it alone, so that the same law at the joint is the same column.
+            have |= {f"{name}.{p.at}" for name in _at_joints(p.effect)}
     found = []
     for effect in effects().values():
         if effect.at == "link" and model.inertia == "free":
@@ -80,7 +79,7 @@ def library(model: Model) -> list[PlacedEffect]:
         if model.inertia == "free" and len(model.joints) == 1 and _scales(effect):
             continue  # a factor on the one torque is a factor on all that is identified
         spots = all_places(effect, model.tree)
-        if effect.name == "sensor_delay":
+        if effect.at == "sensor" and effect.states:
             # A torque channel is late or, where the encoder is late, early: one of the two.
             arm = model.joints[model.tree.carriers :]
             other = {f"tau.{j}": f"q.{j}" for j in arm} | {f"q.{j}": f"tau.{j}" for j in arm}
@@ -102,10 +101,10 @@ def _scales(effect: Effect) -> bool:
     return float(read(0)) == 0 and abs(float(read(3)) - 3 * float(read(1))) < 1e-12
 
 
-def _makkar() -> tuple[str, ...]:
-    """Makkar's law and what it contains; the law of slides is the same."""
-    law = effects()["makkar_friction"]
-    return law.name, *law.contains
+def _at_joints(effect: Effect) -> list[str]:
+    """Joint effects of the same law, and what these contain."""
+    same = [x for x in effects().values() if x.at == "joint" and x.law is effect.law]
+    return [name for x in same for name in (x.name, *x.contains)]
 
 
 def variants(assembly: TorqueModel, placed: PlacedEffect) -> list[EffectVariant]:

@@ -193,7 +193,7 @@ def _traces(source: Captures, decided: Decision) -> tuple[Trace, ...]:
 
 def with_found(model: Model, at: ModelPoint) -> Model:
     """The model with what was found: effects, their values, and numbers of the set-up."""
-    assert isinstance(model.tree, SnareTree)
-    tree = replace(model.tree, setup=model.tree.setup.corrected(at.all_values))
+    tree = model.tree_as(SnareTree)
+    tree = replace(tree, setup=tree.setup.corrected(at.all_values))
     effects = [p.key for p in at.placed if p.effect.name in NUMBERS]
     return replace(with_effects(model, at.without(*effects)), tree=tree)

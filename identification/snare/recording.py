@@ -82,7 +82,7 @@ def load_captures(model: Model, paths: Sequence[str | Path]) -> list[CaptureReco
 
 
 def _capture(model: Model, path: str | Path, data: xr.Dataset) -> CaptureRecording:
-    assert isinstance(model.tree, SnareTree)
+    given = model.tree_as(SnareTree).setup
     body = body_of(path, data)
     time = data["time"].values
     zero, span = float(time[0]), float(time[-1] - time[0])
@@ -99,7 +99,7 @@ def _capture(model: Model, path: str | Path, data: xr.Dataset) -> CaptureRecordi
     if all(f"quat.{body}.{axis}" in data for axis in QUATERNION):
         turn = attitude(data, body, path)
     else:
-        turn = np.tile(model.tree.setup.target.orientation, (len(time), 1))
+        turn = np.tile(given.target.orientation, (len(time), 1))
         notes.append(f"quat.{body} is not recorded; its orientation is the model's")
     if not np.any(np.isfinite(turn).all(1) & start):
         raise InputError(
@@ -109,7 +109,7 @@ def _capture(model: Model, path: str | Path, data: xr.Dataset) -> CaptureRecordi
     if not np.all(np.isfinite(position)):
         raise InputError(f"{path}: pos.{body} has no sample in the first {BEFORE:g} s; give its start")
     orientation = _mean_turn(turn[start])
-    target = replace(model.tree.setup.target, position=position, velocity=velocity, orientation=orientation)
+    target = replace(given.target, position=position, velocity=velocity, orientation=orientation)
     if not target.rotates and (largest := _turned(turn, orientation)) > STILL:
         notes.append(
             f"the target turned by {np.degrees(largest):.2g} deg, which the model leaves out: give [capture] inertia"
@@ -122,7 +122,7 @@ def _capture(model: Model, path: str | Path, data: xr.Dataset) -> CaptureRecordi
     open_snare = int(BEFORE / EVERY)
     noise = {of: _scatter(force[1:open_snare]) for of, force in forces.items()}
     noise["position"] = _scatter(np.diff(measured.position[:open_snare], axis=0)) / np.sqrt(2)
-    setup = replace(model.tree.setup, target=target)
+    setup = replace(given, target=target)
     carried = {of: _scatter(force) for of, force in forces.items()}
     return CaptureRecording(str(path), body, times, measured, sensors, setup, drive, zero, noise, carried, tuple(notes))
 

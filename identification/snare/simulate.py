@@ -40,9 +40,8 @@ def simulate_capture(model: Model, motion: str | Path | None = None) -> xr.Datas
     """
     from ...models.snare.model import SnareModel, SnareStepError
 
-    assert isinstance(model.tree, SnareTree)
     model.demand_values()
-    setup, drive, duration, zero, body, sensor = model.tree.setup, None, DURATION, 0.0, "target", "ring"
+    setup, drive, duration, zero, body, sensor = model.tree_as(SnareTree).setup, None, DURATION, 0.0, "target", "ring"
     if motion is not None:
         (given,) = load_captures(model, [motion])
         setup, drive, duration, zero, body = given.setup, given.drive, float(given.times[-1]), given.zero, given.body

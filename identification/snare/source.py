@@ -44,8 +44,8 @@ class Captures:
 
     def __init__(self, model: Model, records: Sequence[CaptureRecording], n_train: int, runs: CaptureRuns) -> None:
         """Simulate nothing yet."""
-        assert isinstance(model.tree, SnareTree)
-        self.model, self.setup, self.records, self.runs = model, model.tree.setup, tuple(records), runs
+        self.setup = model.tree_as(SnareTree).setup
+        self.model, self.records, self.runs = model, tuple(records), runs
         self.train, self.held = range(n_train), range(n_train, len(records))
         self.channels = channels(self.records[0])
         self._measured = [seen(r, r.measured) for r in self.records]
@@ -197,11 +197,10 @@ class Captures:
 
 def start(model: Model) -> ModelPoint:
     """The model as given; a parameter without a value starts at what hardware usually has."""
-    assert isinstance(model.tree, SnareTree)
-    values = {}
+    setup, values = model.tree_as(SnareTree).setup, {}
     for p in model.effects:
         (x,) = p.effect.parameters
-        usual = model.tree.setup.usual(p.effect.name) if APPLIED[p.effect.name].absent is None else x.grid[0]
+        usual = setup.usual(p.effect.name) if APPLIED[p.effect.name].absent is None else x.grid[0]
         values[f"{p.key}.{x.name}"] = model.values.get(f"{p.key}.{x.name}", usual)
     return ModelPoint.of(model.effects, values, len(TOLERANCES))
 

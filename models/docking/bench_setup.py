@@ -126,6 +126,11 @@ class DockingTree(Tree):
     def __post_init__(self) -> None:
         """Nothing that the recursions of joints could refuse."""
 
+    @property
+    def simulated_as(self) -> str:
+        """A docking test."""
+        return "docking"
+
 
 def docking_places(at: str) -> tuple[str, ...]:
     """Where an effect of a kind of place acts in a docking; nowhere if it cannot."""

@@ -111,6 +111,11 @@ class SnareTree(Tree):
     def __post_init__(self) -> None:
         """Nothing that the recursions of joints could refuse."""
 
+    @property
+    def simulated_as(self) -> str:
+        """A capture."""
+        return "snare"
+
 
 def snare_places(name: str, tree: SnareTree) -> tuple[str, ...]:
     """Where an effect acts in a capture; nowhere if it cannot."""

@@ -3,8 +3,6 @@
 # pyright: reportArgumentType=false
 
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -26,9 +24,12 @@ from snarelab.identification.snare.recording import (
     check_sensors,
     sensed_by,
 )
+from snarelab.models.model import Model
 from snarelab.models.snare.setup import read_setup
 
-MODEL: Any = SimpleNamespace(tree=read_setup(Path("model.toml"), "model", {"target": "free"}, [0.0, 0.0, 0.0]))
+FILE = Path("model.toml")
+TREE = read_setup(FILE, "model", {"target": "free"}, [0.0, 0.0, 0.0])
+MODEL = Model(FILE, "model", "snare_capture", None, TREE, "fixed", (), {}, None, {})
 """A floating target without inertia: it keeps its orientation."""
 
 
