@@ -31,6 +31,13 @@ def standing(record: DockingRecording) -> NDArray[np.bool_]:
     return (slowest < STICKS[0][0] * np.abs(rate).max()) | (rate[1:] * rate[:-1] < 0)
 
 
+def slid(record: DockingRecording) -> NDArray[np.bool_]:
+    """Windows (n,) since the carriage first moved under closed latches: the seats slid then, and what their friction
+    keeps of the preload from then on no law of contact tells."""
+    closed = record.times[1:] > record.motion.latch[1]
+    return np.logical_or.accumulate(closed & ~standing(record))
+
+
 def noise_channels(
     records: Sequence[DockingRecording], linear: Linearisation, could: Sequence[Sequence[Array]], scale: Array
 ) -> list[list[NoiseChannel]]:
@@ -39,7 +46,8 @@ def noise_channels(
     While balls touch and slide no law of contact tells the load to the window: a channel may then be off, as a joint
     near rest may hold any torque, by what nothing explains there, in the RMS over `ABOUT` windows either way, and by
     `LEAST_LEVEL` of its size at least, a vector's of the largest of its axes. A motor whose carriage stands may hold
-    anything up to its friction. Where a channel changes fast it may be off by more, which the noise learns.
+    anything up to its friction. A latch's pull may wander once its seat has slid (`slid`). Where a channel changes fast
+    it may be off by more, which the noise learns.
 
     Parameters
     ----------
@@ -60,18 +68,36 @@ def noise_channels(
         rows = [(standing(r) & (name == "tau.carriage")) if driven else k for r, k in zip(records, loose, strict=True)]
         left = np.concatenate([r[k, c] for r, k in zip(linear.residuals, rows, strict=True)])
         columns = np.concatenate([x[k] for x, k in zip(could[c], rows, strict=True)])
-        if len(left) > 2 * columns.shape[1]:
-            left = left - columns @ np.linalg.lstsq(columns, left, rcond=1e-6)[0]
-            left *= np.sqrt(len(left) / (len(left) - columns.shape[1]))
+        touches = _touches(rows)
+        left = _unexplained(left, columns, touches)
         ends = np.cumsum([k.sum() for k in rows])[:-1]
-        for own, part, k, x in zip(found, np.split(left, ends), rows, seen, strict=True):
+        for own, part, k, r, x in zip(found, np.split(left, ends), rows, records, seen, strict=True):
             energy, count = np.zeros(len(k)), np.convolve(k, np.ones(2 * ABOUT + 1), "same")
             energy[k] = part**2
             energy = np.convolve(energy, np.ones(2 * ABOUT + 1), "same") / np.maximum(count, 1)
             sticks = np.where(k, np.maximum(np.sqrt(energy), least[c]), 0.0)
             n = len(k)
-            own.append(NoiseChannel(EVERY, (slice(0, n),), np.zeros(n), (sticks,), _change(x)[:, c], 1.0))
+            wanders = slid(r).astype(float) if name.startswith("tension.") else 1.0
+            own.append(NoiseChannel(EVERY, (slice(0, n),), np.zeros(n), (sticks,), _change(x)[:, c], 1.0, wanders))
     return found
+
+
+def _unexplained(left: Array, columns: Array, touch: NDArray[np.int_]) -> Array:
+    """What is left (n,) in each touch by what could explain the others (n, k), or by nothing where that is nearer.
+
+    A touch is short, and a few columns explain any one: what it has in common with no other is noise.
+    """
+    found = left.copy()
+    for own in (touch == x for x in np.unique(touch)):
+        rest = left[own] - columns[own] @ np.linalg.lstsq(columns[~own], left[~own], rcond=1e-6)[0]
+        found[own] = np.where(np.abs(rest) < np.abs(left[own]), rest, left[own])
+    return found
+
+
+def _touches(rows: Sequence[NDArray[np.bool_]]) -> NDArray[np.int_]:
+    """Number (n,) of the touch that each of these windows is in: a run of them in one recording."""
+    begun = [k & ~np.concatenate([[False], k[:-1]]) for k in rows]
+    return np.cumsum(np.concatenate(begun))[np.concatenate(list(rows))]
 
 
 def _change(seen: Array) -> Array:

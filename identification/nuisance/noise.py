@@ -1,6 +1,6 @@
 """The noise of one channel: white, coloured, wandering, of the encoders, and of sticking near rest.
 
-    K = w² I + a² e^(-|d|/τa) + v² e^(-|d|/τv) + encoders + s F (I + e^(-|d|/τh)) s F + diag((s' g)²)
+    K = w² I + a² e^(-|d|/τa) + m v e^(-|d|/τv) v m + encoders + s F (I + e^(-|d|/τh)) s F + diag((s' g)²)
 
 The scales are those of highest marginal likelihood beside everything that could explain the residual: beside the
 baseline alone the noise would learn the missing physics, and then hide it.
@@ -35,8 +35,8 @@ AVERAGED = 0.25
 @dataclass(frozen=True)
 class NoiseChannel:
     """One channel of one recording, as its noise sees it: period [s], segments, noise of the encoders (n,) [T], shares
-    of every sample near rest (n,), for each width that this may have, and about it, and the level [T] that a joint may
-    hold at rest."""
+    of every sample near rest (n,), for each width that this may have, and about it, the level [T] that a joint may hold
+    at rest, and where it may wander, m (n,), 0 to 1: everywhere if it is not given."""
 
     step: float
     segments: tuple[slice, ...]
@@ -44,12 +44,14 @@ class NoiseChannel:
     sticks: tuple[Array, ...]
     settles: Array
     level: float
+    wanders: Array | float = 1.0
 
     def some(self, rows: slice) -> "NoiseChannel":
         """The first samples of this channel."""
         inside = tuple(slice(s.start, min(s.stop, rows.stop)) for s in self.segments if s.start < rows.stop)
         sticks = tuple(x[rows] for x in self.sticks)
-        return NoiseChannel(self.step, inside, self.encoder[rows], sticks, self.settles[rows], self.level)
+        wanders = self.wanders if isinstance(self.wanders, float) else self.wanders[rows]
+        return NoiseChannel(self.step, inside, self.encoder[rows], sticks, self.settles[rows], self.level, wanders)
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,7 @@ class Noise:
         held = FirstOrderNoise(run.level * sticks, HELD)
         processes = [
             FirstOrderNoise(self.coloured, self.coloured_time),
-            FirstOrderNoise(self.wander, self.wander_time),
+            FirstOrderNoise(self.wander * run.wanders, self.wander_time),
             held,
         ]
         heard = np.any(run.encoder**2 >= NEGLIGIBLE * variance)
@@ -106,7 +108,8 @@ def learn(
     size, most = float(np.std(whole)) + 1e-12, float(np.sqrt(np.mean(whole**2))) + 1e-12
     stretch = [slice(0, min(len(r), max(STRETCH // len(runs), 100))) for r in residuals]
     parts = [
-        (_beside(r[rows], c[rows]), run.some(rows))
+        # Whatever is slow there is no matter of the fast scales.
+        (_beside(r[rows], c[rows]), replace(run.some(rows), wanders=1.0))
         for r, c, run, rows in zip(residuals, columns, runs, stretch, strict=True)
     ]
 
@@ -174,7 +177,8 @@ def _averaged(residual: Array, columns: Array, run: NoiseChannel) -> tuple[Array
         count += len(own)
     rows = np.concatenate(starts)[:, None] + np.arange(length)
     sticks, settles = tuple(x[rows].mean(axis=1) for x in run.sticks), run.settles[rows].mean(axis=1)
-    other = NoiseChannel(run.step * length, tuple(segments), np.zeros(count), sticks, settles, run.level)
+    wanders = run.wanders if isinstance(run.wanders, float) else run.wanders[rows].mean(axis=1)
+    other = NoiseChannel(run.step * length, tuple(segments), np.zeros(count), sticks, settles, run.level, wanders)
     return _beside(residual[rows].mean(axis=1), columns[rows].mean(axis=1)), other
 
 

@@ -1,5 +1,6 @@
 """Scales of the noise learnt on data in which one nuisance alone is present, drawn by its own recipe."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -72,6 +73,22 @@ def test_a_level_that_wanders_is_found_beside_what_it_could_be_taken_for(seed):
     found = learnt(drawn + 0.3 * rng.normal(size=n), run(n=n))
     assert 0.3 < found.wander < 2.0
     assert found.white == pytest.approx(0.3, rel=0.3)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_level_that_may_wander_only_late_is_found_there_and_nothing_is_excused_before(seed):
+    """A pull that keeps an unknown share of its load once its seat slid: known to a millinewton before."""
+    rng = np.random.default_rng(60 + seed)
+    n = 2 * N
+    late = (np.arange(n) >= N).astype(float)
+    residual = late * process(rng, 0.7, 8.0, n) + 0.03 * rng.normal(size=n)
+    own = replace(run(n=n), wanders=late)
+    found = learnt(residual, own)
+    assert 0.2 < found.wander < 2.0
+    noise = found.covariance(own)
+    size = [1 / np.sqrt(float(k @ noise.solve(k))) for k in (1 - late, late)]
+    assert size[0] < 0.01, "a shift before"
+    assert size[1] > 0.1, "a shift after"
 
 
 @pytest.mark.parametrize("seed", range(3))
