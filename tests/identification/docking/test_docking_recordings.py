@@ -1,5 +1,6 @@
 """Docking recordings: what is read of them, what is refused, and what a diagnosis says of one by another engine."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from snarelab.errors import InputError
 from snarelab.identification.diagnose import diagnose
 from snarelab.identification.docking.recording import EVERY, load_records
 from snarelab.identification.docking.runs import SHIFTS, DockingRuns
+from snarelab.identification.identify import identify
 from snarelab.identification.simulate import simulate
 from snarelab.models.docking.bench import NEVER
 from snarelab.models.model_file import load_model
@@ -123,6 +125,29 @@ def test_a_simulation_follows_the_test_and_is_remembered(tmp_path, model):
     assert moved is not None
     # The pose is as it was measured: its registration does not move what nothing touches.
     np.testing.assert_allclose(moved[:, 1], once[:, 1], atol=1e-9)
+
+
+def test_a_carriages_friction_is_identified_from_its_closed_form(tmp_path, model):
+    """Nothing touches, and the motor's force is level + coefficient * speed at two speeds."""
+    rng = np.random.default_rng(1)
+    time = told()["time"] - 7.0
+    paths = []
+    for name, slow in (("a.csv", 0.002), ("b.csv", 0.004)):
+        rate = np.where(time < 0.5, 0.0, np.where(time < 1.6, 0.008, slow))
+        travel = np.concatenate([[0.0], np.cumsum(rate)[:-1] / RATE])
+        motor = np.where(rate > 0, 35.0 + 900.0 * rate, 0.0) + 0.2 * rng.normal(size=len(time))
+        changed = {"q.carriage [m]": travel, "tau.carriage [N]": motor}
+        columns = told(changed=changed)
+        paths.append(written(tmp_path, {k: x for k, x in columns.items() if k != "closed.latches"}, name))
+    free = replace(model, values={k: x for k, x in model.values.items() if k.startswith("docking_friction")})
+    found = identify(free, paths[:1], paths[1:])
+    said = found.to_json()
+    by_name = {p["name"]: p for p in said["parameters"] if p["effect"] == "carriage_friction"}
+    for name, truth in (("level", 35.0), ("viscous", 900.0)):
+        assert by_name[name]["value"] == pytest.approx(truth, rel=0.1)
+        assert abs(by_name[name]["value"] - truth) < 4 * by_name[name]["std"]
+    assert said["fit"]["tau.carriage"]["holdout"]["relative"] < 0.1
+    assert found.model.values["carriage_friction.carriage.level"] == by_name["level"]["value"]
 
 
 def test_presliding_is_known_to_a_factor_and_stays_above_zero(tmp_path, model, monkeypatch):
