@@ -97,7 +97,8 @@ def _unexplained(left: Array, columns: Array, touch: NDArray[np.int_]) -> Array:
 def _touches(rows: Sequence[NDArray[np.bool_]]) -> NDArray[np.int_]:
     """Number (n,) of the touch that each of these windows is in: a run of them in one recording."""
     begun = [k & ~np.concatenate([[False], k[:-1]]) for k in rows]
-    return np.cumsum(np.concatenate(begun))[np.concatenate(list(rows))]
+    number: NDArray[np.int_] = np.cumsum(np.concatenate(begun), dtype=int)
+    return number[np.concatenate(list(rows))]
 
 
 def _change(seen: Array) -> Array:

@@ -50,7 +50,7 @@ class NoiseChannel:
         """The first samples of this channel."""
         inside = tuple(slice(s.start, min(s.stop, rows.stop)) for s in self.segments if s.start < rows.stop)
         sticks = tuple(x[rows] for x in self.sticks)
-        wanders = self.wanders if isinstance(self.wanders, float) else self.wanders[rows]
+        wanders = self.wanders[rows] if isinstance(self.wanders, np.ndarray) else self.wanders
         return NoiseChannel(self.step, inside, self.encoder[rows], sticks, self.settles[rows], self.level, wanders)
 
 
@@ -177,7 +177,7 @@ def _averaged(residual: Array, columns: Array, run: NoiseChannel) -> tuple[Array
         count += len(own)
     rows = np.concatenate(starts)[:, None] + np.arange(length)
     sticks, settles = tuple(x[rows].mean(axis=1) for x in run.sticks), run.settles[rows].mean(axis=1)
-    wanders = run.wanders if isinstance(run.wanders, float) else run.wanders[rows].mean(axis=1)
+    wanders = run.wanders[rows].mean(axis=1) if isinstance(run.wanders, np.ndarray) else run.wanders
     other = NoiseChannel(run.step * length, tuple(segments), np.zeros(count), sticks, settles, run.level, wanders)
     return _beside(residual[rows].mean(axis=1), columns[rows].mean(axis=1)), other
 

@@ -3,14 +3,15 @@
 import pytest
 
 from snarelab.fmu import shipped
+from snarelab.fmu.elements import ELEMENTS
 
-NAME = sorted(shipped.ELEMENTS)[0]
+NAME = sorted(ELEMENTS)[0]
 
 
 @pytest.fixture
 def one(monkeypatch):
     """One element, and no participant."""
-    monkeypatch.setattr(shipped, "ELEMENTS", {NAME: shipped.ELEMENTS[NAME]})
+    monkeypatch.setattr(shipped, "ELEMENTS", {NAME: ELEMENTS[NAME]})
     monkeypatch.setattr(shipped, "participant_names", tuple)
 
 

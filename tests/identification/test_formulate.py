@@ -72,7 +72,7 @@ def as_found(effect):
 
 def chosen(over, term, values, times="", ends=((-1.0, 1.0), (-1.0, 1.0))):
     """A formula of one term, as if it had been found."""
-    knots = tuple(tuple(np.linspace(*e, 5).tolist()) for e, _ in zip(ends, over, strict=False))
+    knots = tuple(tuple(np.linspace(low, high, 5).tolist()) for (low, high), _ in zip(ends, over, strict=False))
     formula = TableFormula((term,), (np.array(values),), 1.0, 0.0)
     return FormulaChoice("joint1", Table(over, times, knots), formula, ())
 
