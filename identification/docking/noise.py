@@ -83,9 +83,10 @@ def noise_channels(
 
 
 def _unexplained(left: Array, columns: Array, touch: NDArray[np.int_]) -> Array:
-    """What is left (n,) in each touch by what could explain the others (n, k), or by nothing where that is nearer.
+    """What is left (n,) in each touch, or stand of the carriage, by what could explain the others (n, k), or by nothing
+    where that is nearer.
 
-    A touch is short, and a few columns explain any one: what it has in common with no other is noise.
+    Each is short, and a few columns explain any one: what it has in common with no other is noise.
     """
     found = left.copy()
     for own in (touch == x for x in np.unique(touch)):
@@ -95,7 +96,7 @@ def _unexplained(left: Array, columns: Array, touch: NDArray[np.int_]) -> Array:
 
 
 def _touches(rows: Sequence[NDArray[np.bool_]]) -> NDArray[np.int_]:
-    """Number (n,) of the touch that each of these windows is in: a run of them in one recording."""
+    """Number (n,) of the touch, or stand, that each of these windows is in: a run of them in one recording."""
     begun = [k & ~np.concatenate([[False], k[:-1]]) for k in rows]
     number: NDArray[np.int_] = np.cumsum(np.concatenate(begun), dtype=int)
     return number[np.concatenate(list(rows))]
