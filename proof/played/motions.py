@@ -19,7 +19,10 @@ DAMPING = 0.05
 
 
 def motion(rng: Rng, arm: Arm, duration: float) -> Motion:
-    """Two stretches of different make: Fourier sums, moves with stops, or the tip on circles and lines."""
+    """Two stretches of different make: Fourier sums, moves with stops, or the tip on circles and lines.
+
+    Drawn again where a joint stands throughout: the tip does not feel the last one, and a first move may not fit.
+    """
     makers = [(_sums, _stops, _tip)[k] for k in rng.permutation(3)[:2]]
     count = round(duration / STEP)
     cut = int(count * rng.uniform(0.4, 0.6))
@@ -29,6 +32,8 @@ def motion(rng: Rng, arm: Arm, duration: float) -> Motion:
     # The second stretch starts where the first ended, and its own way back is faded in.
     q = np.concatenate([pieces[0], pieces[1] + (pieces[0][-1] - pieces[1][0])])
     q = gaussian_filter1d(q, ROUNDED / STEP, axis=0, mode="nearest")
+    if (np.ptp(q, axis=0) < 1e-6).any():
+        return motion(rng, arm, duration)
     qd = np.gradient(q, STEP, axis=0)
     return q, qd, np.gradient(qd, STEP, axis=0)
 

@@ -111,6 +111,13 @@ def test_warmth_settles_at_the_mean_power():
     np.testing.assert_allclose(found, 1.0 - np.exp(-time / 4.0), atol=1e-9)
 
 
+def test_every_joint_moves_in_every_motion():
+    """Also where moves with stops end before the first one fits, and the tip does not feel the last joint."""
+    arm = arm_of("kinova")
+    for seed in range(3, 9):
+        assert np.ptp(motion(np.random.default_rng(seed), arm, 4.0)[0], axis=0).min() > 1e-3, seed
+
+
 def test_link_lags_behind_a_spring_by_the_torque_that_it_carries():
     """Spring and gravity alone, so slowly that nothing swings: the link stands where both balance."""
     arm = arm_of("ur5")
