@@ -10,9 +10,7 @@ from ..models.axes import Place, place
 from ..models.effect import Parameter, written_unit
 from ..models.hidden_state import reads
 from ..models.model import Model, PlacedEffect
-from ..models.rig.kinematics import sling_of
 from ..models.rig.points import far_end
-from ..models.rig.rig import Rig
 from .equations import Ledger
 from .symbolic import root
 
@@ -63,9 +61,10 @@ class PlacedLaws:
 
     def joint_of(self, p: PlacedEffect) -> int:
         """Index among the arm's joints of the one that an effect's place belongs to; -1 for a floating base."""
-        if p.effect.at == "sling":
-            assert isinstance(self._model.tree, Rig)
-            return sling_of(self._model.tree, p.at).link
+        if p.effect.at in ("sling", "suspension"):
+            found = self._model.tree.link_at(p.effect.at, p.at)
+            assert found is not None
+            return found
         if p.effect.at in ("link", "boom", "base"):
             return self._link_of(p) - self._model.tree.carriers
         return int(self.place_of(p).channels[0])

@@ -13,7 +13,7 @@ from ..models.rig.kinematics import sling_of
 from ..models.rig.points import far_end, symbolic_point
 from ..models.rig.rig import Rig
 
-PLACES = ("sling", "slide", "boom")
+PLACES = ("sling", "slide", "boom", "suspension")
 """Kinds of place that only a rig has."""
 
 
@@ -35,6 +35,8 @@ def rig_reach(rig: Rig, p: PlacedEffect, q: ca.SX) -> ca.SX:
         return -_point(rig, sling.link, sling.point, q)[0].T
     if p.effect.at == "boom":
         return _boom(rig, p.at, q)[0]
+    if p.effect.at == "suspension":
+        return _suspension(rig, q)
     joint = [j.name for j in rig.joints].index(p.at)
     total = ca.SX(rig.n_joints, 1)
     for sling in rig.slings:
@@ -42,6 +44,15 @@ def rig_reach(rig: Rig, p: PlacedEffect, q: ca.SX) -> ca.SX:
             jacobian, _, rotation = _point(rig, joint, contact, q)
             total += jacobian[:3, :].T @ (rotation @ ca.SX(ca.DM(rig.tangent_of(sling, contact))))
     return total
+
+
+def _suspension(rig: Rig, q: ca.SX) -> ca.SX:
+    """Reach (J, 1) of all slings, as `snarelab.models.rig.kinematics.suspension_map` has it."""
+    reach, zero = ca.SX(rig.n_joints, 1), ca.SX.zeros(rig.n_joints)
+    for sling in rig.slings:
+        jacobian, place, _ = _point(rig, sling.link, sling.point, q)
+        reach += jacobian[2, :].T * (place[2] - _point(rig, sling.link, sling.point, zero)[1][2])
+    return reach
 
 
 def _boom(rig: Rig, at: str, q: ca.SX) -> tuple[ca.SX, ca.SX]:

@@ -8,8 +8,9 @@ place (a joint, a link, a sling, a sensor channel) and one instant, in CasADi sy
 - ``at="sensor"``: what the channel reads, given the true value.
 - On a suspension rig: ``at="sling"``, the wrench (6,) on the arm at the sling's hang point, force [N] and moment [N·m]
   in the world frame; ``at="slide"``, the friction force [N] at the slides that a joint moves; ``at="boom"``, for
-  torsion and for bending of a link (2,), the upward force per lever [N/m] on the slings beyond it. The rig's geometry
-  gives the torque of each at every joint.
+  torsion and for bending of a link (2,), the upward force per lever [N/m] on the slings beyond it;
+  ``at="suspension"``, the force [N/m] that every sling loses per rise of its hang point. The rig's geometry gives the
+  torque of each at every joint.
 - On a free-floating arm: ``at="base"``, the wrench (6,) on the base, force [N] and moment [N·m] about the origin of its
   frame, in its own axes.
 - In a docking: ``at="carriage"``, the friction force [N] on the carriage; ``at="grooves"``, the friction force (2,) on
@@ -88,8 +89,8 @@ class Effect:
         The vocabulary's word; also the file's name.
     family : str
         Heading of the vocabulary it stands under.
-    at : "joint", "link", "sensor", "sling", "slide", "boom", "base", "pin", "cables", "target", "carriage", "grooves",
-        "groove" or "latches"
+    at : "joint", "link", "sensor", "sling", "slide", "boom", "suspension", "base", "pin", "cables", "target",
+        "carriage", "grooves", "groove" or "latches"
         Where it acts; a slide goes by the name of its joint, a boom by that of its link.
     sentence : str
         What a test engineer would say: "friction that does not depend on speed".
@@ -159,8 +160,8 @@ class Effect:
     name: str
     family: str
     at: Literal[
-        "joint", "link", "sensor", "sling", "slide", "boom", "base", "pin", "cables", "target", "carriage", "grooves",
-        "groove", "latches",
+        "joint", "link", "sensor", "sling", "slide", "boom", "suspension", "base", "pin", "cables", "target",
+        "carriage", "grooves", "groove", "latches",
     ]  # fmt: skip
     sentence: str
     equation: str

@@ -43,6 +43,7 @@ SIGNALS = {
     "sling": {"velocity": 3, "weight": 1, "tension": 1, "time": 1},
     "slide": _JOINT,
     "boom": {"spread": 2, "time": 1},
+    "suspension": {"time": 1},
     "base": {"spin": 3, "spin_rate": 3, "acceleration": 3, "spin_gained": 3, "impulse": 3, "time": 1},
     "pin": {"overlap": 1, "approach": 1, "elastic_force": 1, "normal_force": 1, "slip": 3, "slip_velocity": 1},
     "cables": {"bending_stiffness": 1, "curvature_rate": 1},
@@ -60,7 +61,7 @@ def signals_of(effect: Effect) -> dict[str, int]:
     return SIGNALS[effect.at] | {f"{name}_of_{k}": 1 for k in numbers for name in ("q", "qd")}
 
 
-#: The signal, by place, that itself depends on the model's parameters; none on a rig's slings, slides and booms.
+#: The signal, by place, that itself depends on the model's parameters; none on a suspension rig.
 THROUGH = {"joint": "load", "link": "phi", "sensor": "value"}
 
 

@@ -13,7 +13,7 @@ from .docking.bench_setup import DockingTree, docking_places
 from .effect import Effect
 from .hidden_state import rows
 from .holding import Holding
-from .rig.kinematics import booms, reached_joints, slides
+from .rig.kinematics import places_of, reached_joints
 from .rig.rig import Rig
 from .servo import Servo
 from .snare.setup import SnareTree, snare_places
@@ -132,9 +132,9 @@ def places(effect: Effect, tree: Tree) -> tuple[str, ...]:
     if effect.at == "base":
         return ("base",) if carriers else ()
     if effect.at != "sensor":
-        if not isinstance(tree, Rig) or effect.at not in ("sling", "slide", "boom"):
+        if not isinstance(tree, Rig):
             return ()
-        every = {"sling": tuple(s.name for s in tree.slings), "slide": slides(tree), "boom": booms(tree)}[effect.at]
+        every = places_of(tree, effect.at)
         return tuple(at for at in every if reached_joints(tree, effect.at, at, rows(effect)))
     return tuple(f"tau.{j.name}" for j in tree.joints[carriers:])
 

@@ -58,6 +58,9 @@ class Dockings(DockingRuns):
     def shift_slopes(self, i: int, at: ModelPoint, here: Array) -> Array:
         return shift_differences(self, i, at, here)
 
+    def own_shifts(self, p: PlacedEffect) -> tuple[int, ...]:
+        return tuple(k for k, name in enumerate(SHIFTS) if name.startswith(f"{p.key}."))
+
     def settled(self, at: ModelPoint, numbers: Sequence[int]) -> ModelPoint:
         return at
 

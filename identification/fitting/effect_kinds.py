@@ -3,7 +3,7 @@
 from ...models.model import PlacedEffect
 from ...models.tree import Tree
 from .effect_places import BasePlace, EffectPlace, EncoderPlace, JointPlace, LinkPlace, SensorPlace
-from .rig_places import BoomPlace, SlidePlace, SlingPlace
+from .rig_places import BoomPlace, SlidePlace, SlingPlace, SuspensionPlace
 
 KINDS: dict[str, type[EffectPlace]] = {
     "joint": JointPlace,
@@ -12,6 +12,7 @@ KINDS: dict[str, type[EffectPlace]] = {
     "sling": SlingPlace,
     "slide": SlidePlace,
     "boom": BoomPlace,
+    "suspension": SuspensionPlace,
     "base": BasePlace,
 }
 """By what effects name in ``at``."""

@@ -1,4 +1,4 @@
-"""Places of effects that only a suspension rig has: slings, slides, booms.
+"""Places of effects that only a suspension rig has: slings, slides, booms, all slings together.
 
 Letters: n samples, J joints, m numbers that a law gives, p parameters of an effect.
 """
@@ -17,7 +17,7 @@ from .experiment import Experiment
 
 Array = NDArray[np.float64]
 
-PLACES = ("sling", "slide", "boom")
+PLACES = ("sling", "slide", "boom", "suspension")
 """Kinds of place that only a rig has."""
 
 
@@ -83,6 +83,14 @@ class BoomPlace(RigPlace):
             link = [link.name for link in self.rig.links].index(self.placed.at)
             experiment.store.update(zip(keys, boom_map(self.rig, link, experiment.motion.q), strict=True))
         return experiment.store[keys[0]], experiment.store[keys[1]]
+
+
+class SuspensionPlace(RigPlace):
+    """All slings together: a force per rise of each one's hang point (m = 1)."""
+
+    def signals(self, along: TorqueState) -> dict[str, Array]:
+        """Time [s]."""
+        return {"time": along.experiment.elapsed}
 
 
 class SlidePlace(RigPlace, JointPlace):

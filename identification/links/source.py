@@ -108,6 +108,9 @@ class Links:
             k += len(free)
         return found
 
+    def own_shifts(self, p: PlacedEffect) -> tuple[int, ...]:
+        return ()
+
     def shift_slopes(self, i: int, at: ModelPoint, here: Array) -> Array:
         found = np.zeros((*here.shape, len(self.rows), len(self.joints)))
         for c, size in enumerate(self._zero):

@@ -79,6 +79,9 @@ class Servos:
     def slopes(self, i: int, at: ModelPoint, here: Array) -> Array:
         return differences(self, i, at, here)
 
+    def own_shifts(self, p: PlacedEffect) -> tuple[int, ...]:
+        return ()
+
     def shift_slopes(self, i: int, at: ModelPoint, here: Array) -> Array:
         return np.zeros((*here.shape, 0))
 

@@ -88,6 +88,9 @@ class Captures:
         steps = WIDE * np.maximum(sizes, usual)
         return self._differences(i, at, here, np.where(at.values + steps > highs, -steps, steps), "values")
 
+    def own_shifts(self, p: PlacedEffect) -> tuple[int, ...]:
+        return ()
+
     def shift_slopes(self, i: int, at: ModelPoint, here: Array) -> Array:
         return self._differences(i, at, here, np.ones(len(at.shifts)), "shifts")
 

@@ -81,7 +81,7 @@ def confirm(
             key = name.placed.key
             rest = fit(source, given, last.at.without(key), own, shifted)
             other = linearised(source, held, source.settled(rest.at, held), beside)
-            density, blocks = _forecast(source, given, rest, other, noise)
+            density, blocks = _forecast(source, given, rest, other, noise, source.own_shifts(name.placed))
             missed[key] = HeldOutLoss(whole[0] - density, scatter(0.5 * (blocks - whole[1])), rest, other)
         weakest = min(names, key=lambda n: missed[n.placed.key].sure)
         if missed[weakest.placed.key].sure > GATE:
@@ -95,10 +95,19 @@ def confirm(
 
 
 def _forecast(
-    source: Source, given: ModelPoint, here: Linearisation, there: Linearisation, known: WeighedRecordings
+    source: Source,
+    given: ModelPoint,
+    here: Linearisation,
+    there: Linearisation,
+    known: WeighedRecordings,
+    tolerance_of_name: Collection[int] = (),
 ) -> tuple[float, Array]:
     """Log density of the held-out recordings given the training ones, averaged over how exactly the shifts may be
-    known, and what each block of time takes off it."""
+    known, and what each block of time takes off it.
+
+    Without a name, the shifts that are its own tolerance are known to their deviations alone, and not from the training
+    recordings: learnt there they would be the effect itself under another name, however many deviations it takes.
+    """
     weighed = weigh(source, [*source.train, *source.held], given, _joined(here, there), known, search=False)
     evidence, n = weighed.evidence, len(source.train)
     every = range(n, n + len(source.held))
@@ -108,7 +117,11 @@ def _forecast(
         weight = weighed.beside.weight(tolerance)
         own = ProjectedEvidence(evidence, range(n), weight)
         priors.append(own.null)
-        ons.append(ProjectedEvidence(evidence, every, weight, own.posterior(evidence.n_always)))
+        mean, covariance = own.posterior(evidence.n_always)
+        for k in (len(here.at.values) + s for s in tolerance_of_name):
+            mean[k], covariance[k], covariance[:, k] = 0.0, 0.0, 0.0
+            covariance[k, k] = weight[k] ** 2
+        ons.append(ProjectedEvidence(evidence, every, weight, (mean, covariance)))
     both = np.array(priors) + [on.null for on in ons]
     always = ons[int(np.argmax(both))].beside([])
     parts = [source.blocks(i, evidence.left(i, always, [])) for i in every]

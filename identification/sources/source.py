@@ -161,6 +161,10 @@ class Source(Protocol):
         """Derivatives (n, c, S) of the prediction by the shifts."""
         ...
 
+    def own_shifts(self, p: PlacedEffect) -> tuple[int, ...]:
+        """Numbers of the shifts that are the tolerance of an effect's own parameters, which it exceeds."""
+        ...
+
     def settled(self, at: ModelPoint, numbers: Sequence[int]) -> ModelPoint:
         """The model with the shifts of these recordings read from them."""
         ...

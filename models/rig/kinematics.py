@@ -62,6 +62,17 @@ def boom_map(rig: Rig, link: int, q: Array) -> tuple[Array, Array]:
     return reach, spread
 
 
+def suspension_map(rig: Rig, q: Array) -> Array:
+    """Drive torque per stiffness of all slings (n, J, 1) [m² or m]: each pulls by that times the rise of its hang
+    point less, since all joints were at zero."""
+    total, zero = np.zeros((len(q), rig.n_joints, 1)), np.zeros((1, rig.n_joints))
+    for sling in rig.slings:
+        held = point_motion(rig, sling.link, sling.point, q, np.zeros_like(q))
+        level = point_motion(rig, sling.link, sling.point, zero, zero).position[0, 2]
+        total[:, :, 0] += held.jacobian[:, 2] * (held.position[:, 2] - level)[:, None]
+    return total
+
+
 def booms(rig: Rig) -> tuple[str, ...]:
     """Links that have a length and slings beyond it."""
     return tuple(
@@ -80,12 +91,29 @@ def sling_of(rig: Rig, name: str) -> Sling:
     return next(s for s in rig.slings if s.name == name)
 
 
+SUSPENSION = "slings"
+"""The place of what all slings do alike."""
+
+
+def places_of(rig: Rig, kind: str) -> tuple[str, ...]:
+    """Names of all places of a kind that only a rig has; none of any other kind."""
+    found = {
+        "sling": lambda: tuple(s.name for s in rig.slings),
+        "slide": lambda: slides(rig),
+        "boom": lambda: booms(rig),
+        "suspension": lambda: (SUSPENSION,),
+    }
+    return found[kind]() if kind in found else ()
+
+
 def place_map(rig: Rig, kind: str, at: str, q: Array) -> Array:
-    """The map (n, J, m) of a sling, a slide or a boom, by its name."""
+    """The map (n, J, m) of a sling, a slide, a boom or the whole suspension, by its name."""
     if kind == "sling":
         return sling_map(rig, sling_of(rig, at), q)
     if kind == "slide":
         return slide_map(rig, [joint.name for joint in rig.joints].index(at), q)
+    if kind == "suspension":
+        return suspension_map(rig, q)
     return boom_map(rig, [link.name for link in rig.links].index(at), q)[0]
 
 

@@ -116,7 +116,9 @@ class Rig(Tree):
         return tuple(s.name for s in self.slings)
 
     def link_at(self, kind: str, name: str) -> int | None:
-        """A sling's is the link that it holds."""
+        """A sling's is the link that it holds, all slings' together the first one's."""
+        if kind == "suspension":
+            return self.slings[0].link
         if kind != "sling":
             return super().link_at(kind, name)
         return next(s.link for s in self.slings if s.name == name)

@@ -43,7 +43,7 @@ CONCEALED = "link_torsion"
 def main() -> int:
     """Run the study; leaves report, numbers, recordings and the improved model in ``build/studies/zero-g-rig``.
 
-    Status 1 where the diagnosis did not name what the plant conceals, at its place.
+    Status 1 where the diagnosis did not name what the plant conceals, at its place, or named anything else beside it.
     """
     begun, folder = time.monotonic(), FOLDER / STUDY
     say("The plant, in another engine, makes two recordings ...")
@@ -94,9 +94,12 @@ def main() -> int:
         },
     )
     say(f"\n{table(quantities)}\n\n{sentence}\n" + "\n".join(words))
-    say(f"The answer, opened now: {truth['effect']}\nReport: {(folder / 'report.html').resolve()}")
+    say(f"The answer, opened now: {truth['effect']}, {truth['beside']}\nReport: {(folder / 'report.html').resolve()}")
     if not result.placed:
         print("the diagnosis did not name what the plant conceals at its place", file=sys.stderr)
+        return 1
+    if result.wrong:
+        print(f"the diagnosis named {result.wrong} effects that the plant does not have", file=sys.stderr)
         return 1
     return 0
 

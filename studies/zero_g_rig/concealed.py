@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...models.rig.kinematics import SUSPENSION
 from ...models.rig.rig import built_in_rig
 from .arm import Arm, arm_of
 from .plant import Plant, Sensors
@@ -27,13 +28,16 @@ KINDS = (
 
 @dataclass(frozen=True, eq=False)
 class ConcealedCase:
-    """A plant, and the name, place and size of what it has and the model has not; ``None`` everywhere for nothing."""
+    """A plant, and the name, place and size of what it has and the model has not; ``None`` everywhere for nothing.
+
+    ``beside`` is a second effect, (name, place, size, unit), without which the first would not be felt."""
 
     plant: Plant
     name: str | None
     at: str | None
     size: float | None
     unit: str | None
+    beside: tuple[str, str, float, str] | None = None
 
     def answer(self) -> dict[str, Any]:
         """All that a score needs: the effect, and each slide's friction law."""
@@ -48,7 +52,8 @@ class ConcealedCase:
             for k, c in enumerate(arm.contacts)
         }
         effect = None if self.name is None else {"name": self.name, "at": self.at, "size": self.size, "unit": self.unit}
-        return {"effect": effect, "friction": friction}
+        beside = None if self.beside is None else dict(zip(("name", "at", "size", "unit"), self.beside, strict=True))
+        return {"effect": effect, "beside": beside, "friction": friction}
 
 
 def conceal(kind: str, seed: int) -> ConcealedCase:
@@ -70,9 +75,10 @@ def conceal(kind: str, seed: int) -> ConcealedCase:
     sign = float(rng.choice([-1.0, 1.0]))
     spread = float(rng.uniform(0.8, 1.25))
     if kind == "link_torsion":
-        boom, misfit = 2, sign * 0.0015 * spread
-        hung = replace(plant, arm=arm.with_boom(boom, misfit=misfit), suspension=Suspension(height_stiffness=700.0))
-        return ConcealedCase(hung, kind, f"link{boom + 1}", misfit, "rad")
+        boom, misfit, held = 2, sign * 0.0015 * spread, 700.0
+        hung = replace(plant, arm=arm.with_boom(boom, misfit=misfit), suspension=Suspension(height_stiffness=held))
+        beside = "suspension_stiffness", SUSPENSION, held, "N/m"
+        return ConcealedCase(hung, kind, f"link{boom + 1}", misfit, "rad", beside)
     if kind == "sling_tension_error":
         one[outer] = sign * 0.03 * spread
         return ConcealedCase(

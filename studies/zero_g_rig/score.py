@@ -27,7 +27,7 @@ class Score:
     in_class : bool
         It is named, or is a rival that the diagnosis says it cannot tell from one it named.
     wrong : int
-        Effects found that are not concealed, or not at that place.
+        Effects found that are not concealed, or not at that place; what is concealed beside the effect is right.
     coverage : float
         Share of the true friction curves inside the 2σ bands.
     """
@@ -57,11 +57,12 @@ def score(answer: Mapping[str, Any], diagnosis: Diagnosis, drawn: Sequence[Slide
     found = {(e.name, e.at) for e in diagnosis.effects}
     rivals = {(r.name, r.at) for e in diagnosis.effects for r in e.rivals if not r.separable}
     names = {name for name, _ in found}
+    true = {(e["name"], e["at"]) for e in (effect, answer.get("beside")) if e}
     return Score(
         effect["name"] in names,
         (effect["name"], effect["at"]) in found,
         effect["name"] in names | {name for name, _ in rivals},
-        len(found - {(effect["name"], effect["at"])}),
+        len(found - true),
         covered,
     )
 

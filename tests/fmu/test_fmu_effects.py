@@ -74,6 +74,7 @@ SYSTEMS = {
             "hang_point_clearance": {"clearance": 0.01},  # at zero its states would be infinitely fast
             "link_torsion": {"torque": 6.0, "radius": 2.0},
             "link_bending": {"torque": -5.0, "radius": 1.5},
+            "suspension_stiffness": {"stiffness": 30.0},
         },
         ([0.4, -0.6], [0.5, 0.6]),
         [5.0, -3.0],

@@ -146,6 +146,7 @@ def test_follows_on_a_rig_with_slings_slides_and_booms(tmp_path):
         "hang_point_clearance": ("sling8", {"clearance": 0.02}),
         "link_torsion": ("link3", {"torque": 40.0, "radius": 2.0}),
         "link_bending": ("link4", {"torque": -30.0, "radius": 1.5}),
+        "suspension_stiffness": ("slings", {"stiffness": 60.0}),
     }  # fmt: skip
     values = {f"{name}.{at}.{k}": v for name, (at, given) in places.items() for k, v in given.items()}
     listed = ", ".join(f'{{ name = "{name}", at = "{at}" }}' for name, (at, _) in places.items())

@@ -329,6 +329,7 @@ REFERENCES = {
     "hang_point_clearance": Reference({"clearance": 0.015}, pin_in_a_hole, likeness=0.05),
     "link_torsion": Reference({"torque": 300.0, "radius": 2.0}, lambda s, t, r: springs_in_series(s, t, r, 0)),
     "link_bending": Reference({"torque": -500.0, "radius": 4.0}, lambda s, t, r: springs_in_series(s, t, r, 1)),
+    "suspension_stiffness": Reference({"stiffness": 700.0}, lambda s, k: np.repeat(k, TIME.size)),
     "payload_mass": Reference({"mass": 1.7, "x": 0.05, "y": -0.1, "z": 0.15}, with_point),
     "com_offset": Reference({"x": 0.2, "y": -0.1, "z": 0.3}, with_shift),
     "inertia_error": Reference(dict(zip(TEN, inertial_parameters(*EXTRA), strict=True)), extra_bodies),

@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from snarelab.models.rig.kinematics import suspension_map
 from snarelab.models.rig.rig import built_in_rig
 from snarelab.studies.zero_g_rig.arm import Arm, arm_of
 from snarelab.studies.zero_g_rig.concealed import KINDS, conceal
@@ -124,6 +125,20 @@ def test_slings_that_keep_their_height_act_as_springs():
     for _ in range(100):
         slings.step(points + np.array([0.0, 0.0, 0.01]), 1e-3)
     assert slings.tension[0] == pytest.approx(400.0 - 0.01 / (1 / 500.0 + 1 / 2e5), rel=1e-6)
+
+
+def test_the_tool_s_stiff_suspension_is_the_plant_s():
+    """An arm that rises and sinks on slings that keep their height, slowly: Exudyn's drives beside the effect's law."""
+    arm, held = _rigid(), 700.0
+    moves = (Move(0.0, 6, 0.4, 0.1), Move(0.0, 2, 0.1, 0.03), Move(0.0, 4, 0.5, 0.1), Move(8.0, 6, -0.6, 0.1))
+    tau = [
+        simulate(Plant(arm, None, Suspension(height_stiffness=h), PERFECT), JointMoves(moves), 18.0)
+        for h in (0.0, held)
+    ]
+    found = tau[1].true_tau - tau[0].true_tau
+    expected = held * suspension_map(built_in_rig(), tau[1].true_q)[:, :, 0]
+    assert np.abs(expected).max() > 100.0
+    np.testing.assert_allclose(found, expected, rtol=0, atol=0.01 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("moves", [TRAIN, HOLDOUT])

@@ -182,6 +182,8 @@ def test_a_score_asks_for_name_and_place():
         (True, True, True),
     ]
     assert [s.wrong for s in told] == [0, 1, 1, 1, 1]
+    beside = answer | {"beside": {"name": "makkar_friction", "at": "joint1"}}
+    assert score(beside, extra, [CURVE]).wrong == 0  # pyright: ignore[reportArgumentType]
     assert told[0].coverage == pytest.approx(0.5)
 
 

@@ -37,6 +37,7 @@ class Slide:
     steps: int = 4
     train: range = field(default_factory=lambda: range(2))
     held: range = field(default_factory=lambda: range(2, 3))
+    tolerance: tuple[int, ...] = ()
 
     def columns_of(self, i):
         speed = np.sin(2.0 * TIME + i) + 0.3 * np.sin(7.1 * TIME)
@@ -59,6 +60,9 @@ class Slide:
 
     def shift_slopes(self, i, at, here):
         return np.full((N, 1, 1), 0.1)
+
+    def own_shifts(self, p):
+        return self.tolerance if p.key == COULOMB.key else ()
 
     def settled(self, at, numbers):
         return at
@@ -150,6 +154,23 @@ def test_what_is_there_is_named_with_its_size_beside_the_shift():
     assert values["viscous_friction.joint1.coefficient"] == pytest.approx(2.0, rel=0.02)
     assert values["coulomb_friction.joint1.level"] == pytest.approx(0.7, rel=0.02)
     assert rms(found.best.held)[0] == pytest.approx(0.05, rel=0.1)
+
+
+@dataclass
+class OneWay(Slide):
+    """A carriage that moves one way only: Coulomb friction looks like the bias, and only its size tells them apart."""
+
+    def columns_of(self, i):
+        speed = 1.5 + np.sin(2.0 * TIME + i)
+        return {VISCOUS.key: speed, COULOMB.key: np.ones(N)}
+
+
+@pytest.mark.parametrize(("size", "names"), [(0.5, ["coulomb_friction"]), (0.1, [])])
+def test_what_exceeds_its_own_tolerance_is_confirmed(size, names):
+    """Five deviations of the bias are no tolerance. Without the name the fit takes them for one, and predicts the
+    held-out recording as well: then the name was not confirmed."""
+    assert named(decide(OneWay(((0.0, size, 0.0),) * 3, tolerance=(0,)), NONE)) == names
+    assert named(decide(OneWay(((0.0, size, 0.0),) * 3), NONE)) == []
 
 
 def test_what_only_the_training_recordings_have_is_not_confirmed():

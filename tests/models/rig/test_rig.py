@@ -132,7 +132,7 @@ def random_rig(tmp_path, seed):
 
 def test_joint_1_does_not_feel_any_vertical_force():
     rig, m = built_in_rig(), motion(built_in_rig(), 60)
-    for name in ("sling_tension_error", "link_torsion", "link_bending"):
+    for name in ("sling_tension_error", "link_torsion", "link_bending", "suspension_stiffness"):
         effect = get_effect(name)
         for at in places(effect, rig):
             experiment = Experiment(m, RigidBody(rig))
@@ -201,6 +201,23 @@ def test_a_boom_and_its_slings_share_a_misfit(name, link):
             step = 1e-5 * np.eye(7)[j]
             rise = (heights(q + step, 0.0) - heights(q - step, 0.0)) / 2e-5
             assert found[j] == pytest.approx(-pull @ rise, abs=2e-3 * np.abs(change).max())
+
+
+def test_stiff_slings_store_the_energy_of_springs():
+    """The drives supply the gradient of half the stiffness times the sum of squared rises, by differences."""
+    rig, m, stiffness = built_in_rig(), motion(built_in_rig(), 12), 500.0
+    p = {"suspension_stiffness.slings.stiffness": stiffness}
+    placed = [PlacedEffect(get_effect("suspension_stiffness"), "slings")]
+    change = modelled(rig, m, placed, p) - modelled(rig, m, [], {})
+
+    def heights(q):
+        return np.array([point_motion(rig, s.link, s.point, q[None], q[None]).position[0, 2] for s in rig.slings])
+
+    level = heights(np.zeros(7))
+    for q, found in zip(m.q, change, strict=True):
+        for j, step in enumerate(1e-5 * np.eye(7)):
+            ahead, behind = (0.5 * stiffness * np.sum((heights(q + s * step) - level) ** 2) for s in (1, -1))
+            assert found[j] == pytest.approx((ahead - behind) / 2e-5, abs=1e-6 * np.abs(change).max())
 
 
 def test_maps_do_the_work_of_the_forces_they_stand_for():
