@@ -20,7 +20,8 @@ results and in reports. This page is written from the code by `python docs/make_
 - On a suspension rig (`system = "zero_g_rig"`) there are four more places. A *sling* has the name that the model file
   gives it; its effect is a force and moment on the arm at the hang point, z up. A *slide* has the name of the joint
   that moves it; its effect is a friction force at the contacts. A *boom* is a link with slings beyond it, and has the
-  link's name. `slings` is the whole suspension, for what all slings do alike. The rig's geometry gives the torque of each effect at every joint that it can turn.
+  link's name. `slings` is the whole suspension, for what all slings do alike. The rig's geometry gives the torque of
+  each effect at every joint that it can turn.
 - On a free-floating arm (`system = "free_floating_arm"`) an effect at the *base* is a force and moment on the base, in
   the base's axes, about the origin of its frame.
 - In a capture (`system = "snare_capture"`) effects of the contact act at the *pin*, effects of the cables themselves at
