@@ -2,7 +2,8 @@
 
 ``registered.json`` beside this file holds the digests of the tool's and of the generators' sources, the seeds, the
 number of cases of each generator, and the bars. ``python -m proof register`` writes it, ``verify`` tells whether the
-tree is still the registered one, and ``registered --hours H`` runs on for so long, from where it was.
+tree is still the registered one, and ``registered --hours H`` runs on for so long, from where it was. Answers are kept
+in `ANSWERS`, to be committed as well: a run goes on on another machine, and they show what the figures were counted on.
 """
 
 import json
@@ -20,6 +21,7 @@ from .seal import ROOT, digest, write_json
 
 REGISTERED = Path(__file__).with_name("registered.json")
 FOLDER = Path("build/proof/registered")
+ANSWERS = Path("proof/answers")
 LONGEST = 300.0  # s, then a diagnosis counts as none
 
 BARS = {
@@ -106,9 +108,12 @@ def run(
     hours: float,
     tell: Callable[[str], None] = print,
     folder: Path = FOLDER,
+    answers: Path = ANSWERS,
     clock: Callable[[], float] = time.monotonic,
 ) -> dict[str, Path]:
     """Draw and diagnose what was registered, generators in turns, until the time is over; the answers' files.
+
+    Cases are drawn in ``folder``, with a file of all answers a generator; those of each seed are in ``answers``.
 
     Raises
     ------
@@ -130,9 +135,9 @@ def run(
         if clock() >= end:
             tell("the time is over; the same command goes on where it was")
             break
-        score([drawn[name, seed][k]], files[name].with_name(f"{name}-{seed}.jsonl"), LONGEST, tell)
+        score([drawn[name, seed][k]], answers / f"{name}-{seed}.jsonl", LONGEST, tell)
     for name, own in registered["seeds"].items():
-        parts = [files[name].with_name(f"{name}-{seed}.jsonl") for seed in own]
+        parts = [answers / f"{name}-{seed}.jsonl" for seed in own]
         files[name].write_text("".join(p.read_text(encoding="utf-8") for p in parts if p.exists()), encoding="utf-8")
     return files
 

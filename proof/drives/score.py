@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import math
 import signal
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -35,13 +36,14 @@ def score(
 ) -> list[dict[str, Any]]:
     """A line for each case in ``out``; what these sources of the tool have answered is not asked again.
 
-    ``limit`` [s] a case, none where 0. Lines of other sources, or of other truths, are made anew.
+    ``limit`` [s] a case, none where 0. Lines of other sources, or of other truths, are made anew; truths that another
+    processor drew differ in their last digits.
     """
     version = sources()
     out.parent.mkdir(parents=True, exist_ok=True)
     lines = [json.loads(x) for x in out.read_text().splitlines()] if out.exists() else []
     truths = {path.name: json.loads((path / "truth.json").read_text()) for path in folders}
-    kept = [x for x in lines if x["version"] == version and truths.get(x["case"], x["truth"]) == x["truth"]]
+    kept = [x for x in lines if x["version"] == version and alike(truths.get(x["case"], x["truth"]), x["truth"])]
     if len(kept) < len(lines):
         tell(f"{out}: {len(lines) - len(kept)} lines of other sources or other cases are made anew")
     with written_whole(out) as part:
@@ -58,6 +60,17 @@ def score(
             names = ", ".join(f"{e['name']} at {e['at']} {e['probability']:.2f}" for e in line["effects"])
             tell(f"{k}/{len(folders)} {path.name}: {line['verdict']} {names}; {line['seconds']:.0f} s")
     return kept
+
+
+def alike(one: Any, other: Any) -> bool:
+    """Whether two values of JSON are the same, numbers but for their rounding."""
+    if isinstance(one, dict) and isinstance(other, dict):
+        return one.keys() == other.keys() and all(alike(one[k], other[k]) for k in one)
+    if isinstance(one, list) and isinstance(other, list):
+        return len(one) == len(other) and all(map(alike, one, other))
+    if isinstance(one, float) and isinstance(other, float):
+        return math.isclose(one, other, rel_tol=1e-6, abs_tol=1e-12)
+    return one == other
 
 
 def asked(folder: Path, limit: float, run: Diagnose) -> dict[str, Any]:

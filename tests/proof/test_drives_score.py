@@ -179,6 +179,21 @@ def test_score_resumes_and_asks_again_when_sources_or_truths_change(tmp_path, fo
     assert "median seconds" in table(read(out))
 
 
+def test_answers_hold_for_truths_that_another_processor_drew(tmp_path, folders):
+    """The last digits of what was drawn differ; a run goes on there."""
+    out, asked = tmp_path / "said.jsonl", []
+
+    def run(folder):
+        asked.append(folder.name)
+        return answer()
+
+    drawn = json.loads((folders[0] / "truth.json").read_text())
+    for level in (0.3, 0.1 + 0.2, 0.3001):
+        (folders[0] / "truth.json").write_text(json.dumps(drawn | {"known": {"level": [level]}}))
+        score(folders[:1], out, tell=lambda _: None, run=run)
+    assert asked == ["0000", "0000"]
+
+
 def test_no_answer_counts_as_none(tmp_path, folders):
     def fails(folder):
         raise InputError("tau.joint1 is missing")

@@ -79,7 +79,7 @@ def test_run_of_another_tree_is_refused(tmp_path):
 
 def test_run_goes_through_generators_in_turns_and_ends_with_its_time(drawn, tmp_path):
     time = iter(range(0, 100_000, 1000))
-    files = run(written(), 1.0, lambda _: None, tmp_path, clock=lambda: next(time))
+    files = run(written(), 1.0, lambda _: None, tmp_path, tmp_path / "answers", clock=lambda: next(time))
     # The first look at the clock starts it; 3600 s are three more.
     assert drawn == [("drives-500.jsonl", "0000"), ("drives-501.jsonl", "0000"), ("played-600.jsonl", "0000")]
     assert len(files["drives"].read_text().splitlines()) == 2
