@@ -17,7 +17,7 @@ from typing import Any
 from .benchmark.case_set import GENERATORS
 from .drives.score import score, sources
 from .drives.table import figures, read, table
-from .seal import ROOT, digest, write_json
+from .seal import CASES, ROOT, digest, write_json
 
 REGISTERED = Path(__file__).with_name("registered.json")
 FOLDER = Path("build/proof/registered")
@@ -38,9 +38,13 @@ BARS = {
 """Of each generator."""
 
 
+SHARED = {"mujoco": CASES}
+"""Sources of a generator beside its own folder."""
+
+
 def code(generator: str) -> str:
     """SHA-256 over a generator's sources."""
-    return digest(sorted((ROOT / "proof" / generator).rglob("*.py")))
+    return digest([*sorted((ROOT / "proof" / generator).rglob("*.py")), *SHARED.get(generator, ())])
 
 
 def now() -> dict[str, Any]:

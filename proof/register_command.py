@@ -7,6 +7,7 @@ from pathlib import Path
 from .ending import status_of, tell
 
 COMMANDS = ("register", "verify", "registered")
+GENERATORS = ("drives", "played", "mujoco")
 
 
 def main(words: Sequence[str]) -> int:
@@ -14,8 +15,8 @@ def main(words: Sequence[str]) -> int:
     parser = argparse.ArgumentParser(prog="python -m proof", description=(__doc__ or "").splitlines()[0])
     commands = parser.add_subparsers(dest="command", required=True)
     registering = commands.add_parser("register", help="write proof/registered.json, to be committed before the run")
-    registering.add_argument("--drives", type=int, nargs="+", default=[], metavar="SEED")
-    registering.add_argument("--played", type=int, nargs="+", default=[], metavar="SEED")
+    for name in GENERATORS:
+        registering.add_argument(f"--{name}", type=int, nargs="+", default=[], metavar="SEED")
     registering.add_argument("--cases", type=int, default=75, help="of each seed (default: 75)")
     commands.add_parser("verify", help="tell whether the tree is the registered one")
     running = commands.add_parser("registered", help="run what was registered; resumed")
@@ -31,9 +32,10 @@ def _do(given: argparse.Namespace) -> int:
     from .seal import write_json
 
     if given.command == "register":
-        seeds = {name: own for name in ("drives", "played") if (own := getattr(given, name))}
+        seeds = {name: own for name in GENERATORS if (own := getattr(given, name))}
         if not seeds:
-            raise ValueError("no seeds: give --drives SEED... or --played SEED..., none that was looked at before")
+            options = " or ".join(f"--{name} SEED..." for name in GENERATORS)
+            raise ValueError(f"no seeds: give {options}, none that was looked at before")
         register.write(register.register(seeds, given.cases))
         tell(f"{register.REGISTERED}: commit it, then python -m proof registered")
         return 0

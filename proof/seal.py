@@ -76,11 +76,16 @@ def digest(paths: Iterable[Path]) -> str:
     return total.hexdigest()
 
 
+CASES = [
+    *(ROOT / "proof" / f"{n}.py" for n in ("robots", "plant", "concealed", "outside", "cases", "model_text")),
+    *(ROOT / "bench" / f"{n}.py" for n in ("arm", "concealed", "lugre", "motion", "mujoco_plant", "parts")),
+]
+"""Sources that cases and recordings of the first generator follow from."""
+
+
 def generator() -> str:
-    """SHA-256 over the sources that cases and recordings follow from."""
-    own = [ROOT / "proof" / f"{name}.py" for name in ("robots", "plant", "concealed", "outside", "cases", "model_text")]
-    used = [ROOT / "bench" / f"{n}.py" for n in ("arm", "concealed", "lugre", "motion", "mujoco_plant", "parts")]
-    return digest([*own, *used])
+    """SHA-256 over them."""
+    return digest(CASES)
 
 
 def tool(names: Sequence[str] = ("identification", "models", "recordings")) -> str:

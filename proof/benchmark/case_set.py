@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from snarelab.models.model_file import load_model
 
 from ..drives.make import make as drives
+from ..mujoco.make import make as mujoco
 from ..played.make import make as played
 from ..rival_columns import baseline, fixed, low_pass, read
 from ..rivals import Task
@@ -69,7 +70,7 @@ class CaseSet:
         return json.loads(path.read_text(encoding="utf-8"))
 
 
-GENERATORS = {"drives": drives, "played": played}
+GENERATORS = {"drives": drives, "played": played, "mujoco": mujoco}
 
 
 def export(folder: Path, seed: int, count: int, tell: Tell = print, generator: str = "drives") -> CaseSet:

@@ -17,7 +17,7 @@ def main(words: Sequence[str]) -> int:
     exporting.add_argument("folder", type=Path, metavar="DIR")
     exporting.add_argument("--seed", type=int, required=True)
     exporting.add_argument("--cases", type=int, default=150)
-    exporting.add_argument("--generator", choices=("drives", "played"), default="drives")
+    exporting.add_argument("--generator", choices=("drives", "played", "mujoco"), default="drives")
     answering = commands.add_parser("answer", help="worked examples: answer them with a method that is here")
     answering.add_argument("folder", type=Path, metavar="DIR")
     answering.add_argument("--method", choices=("snarelab", "joint_bic"), required=True)

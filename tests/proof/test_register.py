@@ -8,6 +8,7 @@ from proof import register
 from proof.register import BARS, differences, now, printed, result, run
 from proof.register import register as registered
 from proof.register_command import main
+from proof.seal import CASES, ROOT, digest
 
 SEEDS = {"drives": [500, 501], "played": [600]}
 
@@ -119,5 +120,6 @@ def test_commands_say_what_to_do(tmp_path, monkeypatch, capsys):
 
 
 def test_digest_of_a_generator_is_of_its_own_sources():
-    assert now()["generators"] == {"drives": register.code("drives"), "played": register.code("played")}
+    assert now()["generators"] == {name: register.code(name) for name in ("drives", "played", "mujoco")}
+    assert digest([*sorted((ROOT / "proof" / "mujoco").rglob("*.py")), *CASES]) == register.code("mujoco")
     assert register.code("drives") != register.code("played")

@@ -1,0 +1,102 @@
+"""Write cases of the first generator with what is true of each beside them, as `proof.drives.score` reads it."""
+
+import json
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from snarelab.models.effects import get_effect
+
+from ..cases import Answer, draw, planned_cases
+from ..concealed import VALUES
+from ..drives.cases import LAWLESS
+from ..drives.make import made
+
+ATTEMPTS = 100
+MASSES = ("payload_mass", "com_offset", "inertia_error")
+"""What a link's wrong mass may rightly be called."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A case before it is drawn: its group, and (what, size) of what it conceals."""
+
+    group: str
+    concealed: tuple[tuple[str, float], ...]
+    drawn: tuple[str, tuple[str, ...], float]
+
+
+def planned(seed: int, count: int) -> list[Plan]:
+    """The first ``count`` cases of a seed."""
+    return [Plan(g, tuple((k, size) for k in kinds), (g, kinds, size)) for g, kinds, size in planned_cases(count, seed)]
+
+
+def make(folder: Path, seed: int, count: int, group: str = "", tell: Callable[[str], None] = print) -> list[Path]:
+    """Folders of the first ``count`` cases of a seed, or of those among them of one group.
+
+    Raises
+    ------
+    ValueError
+        ``folder`` holds cases of another seed.
+    """
+    return made(folder, seed, planned(seed, count), group, tell, write)
+
+
+def write(plan: Plan, seed: int, number: int, folder: Path) -> None:
+    """Record a case, with another arm where one cannot be recorded, and write it; ``truth.json`` last.
+
+    Raises
+    ------
+    RuntimeError
+        No such case in `ATTEMPTS` attempts.
+    """
+    for attempt in range(ATTEMPTS):
+        case = draw(plan.drawn, seed, number, attempt)
+        try:
+            case.write(folder)
+        except ValueError:
+            shutil.rmtree(folder)
+            continue
+        part = folder / "truth.json.part"
+        part.write_text(json.dumps(truth(case.answer, seed), indent=1) + "\n", encoding="utf-8")
+        part.replace(folder / "truth.json")
+        return
+    raise RuntimeError(f"case {number} ({plan.drawn}): no arm could be recorded in {ATTEMPTS} attempts")
+
+
+def truth(answer: Answer, seed: int) -> dict[str, Any]:
+    """What is true of a case. A law outside the vocabulary has no name; nor has a wrong number of the model, for which
+    the names of a link's masses are right. What hides with the whole friction of a joint counts neither way."""
+    lawless, wrong = answer.group == "outside", answer.group == "wrong"
+    effects = [
+        {
+            "name": "" if lawless else answer.truths[k].name,
+            "law": kind,
+            "at": channel if lawless else answer.truths[k].at,
+            "size": answer.size,
+            "channel": channel,
+            "values": {} if lawless else _comparable(kind, value),
+        }
+        for k, (kind, channel, value) in enumerate(zip(answer.kinds, answer.channels, answer.value, strict=True))
+        if not wrong
+    ]
+    return {
+        "seed": seed,
+        "case": answer.case,
+        "group": LAWLESS if lawless else answer.group,
+        "disturbance": {"kind": "white"},
+        "effects": effects,
+        "background": [*(MASSES if wrong else ()), *(other for t in answer.truths for other in t.also)],
+        "known": {},
+        "joints": answer.joints,
+    }
+
+
+def _comparable(kind: str, value: float) -> dict[str, float]:
+    """The value by its parameter in the vocabulary, where that has no sign: a maker's sign may be the other one."""
+    if kind not in VALUES:
+        return {}
+    (parameter,) = (p for p in get_effect(kind).parameters if p.name == VALUES[kind])
+    return {parameter.name: abs(value)} if parameter.low >= 0 else {}
