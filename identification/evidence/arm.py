@@ -98,11 +98,11 @@ def weigh(
     assembly = found.assembly
     states = [assembly.evaluate(e, found.theta) for e in instruments]
     along = ColumnSource(
-        model, assembly, instruments, states, n_train, torque_scale(experiments[:n_train]), tuned or {}
+        model, assembly, instruments, states, n_train, torque_scale(experiments[:n_train]), scales, tuned or {}
     )
     columns = CandidateColumns([len(e.measured) for e in experiments])
     nameless = nameless or {}
-    by_words = curves(along, scales, columns, small=not search, more={words for _, words in nameless})
+    by_words = curves(along, columns, small=not search, more={words for _, words in nameless})
     named = names(along, by_words, columns) if search else {}
     others = beside(along, found, by_words, columns, nameless)
     residuals = [assembly.residual(e, found.theta)[0] for e in experiments]

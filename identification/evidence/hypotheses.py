@@ -44,13 +44,19 @@ class ColumnSource:
     n_train: int
     scale: Array
     """RMS torque of each channel in the training recordings (J,)."""
+    scales: Mapping[str, Scales]
     tuned: Mapping[str, Array] = field(default_factory=dict)
     """Parameters of laws that were fitted by themselves, by their key: a point more of their grid."""
+
+    def coordinates(self, c: int) -> list[Coordinates]:
+        """What a joint's curves run over, along each instrument motion."""
+        own = self.scales[self.model.joints[c]]
+        peak, travel = max(own.speed, 1e-9), own.travel
+        return [Coordinates.of(e, s, c, peak, travel) for e, s in zip(self.instruments, self.states, strict=True)]
 
 
 def curves(
     along: ColumnSource,
-    scales: Mapping[str, Scales],
     columns: CandidateColumns,
     *,
     small: bool = False,
@@ -60,9 +66,8 @@ def curves(
     tree, n = along.model.tree, along.n_train
     alone = not tree.stands
     found = {}
-    for c, joint in enumerate(along.model.joints):
-        peak, travel = max(scales[joint].speed, 1e-9), scales[joint].travel
-        signals = [Coordinates.of(e, s, c, peak, travel) for e, s in zip(along.instruments, along.states, strict=True)]
+    for c in range(len(along.model.joints)):
+        signals = along.coordinates(c)
         if max(float(np.ptp(x.q[:, c])) for x in signals[:n]) < 1e-6:
             continue
         for curve in family(c, along.model.joints, signals[:n], alone):
@@ -285,8 +290,8 @@ def _size(along: ColumnSource, parts: Mapping[int, Sequence[Array]]) -> Array:
 
 
 def coordinate(effect: Effect) -> str | None:
-    """Coordinate of a joint's law, in words of the family of curves; derived from the law itself."""
-    if effect.at != "joint" or effect.acts_on != "torque" or effect.others:
+    """Coordinate of a joint's law, or of its slide's, in words of the family of curves; derived from the law itself."""
+    if effect.at not in ("joint", "slide") or effect.acts_on != "torque" or effect.others:
         return None
     if effect.remembers:
         return "distance since it turned by direction"

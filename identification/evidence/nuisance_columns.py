@@ -6,12 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...models.model import PlacedEffect
 from ..deciding import BASELINE, BASELINE_OWN, BASELINE_SHAPE, BENDS, DISCREPANCY, LAW_ERROR
 from ..fitting.assembly import TorqueModel
 from ..fitting.experiment import Experiment
 from ..fitting.fit import Fit
 from ..fitting.problem import gather
-from ..nuisance.curve import SMALL
+from ..nuisance.curve import SMALL, NuisanceCurve
 from ..search.refit import carry
 from .hypotheses import ColumnSource, Curves, coordinate, lagging, remembers
 from .pool import CandidateColumns
@@ -91,6 +92,17 @@ def beside(
             for c in range(n_channels):
                 row[c].append((count + np.arange(2), columns.some(i, c, item.index) * size))
         count += 2
+    for p in assembly.placed:
+        words = coordinate(p.effect)
+        item = by_words.get((assembly.joint_of(p), words or ""))
+        if item is None or p.effect.at == "joint":
+            continue
+        made = _error_of_force(along, found, p, item.label[1])
+        k = made[0][0][1].shape[1]
+        for row, own in zip(parts, made, strict=True):
+            for c, x in own:
+                row[c].append((count + np.arange(k), x))
+        count += k
     joined = [[_joined(own) for own in row] for row in parts]
     return NuisanceColumns(joined, count, tolerant, baseline, spread)
 
@@ -105,7 +117,7 @@ def _small(found: Fit, baseline: Sequence[Sequence[Part]], scale: Array) -> dict
     for p in assembly.placed:
         words = coordinate(p.effect)
         own = [int(i) for i in assembly.index_of(p) if not shapes[i]]
-        if words is None or not own:
+        if words is None or p.effect.at != "joint" or not own:
             continue
         c = assembly.joint_of(p)
         index = baseline[0][c][0]
@@ -114,6 +126,27 @@ def _small(found: Fit, baseline: Sequence[Sequence[Part]], scale: Array) -> dict
         share = float(np.sqrt(np.mean(torque**2))) / scale[c]
         sizes[c, words] = sizes.get((c, words), 0.0) + (LAW_ERROR * share) ** 2
     return {key: float(np.sqrt(v)) for key, v in sizes.items()}
+
+
+def _error_of_force(
+    along: ColumnSource, found: Fit, p: PlacedEffect, curve: NuisanceCurve
+) -> list[list[tuple[int, Array]]]:
+    """What a force that several channels feel has wrong, as a curve over the motion of the joint that it goes with: of
+    each recording, channels and columns (n, k) in units of their prior deviation, `LAW_ERROR` of the force."""
+    assembly, n, c = found.assembly, along.n_train, found.assembly.joint_of(p)
+    place, made = assembly.at(p), []
+    for e, x in zip(along.instruments, along.coordinates(c), strict=True):
+        own = curve.columns(x)
+        terms = place.spread(e, np.zeros((len(own), 1)), own[:, None, :])
+        made.append([(at, e.to_band(columns, at)) for at, _, columns in terms])
+    rest = assembly.keep([x for x in assembly.placed if x.key != p.key], found.theta)
+    left = carry(found, rest)
+    law = [
+        e.motion.to_band(assembly.torque(e, found.theta) - rest.torque(e, left))[:, c] for e in along.instruments[:n]
+    ]
+    unit = [x for row in made[:n] for at, x in row if at == c]
+    size = np.sqrt(np.mean(np.concatenate(law) ** 2) / np.mean(np.sum(np.concatenate(unit) ** 2, axis=1)))
+    return [[(at, LAW_ERROR * size * x) for at, x in row] for row in made]
 
 
 def _filled(part: Part, n: int) -> Part:
