@@ -2,9 +2,11 @@
 
 Chooses cases where success is in doubt until the boundary is narrow or the cases are used up, runs the paper's own
 misalignment by itself, and goes on where it was stopped. The cases are kept in
-``build/studies/tolerance/<study>-<version>``, a folder for each version of the physics.
+``build/studies/tolerance/<study>-<version>``, a folder for each version of the physics. It starts from the cases of
+that version in ``tolerance/kept``: a study of hours goes on on another machine, and its figures are told in seconds.
 """
 
+import shutil
 import sys
 import time
 from pathlib import Path
@@ -31,6 +33,8 @@ STUDIES = {
 }
 """And what stands before the names of their quantities: without another word they are of the inspection case."""
 _FILES = Path(__file__).parents[1] / "tolerance"
+KEPT = _FILES / "kept"
+"""Cases that the repository keeps; nobody needs them in an installed package."""
 
 
 def main() -> int:
@@ -56,7 +60,7 @@ def main() -> int:
 
 def _run(folder: Path, study: Study) -> tuple[Results, dict[str, Any], float | None]:
     """Results, their summary, and the time by the clock a case took [s], where cases were run."""
-    results = Results(folder / f"{study.name}-{study.capture.version}", study)
+    results = opened(folder, study)
     known, begun = len(results), time.monotonic()
     print(f"  {study.name}: {known} cases are there; captures run until the boundary is narrow ...", flush=True)
     with Progress() as show:
@@ -64,6 +68,14 @@ def _run(folder: Path, study: Study) -> tuple[Results, dict[str, Any], float | N
     new = len(results) - known
     seconds = (time.monotonic() - begun) / new if new else None
     return results, summarise(study, results), seconds
+
+
+def opened(folder: Path, study: Study, kept: Path = KEPT) -> Results:
+    """A study's results in its folder, which starts from the kept cases of the same version, if there are any."""
+    own = f"{study.name}-{study.capture.version}"
+    if (kept / own).is_dir() and not (folder / own).exists():
+        shutil.copytree(kept / own, folder / own)
+    return Results(folder / own, study)
 
 
 def _quantities(prefix: str, content: dict[str, Any]) -> list[Quantity]:

@@ -12,7 +12,7 @@ from ..fitting.assembly import TorqueModel
 from ..fitting.experiment import Experiment
 from ..fitting.fit import Fit
 from ..fitting.problem import gather
-from ..nuisance.curve import SMALL, NuisanceCurve
+from ..nuisance.curve import SMALL, over_decades
 from ..search.refit import carry
 from .hypotheses import ColumnSource, Curves, coordinate, lagging, remembers
 from .pool import CandidateColumns
@@ -93,11 +93,9 @@ def beside(
                 row[c].append((count + np.arange(2), columns.some(i, c, item.index) * size))
         count += 2
     for p in assembly.placed:
-        words = coordinate(p.effect)
-        item = by_words.get((assembly.joint_of(p), words or ""))
-        if item is None or p.effect.at == "joint":
+        if p.effect.at == "joint" or coordinate(p.effect) is None:
             continue
-        made = _error_of_force(along, found, p, item.label[1])
+        made = _error_of_force(along, found, p)
         k = made[0][0][1].shape[1]
         for row, own in zip(parts, made, strict=True):
             for c, x in own:
@@ -128,15 +126,14 @@ def _small(found: Fit, baseline: Sequence[Sequence[Part]], scale: Array) -> dict
     return {key: float(np.sqrt(v)) for key, v in sizes.items()}
 
 
-def _error_of_force(
-    along: ColumnSource, found: Fit, p: PlacedEffect, curve: NuisanceCurve
-) -> list[list[tuple[int, Array]]]:
-    """What a force that several channels feel has wrong, as a curve over the motion of the joint that it goes with: of
-    each recording, channels and columns (n, k) in units of their prior deviation, `LAW_ERROR` of the force."""
+def _error_of_force(along: ColumnSource, found: Fit, p: PlacedEffect) -> list[list[tuple[int, Array]]]:
+    """What friction that several channels feel has wrong, as a curve over the speed of the joint that it goes with, on
+    a logarithmic scale: most of it is near rest. Of each recording, channels and columns (n, k) in units of their prior
+    deviation, `LAW_ERROR` of the friction."""
     assembly, n, c = found.assembly, along.n_train, found.assembly.joint_of(p)
     place, made = assembly.at(p), []
     for e, x in zip(along.instruments, along.coordinates(c), strict=True):
-        own = curve.columns(x)
+        own = over_decades(x)
         terms = place.spread(e, np.zeros((len(own), 1)), own[:, None, :])
         made.append([(at, e.to_band(columns, at)) for at, _, columns in terms])
     rest = assembly.keep([x for x in assembly.placed if x.key != p.key], found.theta)

@@ -24,7 +24,8 @@ TURNING = 0.006
 """Share of the peak speed over which the direction of motion changes its sign."""
 
 SHORTEST = 1e-3
-"""Share of the travel from which on the distance since a reversal is told apart, on a logarithmic scale."""
+"""Share of the travel, or of the peak speed, from which on a distance since a reversal, or a speed, is told apart on a
+logarithmic scale."""
 
 NEIGHBOURS = 3
 """Other joints, the nearest first, whose coordinates a curve may run over."""
@@ -94,6 +95,12 @@ def basis(x: Array, low: float, high: float, length: float, order: int) -> Array
     w = np.pi * np.arange(1, order + 1) / (2 * BEYOND)
     density = np.exp(-0.5 * (2 * length * w) ** 2)
     return np.sin(w * (np.clip(u, -1.2, 1.2)[:, None] + BEYOND)) * np.sqrt(2 * density / density.sum())
+
+
+def over_decades(x: Coordinates) -> Array:
+    """A curve of unit variance over the speed, on a logarithmic scale, by direction (n, k)."""
+    decades = np.log10(1 + np.abs(x.speed) / SHORTEST)
+    return basis(decades, 0.0, float(np.log10(1 + 1 / SHORTEST)), 0.2, 8) * x.direction[:, None]
 
 
 SMALL = ("position", "position by direction", "speed by direction", "load", "load by direction")
