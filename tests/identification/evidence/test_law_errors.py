@@ -47,7 +47,7 @@ def coordinates(e, c, speed=None):
 
 
 def test_error_of_a_slide_s_friction_is_felt_before_the_slide_in_proportion(turning):
-    """Two contacts are a couple: joints with the same axis before the slide feel all of it, all others nothing."""
+    """Two contacts are a couple: upright joints before the slide feel it by their angle to its axis, all others nothing."""
     placed = PlacedEffect(get_effect("slide_friction"), f"joint{JOINT + 1}")
     values = {f"{placed.key}.{p.name}": 0.0 for p in placed.effect.parameters}
     values |= {f"{placed.key}.{k}": v for k, v in (("coulomb_level", 60.0), ("coulomb_speed", 0.03))}
@@ -62,7 +62,7 @@ def test_error_of_a_slide_s_friction_is_felt_before_the_slide_in_proportion(turn
     rms = np.sqrt(np.mean(turning.motion.to_band(law)[:, JOINT] ** 2))
     for c, x in errors:
         np.testing.assert_allclose(x, errors[-1][1] * law[:, [c]] / law[:, [JOINT]], atol=1e-9 * rms)
-        assert np.sqrt(np.mean(np.sum(x**2, axis=1))) == pytest.approx(LAW_ERROR * rms)
+    assert np.sqrt(np.mean(np.sum(errors[-1][1] ** 2, axis=1))) == pytest.approx(LAW_ERROR * rms)
 
 
 def test_error_near_rest_is_told_apart_from_that_in_motion(turning):
