@@ -2,11 +2,13 @@
 
 import json
 import os
+from dataclasses import replace
 
 import pytest
 
 from snarelab.studies import tolerance
 from snarelab.studies.outcome import FOLDER
+from snarelab.tolerance.study import load_study
 
 RADIAL, ANGLE, SHARE = 0.03, 0.05, 1.5
 """A capture succeeds within these [m, rad]; the inspection case is made to take more by ``SHARE``."""
@@ -96,3 +98,26 @@ def test_both_studies_leave_the_documented_numbers_and_go_on(here, capsys):
     again = {q["name"]: q for q in json.loads((here / "result.json").read_text())["quantities"]}
     assert again == {name: q for name, q in found.items() if not name.endswith("seconds_per_case")}
     assert f"{found['ground_cases']['ours']:.0f} cases are there" in capsys.readouterr().out
+
+
+def test_kept_cases_of_the_same_physics_are_gone_on_with(here, tmp_path):
+    """And those of other physics are not: the folder's name has the version."""
+    study = load_study(tmp_path / "ground.toml")
+    values = dict.fromkeys(study.ranges, 0.01)
+    kept = tmp_path / "kept"
+    first = tolerance.opened(kept, study, tmp_path / "none")
+    first.add("box", 0, values, study.capture.run(values))
+    again = tolerance.opened(here, study, kept)
+    assert (len(again), again.done("box", 0)) == (1, True)
+    again.add("box", 1, values, study.capture.run(values))
+    assert len(tolerance.opened(here, study, kept)) == 2
+    assert len(tolerance.opened(kept, study, tmp_path / "none")) == 1
+    other = replace(study, capture=replace(study.capture, version="other"))
+    assert len(tolerance.opened(here, other, kept)) == 0
+
+
+def test_kept_cases_are_of_the_physics_of_today():
+    """Cases of other physics are of no use: delete them, and run `make study-tolerance` anew."""
+    studies = [load_study(tolerance._FILES / f"{name}.toml") for name in tolerance.STUDIES]
+    today = {f"{s.name}-{s.capture.version}" for s in studies}
+    assert {p.name for p in tolerance.KEPT.iterdir()} <= today

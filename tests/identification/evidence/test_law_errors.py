@@ -47,7 +47,7 @@ def coordinates(e, c, speed=None):
 
 
 def test_error_of_a_slide_s_friction_is_felt_before_the_slide_in_proportion(turning):
-    """Two contacts are a couple: upright joints before the slide feel it by their angle to its axis, all others nothing."""
+    """Two contacts are a couple: upright joints before the slide feel it by their angle to its axis."""
     placed = PlacedEffect(get_effect("slide_friction"), f"joint{JOINT + 1}")
     values = {f"{placed.key}.{p.name}": 0.0 for p in placed.effect.parameters}
     values |= {f"{placed.key}.{k}": v for k, v in (("coulomb_level", 60.0), ("coulomb_speed", 0.03))}
