@@ -25,8 +25,8 @@ N, JOINT = 400, 3
 def turning():
     """All joints of the rig turn as sines of their own."""
     rig = built_in_rig()
-    time = 0.01 * np.arange(N)
-    w = 1.0 + 0.3 * np.arange(7)
+    time = np.asarray(0.01 * np.arange(N), np.float64)
+    w = np.asarray(1.0 + 0.3 * np.arange(7), np.float64)
     q = 0.2 * np.sin(time[:, None] * w)
     qd, qdd = 0.2 * w * np.cos(time[:, None] * w), -(w**2) * q
     names = tuple(j.name for j in rig.joints)
