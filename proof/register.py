@@ -129,21 +129,27 @@ def run(
         raise ValueError("; ".join(wrong))
     end = clock() + 3600.0 * hours
     work = [(name, seed) for name, own in registered["seeds"].items() for seed in own]
-    drawn = {
-        (name, seed): GENERATORS[name](folder / name / str(seed), seed, registered["cases"], tell=tell)
-        for name, seed in work
-    }
+    done = {(name, seed): answered(answers / f"{name}-{seed}.jsonl", registered["tool"]) for name, seed in work}
     files = {name: folder / f"{name}.jsonl" for name in registered["seeds"]}
     order = [(name, seed, k) for k in range(registered["cases"]) for name, seed in work]
     for name, seed, k in order:
+        if f"{k:04}" in done[name, seed]:
+            continue
         if clock() >= end:
             tell("the time is over; the same command goes on where it was")
             break
-        score([drawn[name, seed][k]], answers / f"{name}-{seed}.jsonl", LONGEST, tell)
+        case = GENERATORS[name](folder / name / str(seed), seed, k + 1, tell=tell, first=k)
+        score(case, answers / f"{name}-{seed}.jsonl", LONGEST, tell)
     for name, own in registered["seeds"].items():
         parts = [answers / f"{name}-{seed}.jsonl" for seed in own]
         files[name].write_text("".join(p.read_text(encoding="utf-8") for p in parts if p.exists()), encoding="utf-8")
     return files
+
+
+def answered(path: Path, tool: str) -> set[str]:
+    """Numbers of the cases that a tool has answered; they are not drawn again."""
+    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+    return {x["case"] for x in map(json.loads, lines) if x["version"] == tool}
 
 
 def result(registered: Mapping[str, Any], files: Mapping[str, Path]) -> dict[str, Any]:

@@ -9,12 +9,14 @@ from typing import Any
 from .cases import draw, planned
 
 
-def make(folder: Path, seed: int, count: int, group: str = "", tell: Callable[[str], None] = print) -> list[Path]:
-    """Folders of the first ``count`` cases of a seed, or of those among them of one group; raises ValueError where
-    ``folder`` holds cases of another seed.
+def make(
+    folder: Path, seed: int, count: int, group: str = "", tell: Callable[[str], None] = print, first: int = 0
+) -> list[Path]:
+    """Folders of the first ``count`` cases of a seed from number ``first`` on, or of those among them of one group;
+    raises ValueError where ``folder`` holds cases of another seed.
     """
     plans = planned(seed, count)
-    return made(folder, seed, plans, group, tell, lambda plan, seed, k, path: draw(plan, seed, k).write(path))
+    return made(folder, seed, plans, group, tell, lambda plan, seed, k, path: draw(plan, seed, k).write(path), first)
 
 
 def made(
@@ -24,15 +26,16 @@ def made(
     group: str,
     tell: Callable[[str], None],
     write: Callable[[Any, int, int, Path], None],
+    first: int = 0,
 ) -> list[Path]:
     """Folders of the plans of one group, or of all; ``write`` makes those that are not there, from plan, seed, number
-    and folder. Raises ValueError where ``folder`` holds cases of another seed."""
+    and folder. Those before ``first`` are left out. Raises ValueError where ``folder`` holds cases of another seed."""
     folder.mkdir(parents=True, exist_ok=True)
     mark = folder / "seed.json"
     if mark.exists() and json.loads(mark.read_text())["seed"] != seed:
         raise ValueError(f"{folder} holds cases of seed {json.loads(mark.read_text())['seed']}; give another folder")
     mark.write_text(json.dumps({"seed": seed}) + "\n")
-    wanted = [k for k, plan in enumerate(plans) if group in ("", plan.group)]
+    wanted = [k for k, plan in enumerate(plans) if k >= first and group in ("", plan.group)]
     folders = []
     for done, k in enumerate(wanted, 1):
         path = folder / f"{k:04}"

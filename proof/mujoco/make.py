@@ -33,15 +33,17 @@ def planned(seed: int, count: int) -> list[Plan]:
     return [Plan(g, tuple((k, size) for k in kinds), (g, kinds, size)) for g, kinds, size in planned_cases(count, seed)]
 
 
-def make(folder: Path, seed: int, count: int, group: str = "", tell: Callable[[str], None] = print) -> list[Path]:
-    """Folders of the first ``count`` cases of a seed, or of those among them of one group.
+def make(
+    folder: Path, seed: int, count: int, group: str = "", tell: Callable[[str], None] = print, first: int = 0
+) -> list[Path]:
+    """Folders of the first ``count`` cases of a seed from number ``first`` on, or of those among them of one group.
 
     Raises
     ------
     ValueError
         ``folder`` holds cases of another seed.
     """
-    return made(folder, seed, planned(seed, count), group, tell, write)
+    return made(folder, seed, planned(seed, count), group, tell, write, first)
 
 
 def write(plan: Plan, seed: int, number: int, folder: Path) -> None:

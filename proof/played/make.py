@@ -11,8 +11,10 @@ from .residuals import RECORDINGS, residuals
 from .robots import published
 
 
-def make(folder: Path, seed: int, count: int, group: str = "", tell: Callable[[str], None] = print) -> list[Path]:
-    """Folders of the first ``count`` cases of a seed, or of those among them of one group.
+def make(
+    folder: Path, seed: int, count: int, group: str = "", tell: Callable[[str], None] = print, first: int = 0
+) -> list[Path]:
+    """Folders of the first ``count`` cases of a seed from number ``first`` on, or of those among them of one group.
 
     Raises
     ------
@@ -23,7 +25,7 @@ def make(folder: Path, seed: int, count: int, group: str = "", tell: Callable[[s
         raise ValueError(f"no recordings in {RECORDINGS}: there is nothing to play")
     if not published():
         raise ValueError("the package example-robot-data is not installed: make .venv/installed does it")
-    return made(folder, seed, planned(seed, count), group, tell, write)
+    return made(folder, seed, planned(seed, count), group, tell, write, first)
 
 
 def main() -> int:

@@ -34,8 +34,8 @@ def drawn(monkeypatch):
         "known": {},
     }
 
-    def make(folder, seed, count, tell=print):
-        paths = [folder / f"{k:04}" for k in range(count)]
+    def make(folder, seed, count, tell=print, first=0):
+        paths = [folder / f"{k:04}" for k in range(first, count)]
         for path in paths:
             path.mkdir(parents=True, exist_ok=True)
             (path / "truth.json").write_text(json.dumps(truth))
@@ -90,6 +90,11 @@ def test_run_goes_through_generators_in_turns_and_ends_with_its_time(drawn, tmp_
     assert numbers["generators"]["played"]["pairs: both told, and nothing wrong besides"]["met"] is None
     assert "bar" not in numbers["generators"]["drives"]["median seconds"]
     assert printed(files).startswith("drives\n")
+    assert not (tmp_path / "drives/500/0001").exists()
+    # Elsewhere it goes on: what is answered is not drawn again.
+    run(written(), 1.0, lambda _: None, tmp_path / "elsewhere", tmp_path / "answers", clock=lambda: 0.0)
+    assert drawn[3:] == [("drives-500.jsonl", "0001"), ("drives-501.jsonl", "0001"), ("played-600.jsonl", "0001")]
+    assert not (tmp_path / "elsewhere/drives/500/0000").exists()
 
 
 @pytest.mark.parametrize(
