@@ -22,7 +22,7 @@ from .seal import CASES, ROOT, digest, write_json
 REGISTERED = Path(__file__).with_name("registered.json")
 FOLDER = Path("build/proof/registered")
 ANSWERS = Path("proof/answers")
-LONGEST = 300.0  # s, then a diagnosis counts as none
+LONGEST = 300.0  # s of processor time, then a diagnosis counts as none
 
 BARS = {
     "clean: a false name": [0.02, "at most"],

@@ -26,7 +26,7 @@ def main() -> int:
     scoring.add_argument("--out", type=Path, required=True)
     scoring.add_argument("--group", choices=GROUPS, default="")
     scoring.add_argument("--first", type=int, default=0, help="so many of them only (default: all)")
-    scoring.add_argument("--limit-seconds", type=float, default=0.0, help="a case (default: none)")
+    scoring.add_argument("--limit-seconds", type=float, default=0.0, help="of processor time, a case (default: none)")
     telling = commands.add_parser("table", help="print the figures")
     telling.add_argument("file", type=Path)
     given = parser.parse_args()

@@ -18,6 +18,10 @@ Said = dict[str, Any]
 Diagnose = Callable[[Path], Said]
 
 
+IDLE = 4.0
+"""Times its processor time that an answer may take by the clock."""
+
+
 class OutOfTime(BaseException):
     """No answer within the limit; not an Exception, so that nothing on the way takes it for a failure of its own."""
 
@@ -36,8 +40,8 @@ def score(
 ) -> list[dict[str, Any]]:
     """A line for each case in ``out``; what these sources of the tool have answered is not asked again.
 
-    ``limit`` [s] a case, none where 0. Lines of other sources, or of other truths, are made anew; truths that another
-    processor drew differ in their last digits.
+    ``limit`` [s of processor time] a case, none where 0. Lines of other sources, or of other truths, are made anew;
+    truths that another processor drew differ in their last digits.
     """
     version = sources()
     out.parent.mkdir(parents=True, exist_ok=True)
@@ -103,18 +107,23 @@ def asked(folder: Path, limit: float, run: Diagnose) -> dict[str, Any]:
 
 @contextmanager
 def within(limit: float) -> Iterator[None]:
-    """Raise `OutOfTime` in the main thread after so many seconds; 0: never."""
+    """Raise `OutOfTime` in the main thread after so many seconds of processor time, or `IDLE` times that by the clock:
+    what else the machine does is no part of an answer. 0: never."""
 
     def end(*_: object) -> None:
         raise OutOfTime
 
-    before = signal.signal(signal.SIGALRM, end)
-    signal.setitimer(signal.ITIMER_REAL, limit)
+    timers = ((signal.SIGPROF, signal.ITIMER_PROF, limit), (signal.SIGALRM, signal.ITIMER_REAL, IDLE * limit))
+    before = [(sign, signal.signal(sign, end)) for sign, _, _ in timers]
+    for _, timer, seconds in timers:
+        signal.setitimer(timer, seconds)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
+        for _, timer, _ in timers:
+            signal.setitimer(timer, 0.0)
+        for sign, handler in before:
+            signal.signal(sign, handler)
 
 
 def sources() -> str:

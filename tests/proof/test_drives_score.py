@@ -207,8 +207,12 @@ def test_no_answer_counts_as_none(tmp_path, folders):
 
     failed = score(folders[:1], tmp_path / "a.jsonl", tell=lambda _: None, run=fails)
     late = score(folders[:1], tmp_path / "b.jsonl", 0.2, tell=lambda _: None, run=lasts)
-    assert [x[0]["verdict"] for x in (failed, late)] == ["failed", "out of time"]
+    hung = score(folders[:1], tmp_path / "c.jsonl", 0.2, tell=lambda _: None, run=lambda _: time.sleep(9.0))
+    slow = score(folders[:1], tmp_path / "d.jsonl", 0.2, tell=lambda _: None, run=lambda _: time.sleep(0.4) or answer())
+    said = [x[0]["verdict"] for x in (failed, late, hung, slow)]
+    assert said == ["failed", "out of time", "out of time", "adequate"]
     assert late[0]["seconds"] < 2.0
+    assert 0.5 < hung[0]["seconds"] < 9.0
     assert failed[0]["notes"] == ["tau.joint1 is missing"]
 
 
