@@ -33,8 +33,8 @@ STUDIES = {
 }
 """And what stands before the names of their quantities: without another word they are of the inspection case."""
 _FILES = Path(__file__).parents[1] / "tolerance"
-KEPT = _FILES / "kept"
-"""Cases that the repository keeps; nobody needs them in an installed package."""
+KEPT = Path("tolerance/kept")
+"""Cases that the repository keeps, from its root, where studies run; an installed package has none."""
 
 
 def main() -> int:
