@@ -207,7 +207,7 @@ def test_no_answer_counts_as_none(tmp_path, folders):
 
     failed = score(folders[:1], tmp_path / "a.jsonl", tell=lambda _: None, run=fails)
     late = score(folders[:1], tmp_path / "b.jsonl", 0.2, tell=lambda _: None, run=lasts)
-    hung = score(folders[:1], tmp_path / "c.jsonl", 0.2, tell=lambda _: None, run=lambda _: time.sleep(9.0))
+    hung = score(folders[:1], tmp_path / "c.jsonl", 0.2, tell=lambda _: None, run=lambda _: time.sleep(9.0) or answer())
     slow = score(folders[:1], tmp_path / "d.jsonl", 0.2, tell=lambda _: None, run=lambda _: time.sleep(0.4) or answer())
     said = [x[0]["verdict"] for x in (failed, late, hung, slow)]
     assert said == ["failed", "out of time", "out of time", "adequate"]
