@@ -32,8 +32,10 @@ def test_duty_is_what_the_firmware_makes_of_it(recorded):
 @pytest.mark.slow
 def test_load_dependence_is_named_and_takes_a_quarter_of_the_held_out_error(recorded):
     source, decided = bam.decided_on(*recorded)
-    (found,) = bam.findings(source, decided)
+    # On some processors two more laws are named beside it, with less: rounding decides that (docs/study-bam.md).
+    found, *others = sorted(bam.findings(source, decided), key=lambda f: -f.probability)
     assert found.name == "load_dependent_friction"
+    assert all(f.probability < found.probability for f in others)
     assert 0.5 < found.probability < 0.99
     first, last = bam.steps(source, decided)
     assert first["holdout"] == pytest.approx(bam.CHECK["coulomb_and_viscous"], rel=0.1)
