@@ -37,7 +37,7 @@ def test_load_dependence_is_named_and_takes_a_quarter_of_the_held_out_error(reco
     assert found.name == "load_dependent_friction"
     assert all(f.probability < found.probability for f in others)
     assert 0.5 < found.probability < 0.99
-    first, last = bam.steps(source, decided)
+    first, *_, last = bam.steps(source, decided)
     assert first["holdout"] == pytest.approx(bam.CHECK["coulomb_and_viscous"], rel=0.1)
     assert last["holdout"] < bam.CHECK["load_dependent_friction"]
     assert last["holdout"] < 0.75 * first["holdout"]
