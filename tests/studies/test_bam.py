@@ -32,7 +32,7 @@ def test_duty_is_what_the_firmware_makes_of_it(recorded):
 @pytest.mark.slow
 def test_load_dependence_is_named_and_takes_a_quarter_of_the_held_out_error(recorded):
     source, decided = bam.decided_on(*recorded)
-    # On some processors two more laws are named beside it, with less: rounding decides that (docs/study-bam.md).
+    # On one machine two more laws are named beside it, with less; why is not shown (docs/study-bam.md).
     found, *others = sorted(bam.findings(source, decided), key=lambda f: -f.probability)
     assert found.name == "load_dependent_friction"
     assert all(f.probability < found.probability for f in others)

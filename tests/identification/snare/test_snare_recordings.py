@@ -233,7 +233,7 @@ def test_an_umbilical_on_a_pendulum_is_named_and_told_by_its_stiffness(tmp_path)
     assert answer["verdict"] == "missing_physics"
     assert [e["name"] for e in answer["effects"]] == ["umbilical_stiffness"]
     stiffness = answer["effects"][0]["parameters"]["stiffness"]
-    # Processors differ in the last digits, and fits that stop by a step's size in up to 6 %: 75.8 on one of them.
+    # Within 5 % on CI, 75.8 on one machine with the same code; why is not shown.
     assert stiffness["value"] == pytest.approx(80.0, rel=0.08)
     assert stiffness["unit"] == "N/m"
     fit = answer["fit"]["pos.target.z"]["holdout"]
