@@ -114,15 +114,15 @@ def learn(
     ]
 
     def fast(x: Array) -> tuple[Noise, float]:
-        white, coloured, time, settling = np.exp(x[:4])
-        own = Noise(float(white) + 1e-3 * size, float(coloured), float(time), size, WANDER_TIMES[-1], float(settling))
-        return own, most if freely else float(np.exp(x[4]))
+        white, coloured, time, settling, slow = np.exp(x[:5])
+        own = Noise(float(white) + 1e-3 * size, float(coloured), float(time), float(slow), WANDER_TIMES[-1], float(settling))
+        return own, most if freely else float(np.exp(x[5]))
 
-    start = np.log([0.3 * size, 0.3 * size, 0.1, 0.2 * size, 0.1 * size])
-    wide = np.array([1.5, 1.5, 1.0, 2.0, 2.0])
-    low, high = start - 6, start + np.array([2.0, 2.0, 1.6, 3.0, 3.0])
+    start = np.log([0.3 * size, 0.3 * size, 0.1, 0.2 * size, 0.3 * size, 0.1 * size])
+    wide = np.array([1.5, 1.5, 1.0, 2.0, 2.0, 2.0])
+    low, high = start - 6, start + np.array([2.0, 2.0, 1.6, 3.0, 2.0, 3.0])
     low[2] = np.log(0.02)
-    own = slice(0, 4 if freely else 5)
+    own = slice(0, 5 if freely else 6)
     found, _ = fast(_best(lambda x: _cost(fast(x), parts), start[own], wide[own], low[own], high[own]))
     averaged = [_averaged(r, c, run) for r, c, run in zip(residuals, columns, runs, strict=True)]
     own = slice(0, 2 if freely else 3)
@@ -158,7 +158,7 @@ def _best(cost: Callable[[Array], float], start: Array, wide: Array, low: Array,
         return cost(x) + 0.5 * float(np.sum(((x - start) / wide) ** 2))
 
     bounds = list(zip(low, high, strict=True))
-    return minimize(whole, start, method="L-BFGS-B", bounds=bounds, options={"maxiter": 12, "eps": 1e-3}).x
+    return minimize(whole, start, method="L-BFGS-B", bounds=bounds, options={"maxiter": 30, "eps": 1e-3}).x
 
 
 def _beside(residual: Array, columns: Array) -> Array:

@@ -122,13 +122,16 @@ def test_where_friction_settles_its_level_is_learnt():
     assert np.hypot(found.white, found.coloured) == pytest.approx(0.2, rel=0.2)
 
 
-def test_physics_that_could_explain_it_is_not_taken_for_noise():
-    """A wave of size 3 that one of the columns makes, in noise of 0.3."""
+@pytest.mark.parametrize("column", [0, 2], ids=["wave", "drift"])
+@pytest.mark.parametrize("times", [10, 100])
+def test_physics_that_could_explain_it_is_not_taken_for_noise(times, column):
+    """A wave or a drift that one of the columns makes, 10 or 100 times the noise of 0.3: the noise stays white."""
     rng = np.random.default_rng(42)
-    residual = 3 * columns()[:, 0] + 0.3 * rng.normal(size=N)
+    residual = 0.3 * times * columns()[:, column] + 0.3 * rng.normal(size=N)
     found = learnt(residual, run())
     assert np.hypot(found.white, found.coloured) == pytest.approx(0.3, rel=0.1)
-    assert found.wander < 0.3
+    assert found.coloured < 0.5 * found.white
+    assert found.wander == 0.0
 
 
 def test_the_likelihood_is_that_of_all_samples_with_the_amplitudes_integrated_out():
