@@ -115,8 +115,8 @@ def learn(
 
     def fast(x: Array) -> tuple[Noise, float]:
         white, coloured, time, settling, slow = np.exp(x[:5])
-        own = Noise(float(white) + 1e-3 * size, float(coloured), float(time), float(slow), WANDER_TIMES[-1], float(settling))
-        return own, most if freely else float(np.exp(x[5]))
+        scales = float(white) + 1e-3 * size, float(coloured), float(time), float(slow), WANDER_TIMES[-1]
+        return Noise(*scales, float(settling)), most if freely else float(np.exp(x[5]))
 
     start = np.log([0.3 * size, 0.3 * size, 0.1, 0.2 * size, 0.3 * size, 0.1 * size])
     wide = np.array([1.5, 1.5, 1.0, 2.0, 2.0, 2.0])
