@@ -46,5 +46,5 @@ def diagnose_captures(
     begun = time.monotonic()
     progress("reading the recordings")
     with captures_of(model, recordings, several(holdout), jobs) as source:
-        decided = decide(source, settled(source, model, start(model), progress), progress)
+        decided = decide(source, settled(source, model, start(model, len(source.records)), progress), progress)
     return report_on(source, decided, time.monotonic() - begun), with_found(model, decided.best.train.at)

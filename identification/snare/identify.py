@@ -64,7 +64,7 @@ def identify_captures(
     progress("reading the recordings")
     with captures_of(model, recordings, holdout, jobs) as source:
         progress("fitting the effects' parameters with the simulation in the loop")
-        given = known(model, start(model))
-        weighed, found = fitted(source, given, start(model))
+        given = known(model, start(model, len(source.records)))
+        weighed, found = fitted(source, given, start(model, len(source.records)))
         held = linearised(source, source.held, found.at) if holdout else None
         return CaptureIdentification(with_found(model, found.at), given, source, weighed, found, held)

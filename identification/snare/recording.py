@@ -8,6 +8,7 @@ force does not. Forces are tared: their mean over the first half second, with th
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -58,9 +59,9 @@ class Track:
 class CaptureRecording:
     """One capture test: its file, times (K,) [s] from the start, what was measured, and the set-up at its start.
 
-    ``sensors`` names the sensor of each body in the track's forces; ``zero`` is the time of the recording's first row,
-    ``noise`` the standard deviation of a channel's mean over 50 ms, by ``position`` and by body, ``carried`` the RMS of
-    a body's force [N].
+    ``start`` says how well its start is known; ``sensors`` names the sensor of each body in the track's forces;
+    ``zero`` is the time of the recording's first row, ``noise`` the standard deviation of a channel's mean over 50 ms,
+    by ``position`` and by body, ``carried`` the RMS of a body's force [N].
     """
 
     path: str
@@ -69,6 +70,7 @@ class CaptureRecording:
     measured: Track
     sensors: Mapping[str, str]
     setup: CaptureSetup
+    start: "Start"
     drive: RingDrive | None
     zero: float
     noise: Mapping[str, float]
@@ -105,11 +107,11 @@ def _capture(model: Model, path: str | Path, data: xr.Dataset) -> CaptureRecordi
         raise InputError(
             f"{path}: quat.{body} has no sample in the first {BEFORE:g} s; give its start, or leave it out"
         )
-    position, velocity = _start(since[start], place[start])
-    if not np.all(np.isfinite(position)):
+    begun = _start(since[start], place[start])
+    if not np.all(np.isfinite(begun.position)):
         raise InputError(f"{path}: pos.{body} has no sample in the first {BEFORE:g} s; give its start")
     orientation = _mean_turn(turn[start])
-    target = replace(given.target, position=position, velocity=velocity, orientation=orientation)
+    target = replace(given.target, position=begun.position, velocity=begun.velocity, orientation=orientation)
     if not target.rotates and (largest := _turned(turn, orientation)) > STILL:
         notes.append(
             f"the target turned by {np.degrees(largest):.2g} deg, which the model leaves out: give [capture] inertia"
@@ -124,7 +126,8 @@ def _capture(model: Model, path: str | Path, data: xr.Dataset) -> CaptureRecordi
     noise["position"] = _scatter(np.diff(measured.position[:open_snare], axis=0)) / np.sqrt(2)
     setup = replace(given, target=target)
     carried = {of: _scatter(force) for of, force in forces.items()}
-    return CaptureRecording(str(path), body, times, measured, sensors, setup, drive, zero, noise, carried, tuple(notes))
+    known = str(path), body, times, measured, sensors, setup, begun, drive, zero, noise, carried
+    return CaptureRecording(*known, tuple(notes))
 
 
 def _drive(path: str | Path, data: xr.Dataset, since: Array) -> RingDrive | None:
@@ -196,26 +199,43 @@ def _columns(data: xr.Dataset, name: str, axes: str) -> Array | None:
     return np.stack([data[n].values for n in names], axis=1) if all(n in data for n in names) else None
 
 
-def _start(since: Array, place: Array) -> tuple[Array, Array]:
-    """Position [m] and velocity [m/s] (3,) at the start; not numbers where too few samples are known.
+class Start(NamedTuple):
+    """Where a target starts, (3,) each: position [m] and velocity [m/s] of the fit, the velocity's standard deviation
+    ``spread`` [m/s], and the ``lever`` [s]: of a start that is faster by dv, the position is less by lever * dv.
+    """
+
+    position: Array
+    velocity: Array
+    spread: Array
+    lever: float
+
+    def shifted(self, setup: CaptureSetup, deviations: Sequence[float]) -> CaptureSetup:
+        """The set-up with a start velocity that is off by so many deviations along each axis."""
+        faster = self.spread * np.asarray(deviations)
+        moved = replace(setup.target, position=self.position - self.lever * faster, velocity=self.velocity + faster)
+        return replace(setup, target=moved)
+
+
+def _start(since: Array, place: Array) -> Start:
+    """Where a target starts; not numbers where too few samples are known.
 
     By a straight line through the first half second; by a cubic where the motion is bent beyond its noise; by the mean
     where it does not move beyond its noise.
     """
     known = np.isfinite(place).all(1)
     if known.sum() < FEWEST:
-        return np.full(3, np.nan), np.zeros(3)
+        return Start(np.full(3, np.nan), np.zeros(3), np.zeros(3), 0.0)
     fits = []
     for degree in (1, 3):
         columns = np.asarray(np.vander(since[known], degree + 1, increasing=True), float)
         found = np.linalg.lstsq(columns, place[known], rcond=None)[0]
-        left = np.sum((place[known] - columns @ found) ** 2) / (known.sum() - degree - 1)
-        fits.append((float(left), found, float(np.linalg.inv(columns.T @ columns)[1, 1])))
-    left, found, spread = fits[1] if fits[0][0] > 1.2 * fits[1][0] else fits[0]
-    scatter = float(np.sqrt(left * spread)) + 1e-6
-    if np.linalg.norm(found[1]) < MOVES * scatter:
-        return np.nanmean(place, axis=0), np.zeros(3)
-    return found[0], found[1]
+        left = np.sum((place[known] - columns @ found) ** 2, axis=0) / (known.sum() - degree - 1)
+        fits.append((left, found, np.linalg.inv(columns.T @ columns)))
+    left, found, own = fits[1] if fits[0][0].sum() > 1.2 * fits[1][0].sum() else fits[0]
+    spread, lever = np.sqrt(left * own[1, 1]), float(-own[0, 1] / own[1, 1])
+    if np.linalg.norm(found[1]) < MOVES * (np.linalg.norm(spread) + 1e-6):
+        return Start(np.nanmean(place, axis=0), np.zeros(3), spread, lever)
+    return Start(found[0], found[1], spread, lever)
 
 
 def _mean_turn(turns: Array) -> tuple[float, ...]:

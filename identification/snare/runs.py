@@ -13,7 +13,7 @@ from types import TracebackType
 from ...errors import InputError
 from ...models.snare.ring_drive import RingDrive
 from ...models.snare.setup import CaptureSetup
-from .recording import EVERY, CaptureRecording, Track
+from .recording import EVERY, CaptureRecording, Start, Track
 
 SEARCH = (5e-3, 6, 1e-3)
 """Step [s], elements per cable and first steps [s] in a search: within 0.1 mm of finer ones over a capture."""
@@ -24,26 +24,30 @@ MOST_LOST = 3
 """Times that processes which died are replaced."""
 
 Values = Mapping[str, float]
-Key = tuple[int, tuple[tuple[str, float], ...]]
-"""A simulation: the capture's number, and the values in order of their names, to 12 digits."""
+Asked = tuple[int, Values, tuple[float, ...]]
+"""A simulation: the capture's number, effects' values, and what its start velocity is off by (3,) [deviations]."""
+Key = tuple[int, tuple[tuple[str, float], ...], tuple[float, ...]]
+"""As remembered: values in order of their names, to 12 digits."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """A capture as it is to be simulated: set-up at its start, drive, and the number of times in its track."""
+    """A capture as it is to be simulated: set-up, its start, drive, and the number of times in its track."""
 
     setup: CaptureSetup
+    start: Start
     drive: RingDrive | None
     n_times: int
 
 
-def simulated(job: Job, values: Values) -> Track | None:
-    """Simulate a capture with values of effects' parameters; None where it cannot be, as if nothing were seen."""
+def simulated(job: Job, values: Values, faster: tuple[float, ...] = (0.0, 0.0, 0.0)) -> Track | None:
+    """Simulate a capture with values of effects' parameters, its start velocity ``faster`` by so many deviations; None
+    where it cannot be, as if nothing were seen."""
     from ...models.snare.model import Accuracy, SnareModel, SnareStepError  # an engine loads only where one runs
 
     for accuracy in (SEARCH, FINER):
         try:
-            setup = job.setup.with_values(values)
+            setup = job.start.shifted(job.setup, faster).with_values(values)
             model = SnareModel(setup.parameters, setup.target, Accuracy(*accuracy), drive=job.drive)
             history = model.run(EVERY * (job.n_times - 1), every=EVERY)
         except SnareStepError:
@@ -73,8 +77,8 @@ def _end_with_parent() -> None:
         os._exit(1)
 
 
-def _run(number: int, values: Values) -> Track | None:
-    return simulated(_jobs[number], values)
+def _run(number: int, values: Values, faster: tuple[float, ...]) -> Track | None:
+    return simulated(_jobs[number], values, faster)
 
 
 class CaptureRuns:
@@ -89,7 +93,7 @@ class CaptureRuns:
 
     def __init__(self, captures: Sequence[CaptureRecording], workers: int = 2) -> None:
         """Start nothing yet."""
-        self._jobs = tuple(Job(c.setup, c.drive, len(c.times)) for c in captures)
+        self._jobs = tuple(Job(c.setup, c.start, c.drive, len(c.times)) for c in captures)
         self._workers = workers
         self._pool: ProcessPoolExecutor | None = None
         self._lost = 0
@@ -116,13 +120,13 @@ class CaptureRuns:
         """Simulations run so far."""
         return len(self._known)
 
-    def __call__(self, asked: Sequence[tuple[int, Values]]) -> list[Track | None]:
-        """Tracks of (capture's number, values), in order; what was run before is remembered."""
-        keys = [(n, tuple(sorted((k, float(f"{v:.12g}")) for k, v in values.items()))) for n, values in asked]
+    def __call__(self, asked: Sequence[Asked]) -> list[Track | None]:
+        """Tracks, in order; what was run before is remembered."""
+        keys = [(n, tuple(sorted((k, float(f"{v:.12g}")) for k, v in x.items())), faster) for n, x, faster in asked]
         new = [key for key in dict.fromkeys(keys) if key not in self._known]
         if self._workers == 1 or (len(new) == 1 and self._pool is None):
             for key in new:
-                self._known[key] = simulated(self._jobs[key[0]], dict(key[1]))
+                self._known[key] = simulated(self._jobs[key[0]], dict(key[1]), key[2])
         while left := [key for key in new if key not in self._known]:
             try:
                 self._share_out(left)
@@ -136,6 +140,6 @@ class CaptureRuns:
     def _share_out(self, keys: Sequence[Key]) -> None:
         if self._pool is None:
             self._pool = ProcessPoolExecutor(self._workers, get_context("spawn"), _begin, (self._jobs,))
-        waiting: list[Future[Track | None]] = [self._pool.submit(_run, n, dict(values)) for n, values in keys]
+        waiting: list[Future[Track | None]] = [self._pool.submit(_run, n, dict(x), faster) for n, x, faster in keys]
         for key, future in zip(keys, waiting, strict=True):
             self._known[key] = future.result()

@@ -1,6 +1,7 @@
 """Captures behind the one interface: a simulation that answers to values, with slopes by differences.
 
-The shifts are numbers of the set-up that are known to a tolerance (`TOLERANCES`), the same in all recordings.
+The shifts are numbers of the set-up that are known to a tolerance (`TOLERANCES`), the same in all recordings, then each
+recording's own start velocity, which is fitted to its first half second.
 """
 
 import os
@@ -40,13 +41,14 @@ FEWEST_BLOCKS = 4
 class Captures:
     """Captures of a model, the training recordings first, while their processes run."""
 
-    n_shifts, anew, bent, steps = len(TOLERANCES), False, True, 4
+    anew, bent, steps = False, True, 4
 
     def __init__(self, model: Model, records: Sequence[CaptureRecording], n_train: int, runs: CaptureRuns) -> None:
         """Simulate nothing yet."""
         self.setup = model.tree_as(SnareTree).setup
         self.model, self.records, self.runs = model, tuple(records), runs
         self.train, self.held = range(n_train), range(n_train, len(records))
+        self.n_shifts = shifts_of(len(records))
         self.channels = channels(self.records[0])
         self._measured = [seen(r, r.measured) for r in self.records]
 
@@ -55,7 +57,12 @@ class Captures:
 
     def tracks(self, i: int, many: Sequence[ModelPoint]) -> list[Track | None]:
         """Simulations of a recording at many points, side by side."""
-        return self.runs([(i, self._values(at)) for at in many])
+        return self.runs([(i, self._values(at), tuple(map(float, at.shifts[self._own(i)]))) for at in many])
+
+    @staticmethod
+    def _own(i: int) -> slice:
+        """A recording's start velocity among the shifts."""
+        return slice(shifts_of(i), shifts_of(i + 1))
 
     def _values(self, at: ModelPoint) -> dict[str, float]:
         """Effects' values, and numbers within their tolerances where no effect has them; none is negative."""
@@ -65,7 +72,7 @@ class Captures:
     @staticmethod
     def _shifted(at: ModelPoint) -> dict[str, float]:
         """How far numbers are from what they are said to be."""
-        return {k: float(x * s) for (k, x), s in zip(TOLERANCES.items(), at.shifts, strict=True)}
+        return {k: float(x * s) for (k, x), s in zip(TOLERANCES.items(), at.shifts, strict=False)}
 
     def _seen(self, i: int, many: Sequence[ModelPoint]) -> list[Array | None]:
         found = [None if t is None else seen(self.records[i], t) for t in self.tracks(i, many)]
@@ -86,18 +93,23 @@ class Captures:
         usual = [self.size(p, x) for p, x in at.free]
         highs = [self.bounds(p, x)[1] for p, x in at.free]
         steps = WIDE * np.maximum(sizes, usual)
-        return self._differences(i, at, here, np.where(at.values + steps > highs, -steps, steps), "values")
+        return self._differences(i, at, here, np.diag(np.where(at.values + steps > highs, -steps, steps)), "values")
 
     def own_shifts(self, p: PlacedEffect) -> tuple[int, ...]:
         return ()
 
     def shift_slopes(self, i: int, at: ModelPoint, here: Array) -> Array:
-        return self._differences(i, at, here, np.ones(len(at.shifts)), "shifts")
+        own = self._own(i)
+        felt = [*range(len(TOLERANCES)), *range(own.start, own.stop)]
+        found = np.zeros((*here.shape, len(at.shifts)))
+        found[:, :, felt] = self._differences(i, at, here, np.eye(len(at.shifts))[felt], "shifts")
+        return found
 
     def _differences(self, i: int, at: ModelPoint, here: Array, steps: Array, of: str) -> Array:
-        """Derivatives (n, c, k) over steps (k,), nothing where the capture cannot be simulated."""
-        moved = [replace(at, **{of: getattr(at, of) + row}) for row in np.diag(steps)]
-        ends = zip(self._seen(i, moved), steps, strict=True)
+        """Derivatives (n, c, k) over steps (k, K), along one number each, nothing where the capture cannot be
+        simulated."""
+        moved = [replace(at, **{of: getattr(at, of) + row}) for row in steps]
+        ends = zip(self._seen(i, moved), steps.sum(axis=1), strict=True)
         own = [(here if x is None else x) / step - here / step for x, step in ends]
         return np.stack(own, axis=2) if own else np.zeros((*here.shape, 0))
 
@@ -173,7 +185,7 @@ class Captures:
         """Over time, since the ring closes by the clock, and over the target's place along the channel's axis, as the
         model as given has it: a measured one would explain its own noise."""
         found: dict[tuple[int, str], list[Array]] = {}
-        every, at = [*self.train, *self.held], start(self.model)
+        every, at = [*self.train, *self.held], start(self.model, len(self.records))
         seen_first = {i: self._seen(i, [at])[0] for i in every}
         places = {i: np.zeros((len(self._measured[i]), 3)) if x is None else x[:, :3] for i, x in seen_first.items()}
         last = max(len(x) for x in self._measured)
@@ -198,14 +210,19 @@ class Captures:
         return np.array([b.sum() for b in np.array_split(x, max(int(len(x) * QUARTER / BLOCK), FEWEST_BLOCKS))])
 
 
-def start(model: Model) -> ModelPoint:
-    """The model as given; a parameter without a value starts at what hardware usually has."""
+def shifts_of(recordings: int) -> int:
+    """How many numbers so many recordings have that may be off."""
+    return len(TOLERANCES) + 3 * recordings
+
+
+def start(model: Model, recordings: int) -> ModelPoint:
+    """The model of so many recordings as given; a parameter without a value starts at what hardware usually has."""
     setup, values = model.tree_as(SnareTree).setup, {}
     for p in model.effects:
         (x,) = p.effect.parameters
         usual = setup.usual(p.effect.name) if APPLIED[p.effect.name].absent is None else x.grid[0]
         values[f"{p.key}.{x.name}"] = model.values.get(f"{p.key}.{x.name}", usual)
-    return ModelPoint.of(model.effects, values, len(TOLERANCES))
+    return ModelPoint.of(model.effects, values, shifts_of(recordings))
 
 
 def number(name: str, setup: CaptureSetup) -> Effect:
@@ -236,8 +253,8 @@ def captures_of(
     records, n = load_captures(model, [*recordings, *holdout]), len(recordings)
     check_sensors(records)
     with CaptureRuns(records, jobs or min(4, os.cpu_count() or 1)) as runs:
-        at = start(model)
-        tracks = runs([(i, at.all_values) for i in range(len(records))])
+        values = start(model, 0).all_values
+        tracks = runs([(i, values, (0.0, 0.0, 0.0)) for i in range(len(records))])
         records = [sensed_by(r, track) for r, track in zip(records, tracks, strict=True)]
         check_sensors(records)
         source = Captures(model, records, n, runs)

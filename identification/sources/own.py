@@ -1,9 +1,10 @@
 """A model's own parameters, fitted to the training recordings before anything is searched."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...models.model import Model
 from ..deciding import ROUNDS
@@ -11,6 +12,8 @@ from ..evidence.arm import WeighedRecordings
 from .fit import STILL, fit, linearised, shift_columns, sizes_of
 from .source import Linearisation, ModelPoint, Source
 from .weigh import covariances, weigh
+
+Array = NDArray[np.float64]
 
 STEPS = 8
 """Most steps of the fit."""
@@ -22,20 +25,31 @@ def known(model: Model, start: ModelPoint) -> ModelPoint:
 
 
 def fitted(source: Source, given: ModelPoint, start: ModelPoint) -> tuple[WeighedRecordings, Linearisation]:
-    """The parameters fitted from a start, with the prior of what is ``given``; and the recordings as they were weighed.
+    """The parameters fitted from a start, with the prior of what is ``given``; and the recordings as weighed."""
+    here = linearised(source, source.train, start)
+    weighed = weigh(source, source.train, given, here, search=False)
+    return refitted(source, given, start, weighed, shift_columns(here))
+
+
+def refitted(
+    source: Source, given: ModelPoint, start: ModelPoint, weighed: WeighedRecordings, shifted: Sequence[Array]
+) -> tuple[WeighedRecordings, Linearisation]:
+    """As `fitted`, in noise that is known at the start, with the shifts' ``shifted`` columns (n, c, S).
 
     Far from the truth a misfit is taken for noise: where a fit ends the noise is learnt anew, until that moves nothing.
     """
-    here = linearised(source, source.train, start)
-    weighed = weigh(source, source.train, given, here, search=False)
+    at = start
     for _ in range(ROUNDS):
-        found = fit(source, given, here.at, covariances(weighed), shift_columns(here), STEPS)
-        moved = np.abs(found.at.values - here.at.values) / sizes_of(source, found.at)
-        here = found
+        found = fit(source, given, at, covariances(weighed), shifted, STEPS)
+        moved = np.abs(found.at.values - at.values) / sizes_of(source, found.at)
+        at = found.at
         if np.all(moved < STILL):
             break
-        weighed = weigh(source, source.train, given, here, search=False)
-    return weighed, here
+        if source.bent:
+            found = linearised(source, source.train, at)
+            shifted = shift_columns(found)
+        weighed = weigh(source, source.train, given, found, search=False)
+    return weighed, found
 
 
 def settled(

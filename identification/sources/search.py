@@ -15,6 +15,7 @@ from ..evidence.search import MemberOdds, Search
 from ..evidence.tolerant import searched
 from ..nuisance.noise import Noise
 from .fit import fit, linearised, shift_columns
+from .own import refitted
 from .source import GridPoint, Linearisation, ModelPoint, Source
 from .weigh import by_themselves, covariances, weigh
 
@@ -89,12 +90,13 @@ def search(
             break
         added, values = [], {}
         for slot, beside in chosen:
-            placed, start = _started(made, slot, beside)
+            placed, own = _started(made, slot, beside)
             names.append(_name(weighed, slot))
             added.append(placed)
-            values |= start
+            values |= own
         progress("fitting " + ", ".join(f"{p.effect.name} at {p.at}" for p in added))
-        here = fit(source, given, here.at.with_effects(added, values), covariances(weighed), shifted)
+        start = here.at.with_effects(added, values)
+        _, here = refitted(source, given, start, weighed, shifted)
         if source.bent:
             # Beside old columns an effect of the same number would explain what only their change leaves.
             here = linearised(source, train, here.at)

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from snarelab.identification.snare.recording import EVERY, CaptureRecording, Track
+from snarelab.identification.snare.recording import EVERY, CaptureRecording, Start, Track
 from snarelab.identification.snare.source import Captures
 from snarelab.models.effects import get_effect
 from snarelab.models.model import Model, PlacedEffect
@@ -35,6 +35,11 @@ def track(position, quaternion=None, **force):
     return Track(position, still if quaternion is None else np.asarray(quaternion, float), force)
 
 
+def known(setup):
+    """A start that is known exactly."""
+    return Start(setup.target.position, setup.target.velocity, np.zeros(3), 0.0)
+
+
 def capture(measured, *, path="a.csv", zero=0.0, noise=1e-4, target=None, carried=1.0, sensor="wrist"):
     """What was measured, all its forces by one sensor, with the same noise on position and force."""
     times = np.asarray(EVERY * np.arange(len(measured.position)), float)
@@ -42,7 +47,8 @@ def capture(measured, *, path="a.csv", zero=0.0, noise=1e-4, target=None, carrie
     scatter: dict[str, float] = dict.fromkeys(["position", *measured.force], noise)
     bodies = dict.fromkeys(measured.force, sensor)
     forces = dict.fromkeys(measured.force, carried)
-    return CaptureRecording(path, "target", times, measured, bodies, setup, None, zero, scatter, forces, ())
+    start = known(setup)
+    return CaptureRecording(path, "target", times, measured, bodies, setup, start, None, zero, scatter, forces, ())
 
 
 def along(*directions):
@@ -53,26 +59,28 @@ def along(*directions):
 
 class Straight:
     """Simulations (K, 3) of the target: a motion that all have, and a course in proportion to each value, or a law of
-    it; the cables touch from a time of the track on. ``asked`` keeps what was asked for, ``numbers`` of which capture;
-    it stands for processes."""
+    it; the cables touch from a time of the track on; a deviation of the start velocity is a ``push`` [m/s]. ``asked``
+    keeps what was asked for, ``numbers`` of which capture; it stands for processes."""
 
-    def __init__(self, motion, courses=(), law=None, fails=lambda _: False, touch=0):
+    def __init__(self, motion, courses=(), law=None, fails=lambda _: False, touch=0, push=0.0):
         self.motion, self.courses, self.law = np.asarray(motion, float), dict(courses), law or {}
-        self.fails, self.touch, self.asked, self.numbers = fails, touch, [], []
+        self.fails, self.touch, self.push, self.asked, self.numbers = fails, touch, push, [], []
 
     def __call__(self, asked: Any):
-        self.numbers += [n for n, _ in asked]
-        return [self.one(values) for _, values in asked]
+        self.numbers += [n for n, *_ in asked]
+        return [self.one(values, faster) for _, values, faster in asked]
 
     @property
     def count(self):
         return len(self.asked)
 
-    def one(self, values) -> Any:
+    def one(self, values, faster=(0.0, 0.0, 0.0)) -> Any:
         self.asked.append(dict(values))
         if self.fails(values):
             return None
         moved = [self.law.get(k, float)(values[k]) * x for k, x in self.courses.items() if k in values]
+        if self.push:
+            moved.append(self.push * EVERY * np.outer(np.arange(len(self.motion)), faster))
         force = np.where(np.arange(len(self.motion)) < self.touch, 0.0, 1.0)[:, None] * np.ones(3)
         return track(sum(moved, start=self.motion), target=force, effector=-force)
 

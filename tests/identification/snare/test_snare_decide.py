@@ -49,7 +49,7 @@ def decided(values, *, model=None, more: Any = 0.0, seed=0, law=None):
     truth = runs.one(values).position + more
     own = [truth + 1e-4 * rng.normal(size=truth.shape) for _ in range(2)]
     source = captures_of(runs, *own, model=model)
-    return source, decide(source, start(source.model))
+    return source, decide(source, start(source.model, len(source.records)))
 
 
 def test_what_was_left_out_is_named_with_its_value_and_saved():
@@ -133,7 +133,7 @@ def test_a_number_that_the_file_does_not_give_is_corrected_and_is_no_missing_phy
     truth = runs.one({mass: said_mass + 5.0}).position
     own = [truth + 1e-4 * rng.normal(size=truth.shape) for _ in range(2)]
     source = captures_of(runs, *own, model=model_of(()))
-    found = decide(source, start(source.model))
+    found = decide(source, start(source.model, len(source.records)))
     said = report_on(source, found, 1.0)
     assert said.effects == ()
     assert said.verdict == "adequate"

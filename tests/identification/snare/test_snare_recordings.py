@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from captures_by_hand import known
 from refusal import refusal
 
 from snarelab.cli import main
@@ -106,7 +107,7 @@ def test_set_up_and_effects_come_back_from_a_saved_model(tmp_path):
 def test_a_mistake_in_a_model_file_is_named(tmp_path, text, words):
     if "cable_length" in text:  # shorter than the way from ring to ring: found when the snare is built
         model = load_model(written(tmp_path, PLAIN + text))
-        job = Job(setup_of(model), None, 3)
+        job = Job(setup_of(model), known(setup_of(model)), None, 3)
         assert simulated(job, {}) is None
         return
     path = written(tmp_path, PLAIN + text)
@@ -223,18 +224,19 @@ def test_simulate_writes_a_recording_that_is_read_back(tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_an_umbilical_on_a_pendulum_is_named_and_told_by_its_stiffness(tmp_path):
+@pytest.mark.parametrize("seed", [1, 3, 5])
+def test_an_umbilical_on_a_pendulum_is_named_and_told_by_its_stiffness(tmp_path, seed):
+    """The first half second tells the start velocity to 3 %: twenty times the noise by the recording's end."""
     model = load_model(written(tmp_path, PLAIN + '[capture]\ntarget = "pendulum"\nline_length = 2.0\n'))
-    train = swinging(tmp_path, "train.csv", umbilical=80.0, seconds=2.0)
-    held = swinging(tmp_path, "held.csv", umbilical=80.0, direction=1.2, seed=2, seconds=2.0)
+    train = swinging(tmp_path, "train.csv", umbilical=80.0, seed=seed, seconds=2.0)
+    held = swinging(tmp_path, "held.csv", umbilical=80.0, direction=1.2, seed=seed + 1, seconds=2.0)
     said = []
     diagnosis, after = diagnose_captures(model, [train], held, progress=said.append, jobs=1)
     answer = json.loads(json.dumps(diagnosis.to_json(), allow_nan=False))
     assert answer["verdict"] == "missing_physics"
     assert [e["name"] for e in answer["effects"]] == ["umbilical_stiffness"]
     stiffness = answer["effects"][0]["parameters"]["stiffness"]
-    # Within 5 % on CI, 75.8 on one machine with the same code; why is not shown.
-    assert stiffness["value"] == pytest.approx(80.0, rel=0.08)
+    assert stiffness["value"] == pytest.approx(80.0, rel=0.02)
     assert stiffness["unit"] == "N/m"
     fit = answer["fit"]["pos.target.z"]["holdout"]
     assert fit["rms_after"] < 0.2 * fit["rms_before"]
@@ -271,7 +273,7 @@ def test_identify_finds_a_listed_effect(tmp_path):
     model = load_model(written(tmp_path, text))
     found = identify_captures(model, [swinging(tmp_path, "train.csv", umbilical=80.0)], jobs=1)
     (parameter,) = found.to_json()["parameters"]
-    assert parameter["value"] == pytest.approx(80.0, rel=0.05)
+    assert parameter["value"] == pytest.approx(80.0, rel=0.02)
     assert 0 < parameter["std"] < 10.0
     assert not parameter["at_bound"]
     assert found.model.values["umbilical_stiffness.target.stiffness"] == parameter["value"]

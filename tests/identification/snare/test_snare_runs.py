@@ -7,16 +7,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from captures_by_hand import known
 
 from snarelab.identification.snare.runs import MOST_LOST, CaptureRuns
 from snarelab.models.snare.parameters import SnareParameters
 from snarelab.models.snare.setup import CaptureSetup
 from snarelab.models.snare.target import Target
 
+STILL = (0.0, 0.0, 0.0)
 ASKED = [
-    (0, {"umbilical_stiffness.target.stiffness": 2.0}),
-    (1, {}),
-    (0, {"umbilical_stiffness.target.stiffness": 2.0}),
+    (0, {"umbilical_stiffness.target.stiffness": 2.0}, STILL),
+    (1, {}, STILL),
+    (0, {"umbilical_stiffness.target.stiffness": 2.0}, STILL),
 ]
 
 
@@ -25,6 +27,7 @@ class Held:
 
     def __init__(self, mass):
         self.setup = CaptureSetup(SnareParameters(), Target("pendulum", mass=mass))
+        self.start = known(self.setup)
         self.drive = None
         self.times = np.arange(6)
 
@@ -51,7 +54,7 @@ def test_processes_give_what_one_gives_and_replace_one_that_died():
         assert pool is not None
         for process in pool._processes.values():
             process.kill()
-        more = [(n, {**values, "contact_friction.pin.coefficient": 0.2}) for n, values in ASKED]
+        more = [(n, {**values, "contact_friction.pin.coefficient": 0.2}, x) for n, values, x in ASKED]
         np.testing.assert_array_equal(positions(runs(more)), expected)  # out of the cables' reach nothing rubs
         assert runs._pool is not pool
         assert runs.count == 4

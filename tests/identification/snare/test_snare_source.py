@@ -77,6 +77,18 @@ def test_a_slope_is_nothing_where_its_end_cannot_be_simulated():
     np.testing.assert_array_equal(source.slopes(0, at, forecast(source, 0, at)), 0.0)
 
 
+def test_a_start_velocity_is_its_own_recordings():
+    """Of the second of two captures, 2 mm/s along y a deviation: its own three columns alone, a ramp in one channel."""
+    source = captures_of(Straight(STILL, push=2e-3), STILL, STILL, n_train=2)
+    at = ModelPoint.of([], {}, source.n_shifts)
+    slopes = source.shift_slopes(1, at, forecast(source, 1, at))
+    assert slopes.shape[2] == 7
+    ramp = 2e-3 * (np.arange(8) + 0.4) * 0.25
+    felt = slopes[:, :3, 4:]
+    np.testing.assert_allclose(felt - felt[:1], np.multiply.outer(ramp - ramp[0], np.eye(3)), atol=1e-12)
+    np.testing.assert_array_equal(slopes[:, :, 1:4], 0.0)
+
+
 @pytest.mark.parametrize("fails", [lambda _: True, None])
 def test_what_cannot_be_simulated_or_is_not_finite_is_no_prediction(fails):
     law = {"law": lambda _: np.nan} if fails is None else {"fails": fails}
@@ -163,7 +175,7 @@ def test_how_a_rope_damps_is_known_to_a_tolerance_unless_an_effect_has_it():
 def test_a_model_starts_at_its_values_and_else_at_what_hardware_has():
     """A rope's damping is in every set-up; friction is not."""
     model = model_of(effects=[FRICTION, DAMPING, PRETENSION], values={key_of(PRETENSION): 321.0})
-    assert start(model).all_values == pytest.approx(
+    assert start(model, 1).all_values == pytest.approx(
         {key_of(FRICTION): 0.08, key_of(DAMPING): 1e-3, key_of(PRETENSION): 321.0}
     )
 

@@ -25,7 +25,9 @@ from snarelab.identification.snare.recording import (
     sensed_by,
 )
 from snarelab.models.model import Model
-from snarelab.models.snare.setup import read_setup
+from snarelab.models.snare.parameters import SnareParameters
+from snarelab.models.snare.setup import CaptureSetup, read_setup
+from snarelab.models.snare.target import Target
 
 FILE = Path("model.toml")
 TREE = read_setup(FILE, "model", {"target": "free"}, [0.0, 0.0, 0.0])
@@ -117,7 +119,7 @@ def test_a_start_is_the_lines_or_where_motion_is_bent_the_cubics(bend):
     """p + v t + bend t² + t³ without noise: both are met at t = 0. A line fits only where nothing is bent."""
     t = np.linspace(0.0, 0.5, 26)
     place = np.outer(np.ones(26), [0.1, 0.2, 0.3]) + np.outer(t + bend * (t**2 + t**3), [0.2, -0.1, 0.0])
-    position, velocity = _start(t, place)
+    position, velocity, *_ = _start(t, place)
     np.testing.assert_allclose(position, [0.1, 0.2, 0.3], atol=1e-9)
     np.testing.assert_allclose(velocity, [0.2, -0.1, 0.0], atol=1e-9)
 
@@ -134,7 +136,7 @@ def test_a_velocity_counts_from_five_standard_deviations_of_it(moves, expected):
     noise = 1e-3 * zigzag(40)
     scatter = np.sqrt(np.sum(noise**2) / 38 / np.sum((t - t.mean()) ** 2)) + 1e-6
     speed = moves * scatter
-    position, velocity = _start(t, np.column_stack([noise, 0.5 + speed * t, 0.0 * t]))
+    position, velocity, *_ = _start(t, np.column_stack([noise, 0.5 + speed * t, 0.0 * t]))
     if expected:
         np.testing.assert_allclose(velocity, [0.0, speed, 0.0], atol=1e-12)
         np.testing.assert_allclose(position, [0.0, 0.5, 0.0], atol=1e-12)
@@ -143,12 +145,26 @@ def test_a_velocity_counts_from_five_standard_deviations_of_it(moves, expected):
         np.testing.assert_allclose(position, [0.0, 0.5 + speed * t.mean(), 0.0], atol=1e-12)
 
 
+def test_a_start_is_known_as_well_as_the_line_through_it():
+    """Slope of a line: s / sqrt(sum (t - mean)²) on each axis. A line with another slope turns about its middle."""
+    t = 0.01 * np.arange(40)
+    place = np.column_stack([0.2 * t + 1e-3 * zigzag(40), -0.1 * t + 2e-3 * zigzag(40), np.zeros(40)])
+    start = _start(t, place)
+    noise = np.array([1e-3, 2e-3, 0.0]) * np.sqrt(40 / 38)
+    np.testing.assert_allclose(start.spread, noise / np.sqrt(np.sum((t - t.mean()) ** 2)), atol=1e-12)
+    setup = CaptureSetup(SnareParameters(), Target("free"))
+    moved = start.shifted(setup, (1.0, -2.0, 3.0)).target
+    faster = moved.velocity - start.velocity
+    np.testing.assert_allclose(faster, start.spread * [1.0, -2.0, 3.0], atol=1e-15)
+    np.testing.assert_allclose(moved.position + faster * t.mean(), start.position, atol=1e-15)
+
+
 @pytest.mark.parametrize(("known", "found"), [(7, False), (8, True)])
 def test_a_start_takes_eight_samples(known, found):
     t = 0.01 * np.arange(20)
     place = np.full((20, 3), np.nan)
     place[:known] = [0.1, 0.2, 0.3]
-    position, velocity = _start(t, place)
+    position, velocity, *_ = _start(t, place)
     np.testing.assert_allclose(position, [0.1, 0.2, 0.3] if found else np.full(3, np.nan))
     np.testing.assert_array_equal(velocity, 0.0)
 
