@@ -39,6 +39,10 @@ def pysindy_formulas(table: Table, values: Array, std: Array, which: str) -> dic
     columns = np.hstack(parts) * weight[:, None]
     size = np.linalg.norm(columns, axis=0)
     size = np.where(size > 0, size, 1.0)
+    # Thresholds near an end are one column where one knot lies beyond: FROLS divides by what is left of the second.
+    alike = np.tril(np.abs((columns / size).T @ (columns / size)) > 1 - 1e-9, -1)
+    columns[:, alike.any(axis=1)] = 0.0
+    kept = np.flatnonzero(np.any(columns != 0, axis=0))
     target = values * weight
     scale = float(np.linalg.norm(target))
     found = {}
@@ -53,13 +57,14 @@ def pysindy_formulas(table: Table, values: Array, std: Array, which: str) -> dic
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # that a threshold leaves no term, or an iteration ends early
             try:
-                made.fit(columns / size, (target / scale)[:, None])
+                made.fit((columns / size)[:, kept], (target / scale)[:, None])
             except ValueError as error:
                 if "linearly dependent" not in str(error):
                     raise
                 found[threshold] = []  # FROLS ends where what it has taken spans a column: no formula
                 continue
-        whole = np.asarray(made.coef_, float).ravel() * scale / size
+        whole = np.zeros(columns.shape[1])
+        whole[kept] = np.asarray(made.coef_, float).ravel() * scale / size[kept]
         cuts = np.cumsum([p.shape[1] for p in parts])[:-1]
         split = np.split(whole, cuts)
         found[threshold] = [(t, v) for t, v in zip(terms, split, strict=True) if np.any(v != 0)]

@@ -149,7 +149,7 @@ def right(found: Found, case: Case, within: float = WITHIN) -> bool:
         return False
     off = [abs(v / (case.size * a) - 1) for (_, v), (_, a, _) in zip(told, wanted, strict=True)]
     off += [abs(t.shape / s - 1) for (t, _), (_, _, s) in zip(told, wanted, strict=True) if t.shaped]
-    return max(off) <= within
+    return bool(max(off) <= within)
 
 
 def error(values: Array, case: Case) -> float:

@@ -62,7 +62,7 @@ class Likelihood:
 
 
 @dataclass(frozen=True)
-class Candidate:
+class WeighedFormula:
     """Terms with coefficients, the chi-square they leave, and log evidence over that of no torque."""
 
     terms: tuple[Term, ...]
@@ -92,11 +92,11 @@ def likelihood(table: Table, values: Array, curvature: Array, score: Array, *, f
     if fitted:
         at = [np.linspace(k[0], k[-1], _FINE * (len(k) - 1) + 1) for k in at]
     x = tuple(g.ravel() for g in np.meshgrid(*at, indexing="ij"))
-    onto = np.linalg.pinv(table.weights(x)) if fitted else np.eye(values.size)
+    onto = np.asarray(np.linalg.pinv(table.weights(x)) if fitted else np.eye(values.size), float)
     return Likelihood(table, root, y, x, onto, nothing)
 
 
-def candidates(of: Likelihood) -> list[Candidate]:
+def weighed_formulas(of: Likelihood) -> list[WeighedFormula]:
     """One for each set of kinds of terms, the most probable first; what is missing to one is no formula's."""
     search = _Search(of)
     sets = search.sets()
@@ -197,7 +197,7 @@ class _Search:
         both = (bb * ay**2 - 2 * ab * ay * by + aa * by**2) / np.where(good, apart, 1.0)
         return np.where(self.double, np.where(good, both, 0.0), single)
 
-    def fitted(self, terms: tuple[Term, ...]) -> Candidate:
+    def fitted(self, terms: tuple[Term, ...]) -> WeighedFormula:
         """Coefficients by least squares."""
         parts = [self.of.columns(t) for t in terms]
         whole = np.concatenate(parts, axis=1)
@@ -206,9 +206,9 @@ class _Search:
         numbers = len(found) + sum(t.shaped for t in terms)
         cuts = np.cumsum([p.shape[1] for p in parts])[:-1]
         log_evidence = 0.5 * (self.of.energy - left) - numbers * self.of.number
-        return Candidate(terms, tuple(np.split(found, cuts)), left, log_evidence)
+        return WeighedFormula(terms, tuple(np.split(found, cuts)), left, log_evidence)
 
-    def refined(self, start: Candidate) -> Candidate:
+    def refined(self, start: WeighedFormula) -> WeighedFormula:
         """Shapes between the points of the grid, by Gauss and Newton's steps, halved until they help."""
         free = [k for k, t in enumerate(start.terms) if t.shaped]
         best = start

@@ -16,7 +16,7 @@ from ..models.empirical import NAME, likelihood_of, table_values, tables_of
 from ..models.model import Model
 from ..models.table import Table
 from ..report.words import percent
-from .formula_search import Candidate, Likelihood, candidates, likelihood
+from .formula_search import Likelihood, WeighedFormula, likelihood, weighed_formulas
 from .formula_terms import Term, identities
 
 Array = NDArray[np.float64]
@@ -127,7 +127,7 @@ def formulate_table(
         of = likelihood(table, v, np.diag(error**-2), v / error**2, fitted=False)
     else:
         of = likelihood(table, v, *seen, fitted=True)
-    found = candidates(of)
+    found = weighed_formulas(of)
     if not found:
         raise InputError(f"{at}, table over {table.words}: it says nothing of any term; no formula")
     best = found[0]
@@ -144,6 +144,6 @@ def formulate_table(
     return FormulaChoice(at, table, _formula(best, of), tuple(_formula(c, of) for c in rivals[:5]), max(none, 0.0))
 
 
-def _formula(c: Candidate, of: Likelihood) -> TableFormula:
+def _formula(c: WeighedFormula, of: Likelihood) -> TableFormula:
     share, error = 1 - c.left / of.energy, float(np.sqrt(c.left / len(of.y)))
     return TableFormula(c.terms, c.values, share, error, c.probability)
