@@ -11,7 +11,7 @@ ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 # Hundreds of processes are started: what an interpreter compiles, it keeps, whatever the environment says.
 unexport PYTHONDONTWRITEBYTECODE
 
-BENCHES := torque friction_fit diagnosis joints fast floating cosim fmu snare ecos_inspection tolerance
+BENCHES := torque friction_fit diagnosis joints fast floating cosim fmu snare ecos_inspection tolerance formulas
 
 .PHONY: help demo test test-slow check fix hooks studies bench accuracy fuzz kills first-hour hostile mutants proof ledger fmus docs clean $(STUDIES:%=study-%)
 

@@ -1,8 +1,6 @@
 """What has no name, modelled all the same: tables for the nameless curves that a diagnosis is left with.
 
-A table's values v have a Gaussian prior with a squared-exponential kernel over its coordinates (Rasmussen and Williams
-2006, chapter 2). Length and size are those of the greatest evidence; the baseline's parameters are free beside the
-values, so that a table holds only what no law of the baseline can, and they are fitted again beside the table. What was
+A table holds only what no law of the baseline can (`tabulating`), whose parameters are fitted again beside it. What was
 named keeps the values that the recordings confirmed: a table that is nearly a sum of laws must not change them (a cut
 between modules: Liu, Bayarri and Berger 2009). The held-out recordings confirm the table, by the density that they have
 with it and without.
@@ -10,15 +8,14 @@ with it and without.
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, cholesky, eigh
 
 from ..models.empirical import NAME, placed_tables, read_along, tables_of
 from ..models.model import PlacedEffect
-from ..models.table import MOST, Table, read_words
+from ..models.table import Table, read_words
 from .deciding import GATE
 from .evidence.confirm import blocks, scatter
 from .evidence.diagnose import ArmDecision
@@ -26,17 +23,11 @@ from .fitting.assembly import FreeParameter, TorqueModel
 from .fitting.experiment import Experiment
 from .fitting.fit import Fit, fit
 from .fitting.problem import gather
-from .fitting.schur import schur
 from .search.refit import carry
 from .search.rest import fitted
+from .tabulating import Rest, tabulate
 
 Array = NDArray[np.float64]
-
-LENGTHS = (0.03, 0.06, 0.12, 0.25, 0.5)
-"""Length scales that are tried [share of the coordinate's range]; two knots a length."""
-DEVIATIONS = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
-"""Standard deviations of the values that are tried [RMS torque of the channel]."""
-_NUGGET = 1e-6  # of the kernel's variance: keeps it from being singular
 
 
 @dataclass(frozen=True)
@@ -49,13 +40,6 @@ class EmpiricalLaw:
     values: Mapping[str, float]
     gain: float
     sure: float
-
-
-@dataclass(frozen=True)
-class _Chosen:
-    table: Table
-    columns: list[Array]  # by recording (n_band, k), of whitened values z: v = root z
-    root: Array
 
 
 def empirical_laws(
@@ -93,76 +77,19 @@ def _tables(
     assembly, at = final.assembly, final.assembly.tree.joints[c].name
     covariances = [row[c].covariance for row in decided.best.found.weighed.evidence.channels]
     size = float(decided.best.found.weighed.scale[c])
-    residuals, always = [], []
-    for e in train:
+    rests = []
+    for e, covariance in zip(train, covariances, strict=False):  # the held-out recordings' come last
         residual, own = assembly.residual(e, final.theta)
-        residuals.append(residual[:, c])
         index, columns = gather(own, c)
         baseline = [k for k, i in enumerate(index) if _effect_of(assembly.slots[i]) not in named]
-        always.append(columns.reshape(len(residual), -1)[:, baseline])
-    free = always[0].shape[1]
-    chosen: list[_Chosen] = []
+        always = columns.reshape(len(residual), -1)[:, baseline]
+        rests.append(Rest(residual[:, c], always, partial(e.to_band, channel=c), covariance.solve))
     loads = [assembly.evaluate(e, final.theta).load for e in train]
-    for over, times in wanted:
-        read = [_read(assembly, e, load, c, over, times) for e, load in zip(train, loads, strict=True)]
-        signals, factors = [x[:-1] for x in read], [x[-1] for x in read]
-        best: tuple[float, _Chosen] | None = None
-        for length in LENGTHS:
-            steps = int(np.ceil(2 / length)) + 1
-            if steps ** len(over) > MOST:
-                continue
-            ends = [
-                (min(float(x[k].min()) for x in signals), max(float(x[k].max()) for x in signals))
-                for k in range(len(over))
-            ]
-            table = Table(over, times, tuple(tuple(np.linspace(low, high, steps).tolist()) for low, high in ends))
-            raw = [e.to_band(table.weights(x) * f[:, None], c) for e, x, f in zip(train, signals, factors, strict=True)]
-            root = cholesky(_kernel(table.shape, length), lower=True)
-            own = [
-                np.hstack([b, *(o.columns[i] for o in chosen), r, y[:, None]])
-                for i, (b, r, y) in enumerate(zip(always, raw, residuals, strict=True))
-            ]
-            gram: Array = np.sum([x.T @ k.solve(x) for x, k in zip(own, covariances, strict=False)], axis=0)
-            before = gram.shape[0] - 1 - root.shape[0]
-            gram[np.arange(free, before), np.arange(free, before)] += 1.0  # tables chosen before have their prior
-            curvature, score = schur(gram[:-1, :-1], gram[:-1, -1], before)
-            for s, value in zip(DEVIATIONS, _evidence(root.T @ curvature @ root, root.T @ score, size), strict=True):
-                if best is None or value > best[0]:
-                    best = value, _Chosen(table, [x @ (size * s * root) for x in raw], size * s * root)
-        if best is not None and best[1].table.words not in [o.table.words for o in chosen]:
-            chosen.append(best[1])
-    own = [np.hstack([b, *(o.columns[i] for o in chosen)]) for i, b in enumerate(always)]
-    solved = [k.solve(x) for x, k in zip(own, covariances, strict=False)]
-    matrix: Array = np.sum([a.T @ b for a, b in zip(own, solved, strict=True)], axis=0)
-    score: Array = np.sum([b.T @ r for b, r in zip(solved, residuals, strict=True)], axis=0)
-    curvature, left = schur(matrix, score, free)
-    factorised = cho_factor(curvature + np.eye(len(left)), lower=True)
-    amplitudes, spread = cho_solve(factorised, left), cho_solve(factorised, np.eye(len(left)))
-    values: dict[str, float] = {}
-    at_column = 0
-    for o in chosen:
-        part = slice(at_column, at_column + len(o.root))
-        at_column = part.stop
-        value = o.root @ amplitudes[part]
-        std = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", o.root, spread[part, part], o.root), 0.0))
-        for name, v, d in zip(o.table.names, value, std, strict=True):
-            values |= {f"{NAME}.{at}.{name}": float(v), f"std.{NAME}.{at}.{name}": float(d)}
-    return tuple(o.table for o in chosen), values
-
-
-def _kernel(shape: Sequence[int], length: float) -> Array:
-    """Squared-exponential covariance of unit variance at evenly spaced knots over [0, 1] along each coordinate."""
-    at = np.array(list(product(*(np.linspace(0, 1, n) for n in shape))))
-    apart = np.sum((at[:, None] - at[None, :]) ** 2, axis=2)
-    return np.exp(-0.5 * apart / length**2) + _NUGGET * np.eye(len(at))
-
-
-def _evidence(matrix: Array, score: Array, size: float) -> Array:
-    """Log evidence of each of DEVIATIONS, but for what all have in common, of values of unit prior in units of it."""
-    curvature, turn = eigh(matrix)
-    own = (size * np.array(DEVIATIONS))[:, None] ** 2
-    spread = 1 + own * np.maximum(curvature, 0.0)
-    return np.sum(0.5 * own * (turn.T @ score) ** 2 / spread - 0.5 * np.log(spread), axis=1)
+    reads = [
+        [_read(assembly, e, load, c, over, times) for e, load in zip(train, loads, strict=True)]
+        for over, times in wanted
+    ]
+    return tabulate(at, wanted, reads, rests, size)
 
 
 def _read(assembly: TorqueModel, e: Experiment, load: Array, c: int, over: tuple[str, ...], times: str) -> list[Array]:
@@ -184,7 +111,7 @@ def _refitted(
 ) -> Fit:
     """The baseline fitted again beside a table and the named laws, which are held."""
     before = final.assembly
-    known = before.values(final.theta) | {k: v for k, v in values.items() if not k.startswith("std.")}
+    known = before.values(final.theta) | {k: v for k, v in values.items() if k.startswith(f"{NAME}.")}
 
     def assembled(effects: Sequence[PlacedEffect], values: Mapping[str, float]) -> TorqueModel:
         made = TorqueModel(before.tree, (*effects, placed), before.base, before.scales, values)

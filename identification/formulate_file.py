@@ -9,7 +9,8 @@ from ..errors import InputError
 from ..files import written_whole
 from ..models.table import TIMES, UNITS, Table
 from ..report.words import percent
-from .formulate import FormulaChoice, Term
+from .formula_terms import Term
+from .formulate import FormulaChoice
 
 Array = NDArray[np.float64]
 

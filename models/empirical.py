@@ -24,7 +24,11 @@ from .tree import Tree
 
 NAME = "empirical"
 
-_KEYS = ("at", "over", "times", "knots", "values", "std")
+LIKELIHOOD = ("score", "curvature")
+"""What a fit's recordings alone say of a table's values v, ``score v - v curvature v / 2`` in log density; of the
+curvature the lower triangle by rows."""
+
+_KEYS = ("at", "over", "times", "knots", "values", "std", *LIKELIHOOD)
 _EVEN = 1e-6  # of a step: knots that differ from even steps by rounding
 
 
@@ -144,6 +148,29 @@ def table_values(table: Table, at: str, known: Mapping[str, float], what: str = 
     return np.array([known[stem + name] for name in table.names]).reshape(table.shape)
 
 
+def likelihood_values(table: Table, at: str, curvature: np.ndarray, score: np.ndarray) -> dict[str, float]:
+    """What recordings say of a table's values, as values of a model: curvature (k, k) and score (k,)."""
+    lower = curvature[np.tril_indices(len(score))]
+    found = {f"score.{NAME}.{at}.{name}": float(x) for name, x in zip(table.names, score, strict=True)}
+    stem = f"curvature.{NAME}.{at}.{table.names[0]}"
+    return found | {f"{stem}.{k}": float(x) for k, x in enumerate(lower)}
+
+
+def likelihood_of(table: Table, at: str, known: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray] | None:
+    """Curvature (k, k) and score (k,) of a table's values, where a model has them."""
+    n, stem = len(table.names), f"curvature.{NAME}.{at}.{table.names[0]}"
+    if f"{stem}.0" not in known:
+        return None
+    curvature = np.zeros((n, n))
+    curvature[np.tril_indices(n)] = [known[f"{stem}.{k}"] for k in range(n * (n + 1) // 2)]
+    return curvature + np.tril(curvature, -1).T, table_values(table, at, known, "score.").ravel()
+
+
+def of_a_table(key: str) -> bool:
+    """Does a model's value belong to a table's entry?"""
+    return key.startswith((f"{NAME}.", *(f"{what}.{NAME}." for what in ("std", *LIKELIHOOD))))
+
+
 def read_empirical(
     path: Path, raw: Mapping[str, Any], tree: Tree, system: str
 ) -> tuple[tuple[PlacedEffect, ...], dict[str, float]]:
@@ -186,7 +213,22 @@ def read_empirical(
             if key == "std" and (numbers < 0).any():
                 raise InputError(f"{where}: std = {numbers.min():g}; allowed are numbers from 0 up")
             values |= {f"{what}{NAME}.{at}.{name}": float(v) for name, v in zip(table.names, numbers.flat, strict=True)}
+        values |= _likelihood(where, entry, at, table)
     return tuple(placed_tables(at, tables) for at, tables in found.items()), values
+
+
+def _likelihood(where: str, entry: Mapping[str, Any], at: str, table: Table) -> dict[str, float]:
+    n = len(table.names)
+    found = {key: _numbers(where, key, entry[key], 1) for key in LIKELIHOOD if key in entry}
+    for key, size in zip(LIKELIHOOD, (n, n * (n + 1) // 2), strict=True) if found else ():
+        if len(found.get(key, ())) != size:
+            raise InputError(f"{where}: {key} has {len(found.get(key, ()))} numbers, knots ask for {size}; or leave "
+                             f"{' and '.join(LIKELIHOOD)} out")  # fmt: skip
+    if not found:
+        return {}
+    curvature = np.zeros((n, n))
+    curvature[np.tril_indices(n)] = found["curvature"]
+    return likelihood_values(table, at, curvature, np.array(found["score"], float))
 
 
 def _table(where: str, entry: Mapping[str, Any], joints: Sequence[str]) -> Table:
@@ -248,5 +290,8 @@ def empirical_tables(placed: Iterable[PlacedEffect], known: Mapping[str, float])
             entry |= {"knots": [list(k) for k in t.knots], "values": table_values(t, p.at, known).tolist()}
             if f"std.{NAME}.{p.at}.{t.names[0]}" in known:
                 entry["std"] = table_values(t, p.at, known, "std.").tolist()
+            seen = likelihood_of(t, p.at, known)
+            if seen is not None:
+                entry |= {"score": seen[1].tolist(), "curvature": seen[0][np.tril_indices(len(seen[1]))].tolist()}
             made.append(entry)
     return made

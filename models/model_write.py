@@ -9,7 +9,7 @@ from ..files import written_whole
 from ..recordings.mixes import signal_fields
 from .docking.bench_setup import DockingTree
 from .effects import get_effect
-from .empirical import NAME, empirical_tables, tables_of
+from .empirical import NAME, empirical_tables, of_a_table, tables_of
 from .floating.tree import FloatingTree
 from .holding import Holding
 from .model import Model, PlacedEffect, places
@@ -84,7 +84,7 @@ def save_model(model: Model, path: str | Path, note: str) -> None:
     axes = [axis for axis in model.tree.axes if axis.name not in motors]
     if axes:
         lines += ["", "[axes]", *(f"{toml_text(a.name)} = {toml_text(dict(a.along))}" for a in axes)]
-    values = {k: v for k, v in model.values.items() if not k.startswith((f"{NAME}.", f"std.{NAME}."))}
+    values = {k: v for k, v in model.values.items() if not of_a_table(k)}
     if values:
         lines += ["", "[parameters]", *(f"{toml_text(k)} = {float(v)!r}" for k, v in values.items())]
     for table in tables:

@@ -9,7 +9,13 @@ from scipy.integrate import cumulative_trapezoid
 from bench.fmu_models import Slave, write_model
 from snarelab.errors import InputError
 from snarelab.fmu.export import export
-from snarelab.models.empirical import NAME, empirical_effect, table_values, tables_of
+from snarelab.models.empirical import (
+    NAME,
+    empirical_effect,
+    likelihood_of,
+    table_values,
+    tables_of,
+)
 from snarelab.models.hidden_state import evaluate_law
 from snarelab.models.model_file import load_model
 from snarelab.models.model_write import save_model
@@ -211,3 +217,22 @@ def test_tables_over_two_joints_follow_in_an_fmu_as_in_simulate(tmp_path, versio
     np.testing.assert_allclose(back.get(["tau.joint1", "tau.joint2"]), [3.0, -2.0], atol=1e-6)
     for slave in (s, back):
         slave.close()
+
+
+def test_score_and_curvature_are_kept_and_saved(tmp_path):
+    path = write_model(tmp_path, "arm", 1, "[]", {})
+    entry = '[[empirical]]\nat = "joint1"\nover = ["position"]\nknots = [[0.0, 1.0, 2.0, 3.0]]\nvalues = [1, 2, 3, 4]\n'
+    lower = "curvature = [4, 1, 5, 2, 0, 6, 0, 1, 2, 7]\n"
+    path.write_text(path.read_text() + entry + "score = [1, -1, 2, 0.5]\n" + lower)
+    save_model(load_model(path), tmp_path / "again.toml", "again")
+    for model in map(load_model, (path, tmp_path / "again.toml")):
+        (effect,) = (p.effect for p in model.effects if p.effect.name == NAME)
+        seen = likelihood_of(tables_of(effect)[0], "joint1", model.values)
+        assert seen is not None
+        np.testing.assert_array_equal(seen[0], [[4, 1, 2, 0], [1, 5, 0, 1], [2, 0, 6, 2], [0, 1, 2, 7]])
+        np.testing.assert_array_equal(seen[1], [1, -1, 2, 0.5])
+    path.write_text(path.read_text().replace(lower, ""))
+    with pytest.raises(
+        InputError, match=r"curvature has 0 numbers, knots ask for 10; or leave score and curvature out"
+    ):
+        load_model(path)
