@@ -239,13 +239,17 @@ def _name(
 
 
 def _rivals(search: Search, slot: MemberOdds, amplitudes: Array) -> tuple[RivalOdds, ...]:
-    """Names that could stand in a slot: likely ones, and those whose law can do what the slot's does."""
+    """Names that could stand in a slot: likely ones, and those whose law can do what the slot's does; a whole law that
+    holds the slot's and, as it may, another name's of the set."""
     found, on = [], search.on
-    own = slot.taken.item
+    own, name = slot.taken.item, search.pool[slot.taken.hypothesis].label
     energy = float(amplitudes @ on.own(own) @ amplitudes)
     reached = set(on.evidence.reached(on.evidence.items[own]))
     for h, x in enumerate(search.pool):
-        if h == slot.taken.hypothesis or not x.named or not np.isfinite(slot.odds[h]):
+        if h == slot.taken.hypothesis or not x.named:
+            continue
+        holds = x.label.at == name.at and name.effect.name in x.label.effect.contains and h not in search.barred
+        if not np.isfinite(slot.odds[h]) and not holds:
             continue
         share = float(slot.shares[h])
         alike = share >= CLASS

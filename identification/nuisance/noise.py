@@ -118,7 +118,7 @@ def learn(
         scales = float(white) + 1e-3 * size, float(coloured), float(time), float(slow), WANDER_TIMES[-1]
         return Noise(*scales, float(settling)), most if freely else float(np.exp(x[5]))
 
-    start = np.log([0.3 * size, 0.3 * size, 0.1, 0.2 * size, 0.3 * size, 0.1 * size])
+    start = np.log([0.3 * size, 0.3 * size, 0.1, 0.2 * size, size, 0.1 * size])
     wide = np.array([1.5, 1.5, 1.0, 2.0, 2.0, 2.0])
     low, high = start - 6, start + np.array([2.0, 2.0, 1.6, 3.0, 2.0, 3.0])
     low[2] = np.log(0.02)
