@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.model import Model
+from ...models.model import Model, PlacedEffect
 from ..deciding import ALIKE, CLASS, DRIVEN, LAW_ERROR, NEARLY, ROUNDS
 from ..fitting.base_parameters import BaseParameters
 from ..fitting.experiment import Experiment, Scales
@@ -248,8 +248,7 @@ def _rivals(search: Search, slot: MemberOdds, amplitudes: Array) -> tuple[RivalO
     for h, x in enumerate(search.pool):
         if h == slot.taken.hypothesis or not x.named:
             continue
-        holds = x.label.at == name.at and name.effect.name in x.label.effect.contains and h not in search.barred
-        if not np.isfinite(slot.odds[h]) and not holds:
+        if not np.isfinite(slot.odds[h]) and (h in search.barred or not _holds(x.label, name)):
             continue
         share = float(slot.shares[h])
         alike = share >= CLASS
@@ -258,6 +257,11 @@ def _rivals(search: Search, slot: MemberOdds, amplitudes: Array) -> tuple[RivalO
         if alike or share >= 0.005:
             found.append(RivalOdds(x.label, share, not alike))
     return tuple(sorted(found, key=lambda r: (r.separable, -r.probability))[:6])
+
+
+def _holds(whole: PlacedEffect, part: PlacedEffect) -> bool:
+    """Is a law, at its place, a special case of the other one?"""
+    return whole.at == part.at and part.effect.name in whole.effect.contains
 
 
 def likeness(search: Search, own: int, amplitudes: Array, energy: float, other: int) -> float:

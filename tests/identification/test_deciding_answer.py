@@ -4,6 +4,7 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
+import pytest
 from explained import Explained
 from moved_numbers import FACTORS, move, planted
 
@@ -79,6 +80,24 @@ def test_what_adds_the_same_is_alike(monkeypatch):
             move(patch, "ALIKE", factor)
             assert rivals(0.01, 0.6) == [factor > 1]
             assert rivals(0.01, 0.99) == [factor > 1]
+
+
+@pytest.mark.parametrize(("barred", "found"), [((), ["inertia_error"]), ((2,), [])])
+def test_a_whole_law_of_two_names_is_a_rival_of_each_though_it_stands_beside_neither(barred, found):
+    """A payload and an offset of the centre of mass are parts of an error of all mass properties."""
+    made = planted(1.0)
+    _, x = made.columns.of(0, 0)
+    x[:, 2] = x[:, 0]
+    labels = [PlacedEffect(get_effect(name), "link3") for name in ("payload_mass", "com_offset", "inertia_error")]
+    one = SimpleNamespace(amplitudes=[0])
+    items = [Item(np.array([k]), np.ones(1), np.zeros(1, bool), False, one) for k in range(3)]
+    made = Explained(made.pieces, made.columns, items, 0)
+    odds = (0.0, -9.0, -9.0)
+    several = [Hypothesis(y.key, True, (i,), x, y) for y, i, x in zip(labels, items, odds, strict=True)]
+    run = Search(ProjectedEvidence(made.evidence(), (0,)), several, barred)
+    slot = next(s for s in run.answer() if s.taken.hypothesis == 0)
+    object.__setattr__(slot, "odds", np.array([slot.odds[0], -np.inf, -np.inf]))
+    assert [r.placed.effect.name for r in rounds._rivals(run, slot, np.ones(1))] == found
 
 
 def becomes(alike: float) -> bool:
