@@ -47,4 +47,6 @@ def diagnose_captures(
     progress("reading the recordings")
     with captures_of(model, recordings, several(holdout), jobs) as source:
         decided = decide(source, settled(source, model, start(model, len(source.records)), progress), progress)
-    return report_on(source, decided, time.monotonic() - begun), with_found(model, decided.best.train.at)
+        # What was named step by step is fitted again, while there are processes to simulate in.
+        answer = report_on(source, decided, time.monotonic() - begun)
+    return answer, with_found(model, decided.best.train.at)
