@@ -45,6 +45,9 @@ class Plant:
         Shift of a link's centre of mass [m, link frame].
     encoder_step, encoder_noise : float
         Quantum and RMS of the position reading [S]; the servo sees the same readings.
+    drive_delay : float
+        The drive moves as said above, but this long [s] after it should. The recorded torque is what it should be then:
+        the command, ahead of what the joint gets.
     tau_gain, tau_bias, tau_drift, tau_delay, tau_noise
         The torque channel reads gain · torque(t − delay [s]) + bias [T] + drift + white noise of this RMS [T].
     servo : Servo or None
@@ -67,6 +70,7 @@ class Plant:
     com_offset: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
     encoder_step: Mapping[str, float] = field(default_factory=dict)
     encoder_noise: Mapping[str, float] = field(default_factory=dict)
+    drive_delay: Mapping[str, float] = field(default_factory=dict)
     tau_gain: Mapping[str, float] = field(default_factory=dict)
     tau_bias: Mapping[str, float] = field(default_factory=dict)
     tau_drift: Mapping[str, Drift] = field(default_factory=dict)
@@ -195,6 +199,7 @@ def _closed_loop(
     waves = [(wave.amplitude, wave.cycles, wave.phase) for wave in plant.ripple.values()]
     amplitude, cycles, phase = np.array(waves).reshape(-1, 3).T
     bristles = Bristles(model, data, {j: law for j, law in plant.friction.items() if isinstance(law, LuGre)})
+    late = [(j, CONTROL_RATE * x) for j, x in enumerate(plant.per_joint("drive_delay")) if x]
     step = plant.per_joint("encoder_step")
     quantised = step > 0.0
     forward, kp, kd = _servo_gains(plant, target)
@@ -219,6 +224,9 @@ def _closed_loop(
         push, later = later, disturbance[k]
         for share in shares:
             load = torque + push + share * (command - torque + later - push)
+            for j, steps in late:
+                due = torque[j] + share * (command[j] - torque[j])
+                load[j] += _queued(drive[: k + 1, j], command[j], k + share - steps) - due
             if rippled.size:
                 load[rippled] += amplitude * np.sin(cycles * q[motor[rippled]] + phase)
             for dof, spring in backlash:
@@ -229,6 +237,15 @@ def _closed_loop(
             bristles.slip()
         torque = command
     return read_q, read_link, drive
+
+
+def _queued(told: NDArray, last: float, step: float) -> float:
+    """What a drive was told for a step of the servo, which may lie between two; ``last`` follows what it was told."""
+    if step <= 0.0:
+        return told[0]
+    before = int(step)
+    after = told[before + 1] if before + 1 < len(told) else last
+    return told[before] + (step - before) * (after - told[before])
 
 
 def _servo_gains(plant: Plant, target: tuple[NDArray, NDArray, NDArray]) -> tuple[NDArray, NDArray, NDArray]:

@@ -14,10 +14,9 @@ chapters 6 and 8, for M, c and M's factors).
 At a springy joint ``q`` is the motor, as an encoder reads it, and ``q_link`` the link.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf
-from typing import Any
 
 import casadi as ca
 
@@ -32,7 +31,7 @@ from .base import Base
 from .equations import Equations, Ledger
 from .placed_laws import PlacedLaws, identifier, summed
 from .rigid_arm import RigidArm, body_outputs, rigid
-from .sensors import read_sensors
+from .sensors import delivered, read_sensors
 from .suspension import PLACES, rig_reach, rig_signals
 from .symbolic import root
 
@@ -88,7 +87,7 @@ class _Writer:
 
     def written(self, stiff: bool | None, servo: ServoGains | None, start: Sequence[float]) -> Equations:
         ledger, n, arm, tree = self.ledger, self.n, self.arm, self.model.tree
-        self.tau = ca.vertcat(*self._each(ledger.input, "tau", self.torque_units, "drive torque delivered at"))
+        self.tau = ca.vertcat(*self._inputs())
         words = f"on the tip ({arm.tree.links[arm.tip_link].name}), in the world frame"
         at_tip = ca.vertcat(
             ledger.vector_input("force.tip", "N", f"force from outside {words}"),
@@ -102,6 +101,8 @@ class _Writer:
         self.base = base = Base(arm, ledger, laws)
         if servo is not None:
             self.tau += self._servo(servo, q, qd, start)
+        command = self.tau
+        self.tau, command_rates = delivered(laws, ledger, command, (q, qd), (start_q, start_qd))
 
         # A spring's twist starts where it carries what the arm weighs at the start.
         resting = rigid(tree, arm, phi, start_q, ca.SX(n, 1)).terms[base.size :]
@@ -128,7 +129,7 @@ class _Writer:
         qdd = ca.SX(link_qdd)
         for j, p in springy.items():
             qdd[j] = self._motor(friction, j, p, springs[j])
-        rates = [*ca.vertsplit(qd), *ca.vertsplit(qdd), *base.rates(accelerations[: base.size])]
+        rates = [*ca.vertsplit(qd), *ca.vertsplit(qdd), *base.rates(accelerations[: base.size]), *command_rates]
         for j in springy:
             rates += [twists[j][1], qdd[j] - link_qdd[j]]
         for p, _ in hidden:
@@ -147,7 +148,7 @@ class _Writer:
                 states = dict((q.key, s) for q, s in hidden).get(p.key, {})
                 laws.tell_held(p.at, p.effect.law.held(self._signals(p, motion, qdd, load, now) | states))
         body_outputs(ledger, arm, base, now.tip, qd_link)
-        columns = {"q": q, "qd": qd, "qdd": qdd, "load": load, "tau": self.tau, "q_link": q_link}
+        columns = {"q": q, "qd": qd, "qdd": qdd, "load": load, "tau": command, "q_link": q_link}
         signals = [{name: x[j] for name, x in columns.items()} for j in range(n)]
         rates += read_sensors(laws, ledger, signals, {"q": start_q, "q_link": start_link})
         kind = "floating" if arm.floating else "fixed"
@@ -157,10 +158,14 @@ class _Writer:
             identifier(self.model.name), description, rates, self._stiff(rates) if stiff is None else stiff
         )
 
-    def _each(self, add: Callable[..., ca.SX], stem: str, units: list[str], words: str, *rest: Any) -> list[ca.SX]:
-        """One variable a joint."""
-        named = zip(self.joints, units, strict=True)
-        return [add(f"{stem}.{joint}", unit, *rest, f"{words} {joint}") for joint, unit in named]
+    def _inputs(self) -> list[ca.SX]:
+        """Torque that each drive delivers, or is told to deliver."""
+        late = {p.at for p in self.model.effects if p.effect.leads}
+        units = dict(zip((f"tau.{joint}" for joint in self.joints), self.torque_units, strict=True))
+        words = {name: "commanded" if name in late else "delivered" for name in units}
+        return [
+            self.ledger.input(x, u, f"drive torque {words[x]} at {x.removeprefix('tau.')}") for x, u in units.items()
+        ]
 
     def _starts(self, start: Sequence[float]) -> tuple[ca.SX, ca.SX]:
         """Positions and speeds at the start (J,)."""

@@ -2,13 +2,15 @@
 
 Inputs are the motion ``q qd qdd`` of every joint, outputs ``tau`` as the sensors would read it. The motion is the true
 one: where a position sensor is late, ``sensor.q.<joint>`` is what it reads of it. (A recording has the reading, and
-`simulate`, which knows all of it, turns the delay round; an FMU cannot know a motion ahead.) On a floating base its
+`simulate`, which knows all of it, turns the delay round; an FMU cannot know a motion ahead.) For the same reason, where
+a drive is late ``tau`` is the torque that it delivers: its command was given the delay before. On a floating base its
 motion is given too, and the force and moment that it needs from outside come out: none, where the model is complete.
 
 Hidden states are stepped with the motion linear between communication points, as `snarelab.models.hidden_state` steps
 them between samples.
 """
 
+import warnings
 from collections.abc import Callable
 
 import casadi as ca
@@ -102,7 +104,7 @@ class _Follower:
         for joint, (_, unit), reading in zip(
             self.joints, self.units, ca.vertsplit(readings[self.first :]), strict=True
         ):
-            ledger.output(f"tau.{joint}", unit, reading, f"torque or force at {joint} as its sensor reads it")
+            ledger.output(f"tau.{joint}", unit, reading, f"torque or force at {joint} {self._words(f'tau.{joint}')}")
         for channel, reading in self.encoders.items():
             unit = self.units[self.joints.index(channel.removeprefix("q."))][0]
             ledger.output(f"sensor.{channel}", unit, reading, f"what the sensor of {channel} reads")
@@ -111,6 +113,19 @@ class _Follower:
         words = ", ".join(dict.fromkeys(p.effect.name for p in self.model.effects)) or "no effects"
         description = f"Torques of an arm of {self.n} joints along a given motion; with {words}."
         return ledger.following(f"{identifier(self.model.name)}_inverse", description, self._advance(states))
+
+    def _words(self, channel: str) -> str:
+        """What a torque output is; a warning where it is no reading."""
+        late = [p for p in self.model.effects if p.effect.leads and p.at == channel]
+        if not late:
+            return "as its sensor reads it"
+        by = " + ".join(f"{p.key}.{x.name}" for p in late for x in p.effect.parameters)
+        warnings.warn(
+            f"{self.model.path}: output {channel} is the torque delivered: its command leads it by {by}, and an FMU "
+            "cannot know the motion ahead; 'snarelab simulate' gives the command, an FMU without --inverse takes it",
+            stacklevel=2,
+        )
+        return f"as it is delivered; its command leads it by {by}"
 
     def _advance(self, states: dict[str, ca.SX]) -> ca.Function:
         """States a step of h later."""
@@ -150,8 +165,8 @@ class _Follower:
         readings, rig = list(loads), self.model.tree
         # Sensors read what all the others add up to, so they come last.
         for p in laws.at("joint", "base", *PLACES) + laws.at("sensor"):
-            if p.at.startswith("q_link."):
-                continue  # neither torque nor motor's position
+            if p.at.startswith("q_link.") or p.effect.leads:
+                continue  # neither torque nor motor's position; or ahead of the motion
             j = self.first + laws.joint_of(p)
             encoder = p.effect.at == "sensor" and p.at.startswith("q.")
             signals = [

@@ -5,7 +5,7 @@ place (a joint, a link, a sling, a sensor channel) and one instant, in CasADi sy
 
 - ``at="joint"``: the torque [N·m or N] that the drive must supply on top of the rigid body's.
 - ``at="link"``: the link's ten inertial parameters about its own frame, changed.
-- ``at="sensor"``: what the channel reads, given the true value.
+- ``at="sensor"``: what the channel reads, given the true value; of one that leads, the true value, given the reading.
 - On a suspension rig: ``at="sling"``, the wrench (6,) on the arm at the sling's hang point, force [N] and moment [N·m]
   in the world frame; ``at="slide"``, the friction force [N] at the slides that a joint moves; ``at="boom"``, for
   torsion and for bending of a link (2,), the upward force per lever [N/m] on the slings beyond it;
@@ -129,6 +129,11 @@ class Effect:
         a closed solution between samples; ``later`` are the signals then. None integrates the rate.
     from_zero : bool
         True where the states accumulate, and so start from zero.
+    leads : bool
+        Sensor effects only, and of torque channels alone: True where the channel is ahead of its joint, as a command is
+        ahead of the torque that a drive delivers. The law gives what the joint gets, from what the channel reads. A
+        simulation puts it between the torque input and the joint; a fit, which knows the torque that the motion needs
+        and asks for the reading, follows the states in reverse time.
     acts_on : "torque" or "position"
         Joint effects only: the law gives a torque at the joint, or a displacement of the link behind the joint
         (a vector: displacement, its rate, its second rate), which changes the torque of every joint.
@@ -172,6 +177,7 @@ class Effect:
     rate: Callable[[Symbols, Symbols], list[ca.SX]] | None = None
     advance: Callable[[Symbols, Symbols, Symbols, ca.SX], list[ca.SX]] | None = None
     from_zero: bool = False
+    leads: bool = False
     acts_on: Literal["torque", "position"] = "torque"
     neighbours: Literal["", "too", "only"] = ""
     others: tuple[str, ...] = ()

@@ -248,10 +248,10 @@ def _placed(path: Path, entries: Any, tree: Tree) -> tuple[PlacedEffect, ...]:
             raise InputError(f"{path}: effects: {name} has {sorted(extra)[0]!r}; allowed are name, at, hold")
         at = entry.get("at") if isinstance(entry, dict) else None
         allowed, encoded = everywhere, tree.joints[tree.carriers :]
-        if effect.at == "sensor" and effect.states:
+        if effect.at == "sensor" and effect.states and not effect.leads:
             # A late position shows as an early torque; what else an encoder does would be read as torque.
             allowed += tuple(f"q.{j.name}" for j in encoded)
-        if effect.at == "sensor":
+        if effect.at == "sensor" and not effect.leads:
             allowed += tuple(f"q_link.{j.name}" for j in encoded)
         if effect.at == "joint" and effect.acts_on == "torque":
             allowed += tuple(axis.name for axis in (*tree.axes, *neighbours(tree, tree.carriers)))

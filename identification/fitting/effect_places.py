@@ -144,7 +144,7 @@ class JointPlace(EffectPlace):
 
 
 class SensorPlace(JointPlace):
-    """A torque sensor; or the encoder of a single joint, which makes its own channel early, and no other."""
+    """A torque sensor, or a command; or the encoder of a single joint, which makes its own channel early alone."""
 
     @property
     def where(self) -> Place:
@@ -153,8 +153,9 @@ class SensorPlace(JointPlace):
 
     @property
     def direction(self) -> slice:
-        """Against a late encoder's motion, all that the joint's motion causes is early: time in reverse."""
-        return BACKWARD if self.placed.at.startswith("q.") else FORWARD
+        """Against a late encoder's motion, all that the joint's motion causes is early: time in reverse. So is what
+        leads."""
+        return BACKWARD if self.placed.effect.leads or self.placed.at.startswith("q.") else FORWARD
 
     def terms(self, along: TorqueState, parameters: Array, bare: bool = False) -> EffectTerms:
         """The reading's error, and the map of its channel's columns through the sensor."""

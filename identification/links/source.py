@@ -156,7 +156,7 @@ class Links:
         for c, joint in enumerate(self.joints):
             for effect in effects().values():
                 at = [joint] if effect.at == "joint" and effect.acts_on == "position" else []
-                if effect.at == "sensor" and {"value", "time"}.issuperset(reads(effect)):
+                if effect.at == "sensor" and not effect.leads and {"value", "time"}.issuperset(reads(effect)):
                     at = [f"q.{joint}", f"q_link.{joint}"] if effect.states else [f"q_link.{joint}"]
                 found += [PlacedEffect(effect, x) for x in at if (effect.name, c) not in have]
         return found

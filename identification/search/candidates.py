@@ -72,6 +72,8 @@ def library(model: Model) -> list[PlacedEffect]:
         if p.effect.at == "slide" and p.at == model.joints[0]:
             # The first joint's slides act on it alone, so that the same law at the joint is the same column.
             have |= {f"{name}.{p.at}" for name in _at_joints(p.effect)}
+    delayed = [p.at.partition(".") for p in model.effects if p.effect.at == "sensor" and p.effect.states]
+    shifted = {joint for kind, _, joint in delayed if kind in ("tau", "q")}
     found = []
     for effect in effects().values():
         if effect.at == "link" and model.inertia == "free":
@@ -80,10 +82,9 @@ def library(model: Model) -> list[PlacedEffect]:
             continue  # a factor on the one torque is a factor on all that is identified
         spots = all_places(effect, model.tree)
         if effect.at == "sensor" and effect.states:
-            # A torque channel is late or, where the encoder is late, early: one of the two.
-            arm = model.joints[model.tree.carriers :]
-            other = {f"tau.{j}": f"q.{j}" for j in arm} | {f"q.{j}": f"tau.{j}" for j in arm}
-            spots = tuple(at for at in other if f"{effect.name}.{other[at]}" not in have)
+            # A joint's torque is late against its motion, or early (a command, a late encoder): one shift of the two.
+            arm = [j for j in model.joints[model.tree.carriers :] if j not in shifted]
+            spots = tuple(f"{kind}.{j}" for kind in (("tau",) if effect.leads else ("tau", "q")) for j in arm)
         found += [PlacedEffect(effect, at) for at in spots if f"{effect.name}.{at}" not in have]
     return found
 

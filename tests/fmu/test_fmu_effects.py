@@ -17,6 +17,8 @@ from snarelab.models.effects import effects
 from snarelab.models.model_file import load_model
 
 DURATION, STEPS = 0.1, 5
+BEFORE = 0.4
+"""Share of the drive torques that was commanded before the start."""
 MAKKAR = {"stribeck_level": 1.0, "stribeck_speed": 0.05, "stribeck_ratio": 4.0, "coulomb_level": 2.0}
 MAKKAR |= {"coulomb_speed": 0.08, "viscous_coefficient": 3.0}
 
@@ -54,6 +56,7 @@ SYSTEMS = {
             "payload_mass": {"mass": 2.0, "x": 0.1, "y": -0.05, "z": 0.02},
             "com_offset": {"x": 0.02, "y": 0.01, "z": -0.01},
             "inertia_error": {"mass": 0.4, "moment_x": 0.05, "inertia_xx": 0.02, "inertia_yz": 0.01},
+            "command_delay": {"delay": 0.03},  # at zero it would take a moment yet
             # Sensors change no motion: they stay on.
             "sensor_gain": {"error": 0.05},
             "sensor_bias": {"offset": 0.3},
@@ -63,7 +66,7 @@ SYSTEMS = {
         },
         ([0.3, -0.5], [0.9, -0.7]),
         [12.0, -4.0],
-        ("sensor_gain", "sensor_bias", "sensor_drift", "sensor_delay", "motor_saturation"),
+        ("command_delay", "sensor_gain", "sensor_bias", "sensor_drift", "sensor_delay", "motor_saturation"),
     ),
     "rig": System(
         'system = "zero_g_rig"',
@@ -100,7 +103,7 @@ CASES = [(kind, name) for kind, system in SYSTEMS.items() for name in system.cas
 ENDS = [(kind, name) for kind, system in SYSTEMS.items() for name in (*system.cases,)[:: len(system.cases) - 1]]
 """The first and the last effect of each system: FMI 3.0 wraps the same equations, and every effect is in each FMU."""
 NARROW = {"sensor_gain": "tau.joint1", "sensor_bias": "tau.joint1", "sensor_drift": "tau.joint2"}
-NARROW |= {"sensor_delay": "q.joint2", "motor_saturation": "tau.joint1"}
+NARROW |= {"sensor_delay": "q.joint2", "command_delay": "tau.joint2", "motor_saturation": "tau.joint1"}
 
 
 def test_no_effect_of_the_vocabulary_is_left_out():
@@ -159,7 +162,8 @@ class Built:
     def _run(self, name):
         model = replace(self.bare, values=self.values | self.of(name))
         system = self.system
-        return Native(model, {name, *system.always}, system.tau, system.wheels).run(*system.start, DURATION)
+        before = [BEFORE * x for x in system.tau]
+        return Native(model, {name, *system.always}, system.tau, system.wheels, before).run(*system.start, DURATION)
 
 
 @pytest.fixture(scope="module")
@@ -175,10 +179,12 @@ def test_the_effect_moves_the_fmu_as_it_moves_the_model(built, kind, name, versi
     start = {
         f"start.{x}.joint{k + 1}": v for x, vs in zip(("q", "qd"), system.start, strict=True) for k, v in enumerate(vs)
     }
-    start |= {f"tau.joint{k + 1}": v for k, v in enumerate(system.tau)} | b.of(name) | {"solver.tolerance": 1e-12}
+    tau = {f"tau.joint{k + 1}": v for k, v in enumerate(system.tau)}
+    start |= {k: BEFORE * v for k, v in tau.items()} | b.of(name) | {"solver.tolerance": 1e-12}
     if kind == "base":
         start |= {f"torque.wheels.{a}": v for a, v in zip("xyz", system.wheels, strict=True)}
     s = Slave(b.fmu(version), b.folder / f"{kind}{version}", start)
+    s.set(tau)
     for _ in range(STEPS):
         s.step(DURATION / STEPS)
     wanted = b.native(name)

@@ -32,7 +32,10 @@ def draw(parameter, s, rng):
 
 
 def evaluate(effect, s, parameters) -> LawEvaluation:
-    return evaluate_law(effect, s, np.asarray(parameters), dt=DT)
+    """Along the samples; of what leads, against time, as a fit has it."""
+    way = slice(None, None, -1 if effect.leads else 1)
+    found = evaluate_law(effect, {name: x[way] for name, x in s.items()}, np.asarray(parameters), dt=DT)
+    return LawEvaluation(*(x if x is None else x[way] for x in found))
 
 
 def baseline(effect, s):
@@ -134,7 +137,7 @@ def check_recovery(effect: Effect, reference: Reference) -> None:
     s, rng = signals(), np.random.default_rng(14)
     truth = [reference.truth[parameter.name] for parameter in effect.parameters]
     clean = reference.output(s, *reference.truth.values()).reshape(TIME.size, -1)
-    keep = s["time"] >= reference.settle
+    keep = (s["time"][::-1] if effect.leads else s["time"]) >= reference.settle
     size = rms(clean - baseline(effect, s))
     sharp = keep & (np.abs(s["qd"]) > 0.005 * s["speed_scale"])  # where a smooth sign equals a sign
     assert np.all(rms((evaluate(effect, s, truth).values - clean)[sharp]) <= reference.likeness * size)

@@ -19,7 +19,7 @@ class Reference:
     truth: dict[str, float]
     output: Callable[..., np.ndarray]
     tolerance: float = 0.02  # on each parameter, relative to its true value
-    settle: float = 0.0  # s left out at the start: what was before it is not in the recording
+    settle: float = 0.0  # s left out where states start: what was before (of what leads: after) is not recorded
     likeness: float = 2e-3  # share of its size by which the law may be off: what a rounded corner costs
 
 
@@ -368,5 +368,6 @@ REFERENCES = {
     "sensor_bias": Reference({"offset": 0.3}, lambda s, offset: np.polyval([1.0, offset], s["value"])),
     "sensor_drift": Reference({"rate": 0.05}, lambda s, rate: np.interp(TIME, [0, 9], [0, 9 * rate]) + s["value"]),
     "sensor_gain": Reference({"error": -0.07}, lambda s, error: np.polyval([1 + error, 0.0], s["value"])),
+    "command_delay": Reference({"delay": 0.017}, lambda s, delay: value(TIME + delay), settle=0.3),
     "sensor_delay": Reference({"delay": 0.013}, lambda s, delay: value(TIME - delay), settle=0.3),
 }

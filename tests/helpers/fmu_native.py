@@ -70,11 +70,14 @@ class Law:
 
 
 class Native:
-    """One model: forward dynamics with the effects named in ``active``, drive torques (J,) and wheels' torque held."""
+    """One model: forward dynamics with the effects named in ``active``, drive torques (J,) and wheels' torque held.
 
-    def __init__(self, model, active, tau, wheels=(0.0, 0.0, 0.0)):
+    ``before`` (J,): the torques that were commanded until the start, where they were others."""
+
+    def __init__(self, model, active, tau, wheels=(0.0, 0.0, 0.0), before=None):
         tree = self.tree = model.tree
         self.tau, self.wheels, self.values = np.asarray(tau, float), np.asarray(wheels, float), model.values
+        self.before = self.tau if before is None else np.asarray(before, float)
         self.n, self.base = len(self.tau), tree.carriers
         self.names = [joint.name for joint in tree.joints[self.base :]]
         self.laws = [Law(p, model.values) for p in model.effects if p.effect.name in active]
@@ -88,7 +91,10 @@ class Native:
         """Positions, speeds, the base's pose and twist and the sensors' readings, by name, at the end."""
         q, qd = np.asarray(q, float), np.asarray(qd, float)
         parts = [q, qd, [0, 0, 0, 1, *[0] * 9, 0, 0, 0]] if self.base else [q, qd]
-        parts += [law.steady(self._signals(law, 0.0, q, qd) | {"value": self._channel(law, q)}) for law in self.laws]
+        first = [self._channel(law, q, self.before) for law in self.laws]
+        parts += [
+            law.steady(self._signals(law, 0.0, q, qd) | {"value": x}) for law, x in zip(self.laws, first, strict=True)
+        ]
         y = solve_ivp(self._rate, (0, duration), np.concatenate(parts), "DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
         q, qd, base, states = self._split(y)
         found = {f"{n}.{j}": x for n, xs in (("q", q), ("qd", qd)) for j, x in zip(self.names, xs, strict=True)}
@@ -97,7 +103,9 @@ class Native:
             for kind, x in (("pos", base[:3]), ("vel", turn @ base[7:10]), ("omega", turn @ base[10:13])):
                 found |= {f"{kind}.base.{a}": v for a, v in zip("xyz", x, strict=True)}
         for law in self.laws:  # the sensors of one channel read one after another
-            if law.effect.at == "sensor":
+            if law.effect.leads:
+                found[f"delivered.{law.at.removeprefix('tau.')}"] = law({}, states[law.key])[0][0]
+            elif law.effect.at == "sensor":
                 channel = f"sensor.{law.at}"
                 value = found.get(channel, self._channel(law, q))
                 own = self._signals(law, duration, q, qd) | {"value": value}
@@ -112,12 +120,21 @@ class Native:
             states[law.key], rest = np.split(rest, [len(law.effect.states)])
         return y[:n], y[n : 2 * n], base, states
 
-    def _channel(self, law, q):
+    def _channel(self, law, q, tau=None):
         """What a sensor should read."""
         if law.effect.at != "sensor":
             return 0.0
         kind, _, joint = law.at.partition(".")
-        return (q if kind == "q" else self.tau)[self.names.index(joint)]
+        tau = self.tau if tau is None else tau
+        return (q if kind == "q" else tau)[self.names.index(joint)]
+
+    def _delivered(self, states):
+        """Torque of the drives, of late ones what their states make of the command."""
+        tau = self.tau.copy()
+        for law in self.laws:
+            if law.effect.leads:
+                tau[self.names.index(law.at.removeprefix("tau."))] = law({}, states[law.key])[0][0]
+        return tau
 
     def _signals(self, law, t, q, qd):
         """What a law at a joint or on a rig reads of the motion."""
@@ -167,7 +184,7 @@ class Native:
         if self.base:
             terms[3:6] -= self.wheels + np.cross(spin, impulse)
         read = {law.key: self._signals(law, t, q, qd) for law in self.laws}
-        driven = np.concatenate([np.zeros(self.base), self.tau])
+        driven = np.concatenate([np.zeros(self.base), self._delivered(states)])
         acting = [law for law in self.laws if law.effect.at not in ("link", "sensor")]
         reacting = [law for law in acting if {"qdd", "load", "spin_rate", "acceleration"} & set(reads(law.effect))]
         for law in acting:

@@ -58,6 +58,8 @@ def recording(path, seed, concealed, seconds, still=()):
         seen[:, JOINT] += rigid[:, JOINT] / 4000.0
     if concealed == "late torque":
         torque[:, JOINT] = np.interp(time - LATE, time, torque[:, JOINT])
+    if concealed == "late drive":
+        torque[:, JOINT] = np.interp(time + LATE, time, torque[:, JOINT])
     if concealed == "late encoder":
         seen[:, JOINT] = np.interp(time - LATE, time, q[:, JOINT])
     rng = np.random.default_rng(seed + 100)
@@ -92,6 +94,7 @@ def test_noise_of_the_encoders_is_no_spring(tmp_path):
         ("joint_elasticity", "joint_elasticity", "joint2", "stiffness", 4000.0, 0.1, 12.0),
         # Coulomb friction is a step, which the delay's two states turn over gradually.
         ("late torque", "sensor_delay", "tau.joint2", "delay", LATE, 0.15, 12.0),
+        ("late drive", "command_delay", "tau.joint2", "delay", LATE, 0.15, 12.0),
         ("late encoder", "sensor_delay", "q.joint2", "delay", LATE, 0.15, 12.0),
         pytest.param("inertia_error", "inertia_error", "link3", "mass", None, 0.15, 24.0, marks=pytest.mark.slow),
     ],

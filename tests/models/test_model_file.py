@@ -122,6 +122,10 @@ def test_missing_urdf_file(folder):
             'effects = [{ name = "sensor_bias", at = "q.joint1" }]',
             ("'q.joint1'", "this model has tau.joint1, tau.joint2"),
         ),
+        *(
+            (f'effects = [{{ name = "command_delay", at = "{at}" }}]', (repr(at), "has tau.joint1, tau.joint2"))
+            for at in ("q.joint1", "q_link.joint1", "joint1")
+        ),
         ('effects = [{ name = "sensor_delay", at = "qd.joint1" }]', ("tau.joint1, tau.joint2, q.joint1, q.joint2",)),
         (
             'effects = [{ name = "viscous_friction", place = "joint1" }]',

@@ -114,10 +114,17 @@ INNER = slice(60, N - 60)
 """Where neither end of a run is felt."""
 
 
-@pytest.mark.parametrize(("at", "early_alone", "later"), [("tau.joint2", False, -DELAY), ("q.joint2", True, DELAY)])
-def test_a_late_torque_and_a_late_encoder_that_makes_its_channel_early(at, early_alone, later):
+@pytest.mark.parametrize(
+    ("name", "at", "early_alone", "later"),
+    [
+        ("sensor_delay", "tau.joint2", False, -DELAY),
+        ("sensor_delay", "q.joint2", True, DELAY),
+        ("command_delay", "tau.joint2", False, DELAY),
+    ],
+)
+def test_a_late_torque_a_late_encoder_that_makes_its_channel_early_and_a_command(name, at, early_alone, later):
     e, reading = run(), wave(0.6, 0.4)
-    terms, _, passed = added(e, "sensor_delay", at, [DELAY], reading=reading, early_alone=early_alone)
+    terms, _, passed = added(e, name, at, [DELAY], reading=reading, early_alone=early_alone)
     ((channel, torque, by),) = terms
     assert channel == 1
     np.testing.assert_allclose(torque[INNER], (wave(0.6, 0.4, later) - reading)[INNER], atol=2e-4)

@@ -152,11 +152,12 @@ def test_every_effect_is_tried_at_every_place_that_has_it_not():
     assert keys(arm(("viscous_friction", "joint2"))) == whole - {"viscous_friction.joint2"}
 
 
-@pytest.mark.parametrize("late", ["tau.joint1", "q.joint1"])
-def test_of_a_late_torque_and_a_late_encoder_one_alone_is_tried(late):
-    """Either makes the joint's torque late against its motion, or early."""
-    gone = keys(arm()) - keys(arm(("sensor_delay", late)))
-    assert gone == {"sensor_delay.tau.joint1", "sensor_delay.q.joint1"}
+@pytest.mark.parametrize("late", ["sensor_delay.tau.joint1", "sensor_delay.q.joint1", "command_delay.tau.joint1"])
+def test_of_a_late_torque_a_late_encoder_and_a_late_drive_one_alone_is_tried(late):
+    """Each makes the joint's torque late against its motion, or early."""
+    name, _, at = late.partition(".")
+    gone = keys(arm()) - keys(arm((name, at)))
+    assert gone == {"sensor_delay.tau.joint1", "sensor_delay.q.joint1", "command_delay.tau.joint1"}
 
 
 def test_slides_of_the_first_joint_are_its_friction():
