@@ -95,6 +95,11 @@ class _Writer:
             ledger.vector_input("torque.tip", "N*m", f"moment from outside {words}"),
         )
         self.laws = laws = PlacedLaws(self.model, ledger)
+        for p in laws.at("beam"):
+            raise InputError(
+                f"{self.model.path}: {p.key} is a spring inside a link, whose forward dynamics are not written; export "
+                "with --inverse"
+            )
         phi = ca.vertcat(*laws.link_parameters())
         springy = {laws.joint_of(p): p for p in laws.at("joint") if p.effect.acts_on == "position"}
         start_q, start_qd = self._starts(start)

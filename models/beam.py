@@ -57,9 +57,9 @@ def beams(tree: Tree) -> tuple[str, ...]:
 
 def length_axes(end: Array) -> Array:
     """Axes of a beam (3, 3) by columns in its link's frame, of its far end (3,) [m]: along it, and two across."""
-    along = end / np.linalg.norm(end)
-    across = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
-    across /= np.linalg.norm(across)
+    along: Array = end / np.linalg.norm(end)
+    across = np.asarray(np.cross(along, np.eye(3)[np.argmin(np.abs(along))]), float)
+    across = across / float(np.linalg.norm(across))
     return np.stack([along, across, np.cross(along, across)], axis=1)
 
 
@@ -108,9 +108,9 @@ def symbolic_beam(tree: Tree, link: int, motion: tuple[ca.SX, ca.SX, ca.SX], gra
     """`BeamTerms` of one instant in CasADi symbols, for ``motion`` q, qd, qdd, each (J,)."""
     whole, n = cut(tree, link), tree.n_joints
     turns = [ca.SX.sym(name, TURNS) for name in ("turn", "rate", "second")]
-    given = [ca.vertcat(x[: link + 1], turn, x[link + 1 :]) for x, turn in zip(motion, turns, strict=True)]
+    q, qd, qdd = (ca.vertcat(x[: link + 1], turn, x[link + 1 :]) for x, turn in zip(motion, turns, strict=True))
     at = 10 * (link + 1)
-    torque = symbolic_torque(whole, *given, gravity, ca.vertcat(phi[:at], ca.SX.zeros(10 * TURNS), phi[at:]))
+    torque = symbolic_torque(whole, q, qd, qdd, gravity, ca.vertcat(phi[:at], ca.SX.zeros(10 * TURNS), phi[at:]))
     own = torque[link + 1 : link + 1 + TURNS]
     joints = ca.vertcat(torque[: link + 1], torque[link + 1 + TURNS : n + TURNS])
     found = [own, ca.jacobian(own, turns[2]), *(ca.jacobian(joints, turn) for turn in turns)]

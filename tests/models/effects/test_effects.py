@@ -29,7 +29,9 @@ wheel_friction contact_friction contact_damping contact_stiffness cable_damping 
 sensor_bias sensor_drift sensor_gain sensor_delay carriage_friction docking_friction groove_misalignment latch_play
 preload_loss gear_efficiency motor_saturation heating_friction joint_spring suspension_stiffness
 """
-NAMES = list(effects())
+LAWS = {law: e for name, e in effects().items() for law, e in ((name, e), (f"{name} elsewhere", e.elsewhere)) if e}
+"""Every law by its effect's name; one that holds on trees without the effect's kind of place under a name more."""
+NAMES = list(LAWS)
 
 
 def reference_of(name):
@@ -97,8 +99,9 @@ def fit(effect, s, measured, keep):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_metadata_is_complete(name):
-    effect = effects()[name]
-    assert name in re.split(r"\s+", VOCABULARY)
+    effect = LAWS[name]
+    assert effect.name in re.split(r"\s+", VOCABULARY)
+    assert name.removesuffix(" elsewhere") == effect.name
     assert effect.family in FAMILIES
     assert min(len(effect.sentence), len(effect.equation)) > 10
     assert effect.experiment.format(at="joint3").count("joint3") == effect.experiment.count("{at}") > 0
@@ -118,7 +121,7 @@ def test_metadata_is_complete(name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_derivatives_agree_with_finite_differences(name):
-    effect, s, rng = effects()[name], signals(), np.random.default_rng(11)
+    effect, s, rng = LAWS[name], signals(), np.random.default_rng(11)
     through = THROUGH.get(effect.at, "")
     for _ in range(4):
         p = np.array([draw(parameter, s, rng) for parameter in effect.parameters])
@@ -139,7 +142,7 @@ def test_derivatives_agree_with_finite_differences(name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_zero_amplitude_equals_baseline(name):
-    effect, s, rng = effects()[name], signals(), np.random.default_rng(12)
+    effect, s, rng = LAWS[name], signals(), np.random.default_rng(12)
     elastic = effect.acts_on == "position"  # vanishes as the stiffness grows, not at zero
     p = [draw(parameter, s, rng) if parameter.zero else 0.0 for parameter in effect.parameters]
     if elastic:
@@ -151,9 +154,9 @@ def test_zero_amplitude_equals_baseline(name):
         assert np.abs(evaluate(effect, s, p).values - baseline(effect, s)).max() > 1e-3
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if effects()[name].dissipates])
+@pytest.mark.parametrize("name", [name for name in NAMES if LAWS[name].dissipates])
 def test_friction_never_feeds_energy_in(name):
-    effect, s, rng = effects()[name], signals(), np.random.default_rng(13)
+    effect, s, rng = LAWS[name], signals(), np.random.default_rng(13)
     s = s | {"qd": np.sign(s["qd"]) * 10 ** rng.uniform(-7, 1.5, TIME.size), "load": rng.normal(size=TIME.size)}
     for _ in range(50):
         p = np.array([draw(parameter, s, rng) for parameter in effect.parameters])
@@ -164,7 +167,7 @@ def test_friction_never_feeds_energy_in(name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_recovers_parameters_from_data_it_did_not_generate(name):
-    effect, s, rng = effects()[name], signals(), np.random.default_rng(14)
+    effect, s, rng = LAWS[name], signals(), np.random.default_rng(14)
     reference = reference_of(name)
     truth = [reference.truth[parameter.name] for parameter in effect.parameters]
     clean = reference.output(s, *reference.truth.values()).reshape(TIME.size, -1)
@@ -200,8 +203,8 @@ def test_units_are_written_out_for_a_kind_of_joint(unit, joint, channel, written
 
 def test_members_are_the_files_in_order_of_family():
     folder = Path(snarelab.models.effects.__path__[0])
-    assert sorted(NAMES) == sorted(path.stem for path in folder.glob("[!_]*.py"))
-    families = [FAMILIES.index(effects()[name].family) for name in NAMES]
+    assert sorted(effects()) == sorted(path.stem for path in folder.glob("[!_]*.py"))
+    families = [FAMILIES.index(effect.family) for effect in effects().values()]
     assert families == sorted(families)
 
 
@@ -212,5 +215,5 @@ def test_unknown_effect_names_the_nearest_and_all():
     message = str(caught.value)
     assert "'columb_friction'" in message
     assert "nearest: coulomb_friction" in message
-    assert all(name in message for name in NAMES)
+    assert all(name in message for name in effects())
     assert "\n" not in message
