@@ -20,7 +20,9 @@ from .rigid_body import symbolic_torque
 from .tree import Joint, Link, Tree
 
 TURNS = 3
-"""Virtual joints of a beam: about its length, then about two axes across it."""
+"""Axes of a beam: its length, then two across it."""
+
+_WORDS = ("torsion", "bending1", "bending2")
 
 
 class BeamTerms(NamedTuple):
@@ -55,6 +57,11 @@ def beams(tree: Tree) -> tuple[str, ...]:
     return tuple(found)
 
 
+def carried_joint(tree: Tree, link: int) -> int:
+    """Index of the joint at a beam's far end; raises StopIteration where the link carries none."""
+    return next(i for i, joint in enumerate(tree.joints) if joint.parent == link)
+
+
 def length_axes(end: Array) -> Array:
     """Axes of a beam (3, 3) by columns in its link's frame, of its far end (3,) [m]: along it, and two across."""
     along: Array = end / np.linalg.norm(end)
@@ -63,30 +70,33 @@ def length_axes(end: Array) -> Array:
     return np.stack([along, across, np.cross(along, across)], axis=1)
 
 
-def cut(tree: Tree, link: int) -> Tree:
-    """The tree with virtual joints at a link's far end, numbers ``link + 1`` to ``link + 3``, and massless links.
+def cut(tree: Tree, link: int, about: tuple[int, ...] = (0, 1, 2)) -> Tree:
+    """The tree with virtual joints at a link's far end, about some of its axes, and a massless link behind each.
+
+    They have the numbers from ``link + 1`` on, and are named ``<link>.torsion``, ``.bending1`` and ``.bending2``.
 
     Raises
     ------
     StopIteration
         Where the link carries no joint.
     """
-    end = next(joint.translation for joint in tree.joints if joint.parent == link)
-    axes, last = length_axes(end), link + TURNS
+    end = tree.joints[carried_joint(tree, link)].translation
+    axes, more, eye = length_axes(end), len(about), np.eye(3)
+    name = tree.links[link].name
     virtual = [
-        Joint(f"turn{k + 1}", "revolute", np.eye(3)[k], link + k, np.eye(3) if k else axes, np.zeros(3) if k else end)
-        for k in range(TURNS)
+        Joint(f"{name}.{_WORDS[a]}", "revolute", eye[a], link + k, eye if k else axes, np.zeros(3) if k else end)
+        for k, a in enumerate(about)
     ]
 
     def moved(joint: Joint) -> Joint:
         if joint.parent == link:
             pose = axes.T @ joint.rotation, axes.T @ (joint.translation - end)
-            return replace(joint, parent=last, rotation=pose[0], translation=pose[1])
-        return joint if joint.parent < link else replace(joint, parent=joint.parent + TURNS)
+            return replace(joint, parent=link + more, rotation=pose[0], translation=pose[1])
+        return joint if joint.parent < link else replace(joint, parent=joint.parent + more)
 
     joints = [moved(joint) for joint in tree.joints]
     followers = tuple(
-        replace(f, joint=moved(f.joint), leader=f.leader + TURNS * (f.leader > link)) for f in tree.followers
+        replace(f, joint=moved(f.joint), leader=f.leader + more * (f.leader > link)) for f in tree.followers
     )
     none = [Link(joint.name, np.zeros(10)) for joint in virtual]
     return Tree(
@@ -95,6 +105,7 @@ def cut(tree: Tree, link: int) -> Tree:
         (*tree.links[: link + 1], *none, *tree.links[link + 1 :]),
         tree.gravity,
         followers=followers,
+        axes=tree.axes,
     )
 
 

@@ -42,9 +42,10 @@ def elastic_link(
         sentence=sentence,
         equation=equation,
         source=source,
+        # The joint that the link carries feels part of the moment: its torque may be far below, never above.
         parameters=(
             Parameter(
-                "stiffness", "N*m/rad", "moment per turn of the far end", zero=300.0, low=2.0, high=1e5,
+                "stiffness", "N*m/rad", "moment per turn of the far end", zero=300.0, low=2.0, high=1e6,
                 grid=(10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0), relative_to="rate",
             ),
             # A structure damps little: one start is enough.
