@@ -23,14 +23,14 @@ from scipy import signal
 from .arm import STANDARD_GRAVITY, Arm
 from .lugre import Bristles, LuGre
 from .motion import Motion
-from .parts import Disturbance, Drift, Elasticity, Harness, Payload, Ripple, Servo, SolverFriction
+from .parts import Beam, Disturbance, Drift, Elasticity, Harness, Payload, Ripple, Servo, SolverFriction
 
 CONTROL_RATE = 1000
 
 
 @dataclass(frozen=True, eq=False)
 class Plant:
-    """An arm and all that its URDF does not say, each by joint name (``com_offset``: by link name).
+    """An arm and all that its URDF does not say, each by joint name (``com_offset``, ``beam``: by link name).
 
     Parameters
     ----------
@@ -60,6 +60,7 @@ class Plant:
     friction: Mapping[str, LuGre | SolverFriction] = field(default_factory=dict)
     armature: Mapping[str, float] = field(default_factory=dict)
     elasticity: Mapping[str, Elasticity] = field(default_factory=dict)
+    beam: Mapping[str, Beam] = field(default_factory=dict)
     ripple: Mapping[str, Ripple] = field(default_factory=dict)
     harness: Mapping[str, Harness] = field(default_factory=dict)
     disturbance: Mapping[str, Disturbance] = field(default_factory=dict)
@@ -79,7 +80,7 @@ class Plant:
         """Refuse names that would be ignored."""
         for name, value in vars(self).items():
             if isinstance(value, Mapping):
-                prefix = "link" if name == "com_offset" else "joint"
+                prefix = "link" if name in ("com_offset", "beam") else "joint"
                 known = {f"{prefix}{k}" for k in range(1, len(self.arm.links) + 1)}
                 if unknown := set(value) - known:
                     raise ValueError(f"{name}: {sorted(unknown)} not in the arm; it has {sorted(known)}")
@@ -106,7 +107,8 @@ class Plant:
             joint: f'stiffness="{0.0 if spring.gap else spring.stiffness!r}" damping="{spring.damping!r}"'
             for joint, spring in self.elasticity.items()
         }
-        text = real.mjcf(timestep=timestep, gravity=self.gravity, attributes=attributes, twist=twist)
+        turns = {link: beam.hinges for link, beam in self.beam.items()}
+        text = real.mjcf(timestep=timestep, gravity=self.gravity, attributes=attributes, twist=twist, turns=turns)
         return mujoco.MjModel.from_xml_string(text)
 
 

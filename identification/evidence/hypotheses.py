@@ -196,8 +196,8 @@ def _items(along: ColumnSource, p: PlacedEffect, by_words: Curves, columns: Cand
 
 
 def remembers(p: PlacedEffect) -> bool:
-    """Whether a law has a memory that is no joint's own: a sling's carriage, a tank, a late sensor."""
-    return bool(p.effect.states) and p.effect.at != "joint"
+    """Whether a law has a memory that is no drive's or link's own: a sling's carriage, a tank, a late sensor."""
+    return bool(p.effect.states) and p.effect.at != "joint" and p.effect.acts_on == "torque"
 
 
 def lagging(along: ColumnSource, parts: Mapping[int, Sequence[Array]], columns: CandidateColumns) -> Item:

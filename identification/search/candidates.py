@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...models.effect import Effect, Parameter
 from ...models.effects import effects
-from ...models.model import Model, PlacedEffect, all_places
+from ...models.model import Model, PlacedEffect, all_places, effect_on
 from ..fitting.assembly import TorqueEvaluation, TorqueModel
 from ..fitting.effect_places import EffectTerms, TorqueState
 from ..fitting.experiment import Experiment
@@ -73,7 +73,7 @@ def library(model: Model) -> list[PlacedEffect]:
             # The first joint's slides act on it alone, so that the same law at the joint is the same column.
             have |= {f"{name}.{p.at}" for name in _at_joints(p.effect)}
     found = []
-    for effect in effects().values():
+    for effect in (effect_on(e, model.tree) for e in effects().values()):
         if effect.at == "link" and model.inertia == "free":
             continue  # the identified inertia already holds whatever a link effect could add
         if model.inertia == "free" and len(model.joints) == 1 and _scales(effect):

@@ -147,7 +147,8 @@ def test_every_effect_is_tried_at_every_place_that_has_it_not():
     at_joints |= {f"{e.name}.joint1{sign}joint2" for e in joints if e.neighbours for sign in "+-"}
     at_links = {f"{e.name}.link{k}" for e in effects().values() if e.at == "link" for k in (1, 2)}
     sensors = {f"{e.name}.tau.joint{k}" for e in effects().values() if e.at == "sensor" for k in (1, 2)}
-    assert whole == at_joints | at_links | sensors | {"sensor_delay.q.joint1", "sensor_delay.q.joint2"}
+    at_beams = {f"{e.name}.link1" for e in effects().values() if e.elsewhere}  # the last link carries no joint
+    assert whole == at_joints | at_links | at_beams | sensors | {"sensor_delay.q.joint1", "sensor_delay.q.joint2"}
     assert keys(arm(inertia="free")) == whole - at_links
     assert keys(arm(("viscous_friction", "joint2"))) == whole - {"viscous_friction.joint2"}
 
