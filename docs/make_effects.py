@@ -32,7 +32,8 @@ results and in reports. This page is written from the code by `python docs/make_
 - Units are those of a rotary joint. For a sliding joint read N for N·m, and m for rad. U is the channel's own unit.
 - `q`, `qd` and `qdd` are the joint's position, speed and acceleration. `load` is the rigid-body torque at the joint,
   from the model. `sgn` is the direction of motion, smoothed over 0.1 % of the joint's peak speed.
-- *Shape* marks a parameter in which the law is nonlinear. Its starting values come from a grid.
+- *Shape* marks a parameter in which the law is nonlinear. Its starting values come from a grid, or,
+  for the length of a wave, from a periodogram.
 - An effect *contains* its special cases. They are named first; the containing effect is named only for what they leave.
 
 How to add an effect: [adding-an-effect.md](adding-an-effect.md).

@@ -56,6 +56,9 @@ class Parameter:
     relative_to : "", "speed", "travel", "torque", "rate" or "per_torque"
         Unit of the bounds' finite ends and of the grid: the joint's peak speed, its travel, its peak torque,
         peak torque per travel, or one over its peak torque; "" for absolute numbers in SI units.
+    periodic_over : str
+        Of a shape that is the length of a wave: the signal that the law repeats over. Where a residual is at hand, the
+        starting values are the peaks of its periodogram over that signal, and not the grid.
     alone : bool
         False where this parameter alone would be another effect: a spring's rest torque alone is a bias.
     """
@@ -68,6 +71,7 @@ class Parameter:
     high: float = float("inf")
     grid: tuple[float, ...] = ()
     relative_to: Literal["", "speed", "travel", "torque", "rate", "per_torque"] = ""
+    periodic_over: str = ""
     alone: bool = True
 
 
