@@ -25,7 +25,7 @@ Hidden state (a spring's twist, a delayed signal) is a system of ordinary differ
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import casadi as ca
@@ -147,6 +147,9 @@ class Effect:
     contains : tuple of str
         Simpler effects that are special cases of this one. A search names the simpler one first, and this one only for
         what the simpler one leaves (the principle of marginality: Nelder 1977).
+    series : bool
+        Joint effects only: True where the law is a term of a series. Where a model has a term, a search tries one more
+        of the same law at the same place, by the names that `term` gives.
     at_rest : bool
         True where the effect shows mainly near rest. It must pass in motion like any other. But the share of the
         residual that makes it worth a name includes samples near rest, and its columns come from the measured motion,
@@ -181,7 +184,13 @@ class Effect:
     others: tuple[str, ...] = ()
     dissipates: bool = False
     contains: tuple[str, ...] = ()
+    series: bool = False
     at_rest: bool = False
     remembers: bool = False
     exceeds_at_rest: bool = False
     experiment: str = ""
+
+
+def term(effect: Effect, number: int) -> Effect:
+    """A further term of a series, from the second on: the same law and parameters as ``name_2``, ``name_3``, ..."""
+    return replace(effect, name=f"{effect.name}_{number}")

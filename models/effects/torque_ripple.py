@@ -39,6 +39,7 @@ EFFECT = Effect(
         ),
     ),
     law=_law,
+    series=True,
     experiment="run {at} slowly to and fro over its whole travel and average the torques of both directions "
     "position by position",
 )
