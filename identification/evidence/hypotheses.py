@@ -148,6 +148,8 @@ def log_share_of_places(k: int, n: int) -> float:
 
 def _items(along: ColumnSource, p: PlacedEffect, by_words: Curves, columns: CandidateColumns) -> list[Item]:
     own_peaks = along.peaks.get(p.key)
+    if own_peaks is not None and not len(own_peaks.waves):
+        return []
     if own_peaks is None:
         grid, between = _grid(along.assembly, p)
         tried, prior = list(range(len(grid))), 0.0

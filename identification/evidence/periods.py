@@ -74,7 +74,7 @@ class Periods:
                     continue
                 own = self._along
                 n = own.n_train
-                at = wave_peaks(own.assembly, p, x, own.instruments[:n], own.states[:n], self._weighed)
+                at = wave_peaks(own.assembly, p, x, own.instruments[:n], own.states[:n], self._weighed, lines=True)
                 if at is not None:
                     found[p.key] = at
         return found

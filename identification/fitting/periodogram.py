@@ -82,10 +82,16 @@ def periodogram(waves: Array, runs: Sequence[SampledSignal]) -> Array:
     return power
 
 
-def peaks(waves: Array, power: Array) -> Peaks:
-    """The highest peaks of a periodogram of one trial or more."""
+def peaks(waves: Array, power: Array, *, lines: bool = False) -> Peaks:
+    """The highest peaks of a periodogram of one trial or more; with ``lines`` those alone that are none of a continuum.
+
+    A residual may depend on position without repeating. Its power is then exponentially distributed about a continuum,
+    of median m: the highest of N trials reaches m ln N / ln 2.
+    """
     padded = np.concatenate([[-np.inf], power, [-np.inf]])
     tops = np.flatnonzero((power >= padded[:-2]) & (power > padded[2:]))
+    if lines:
+        tops = tops[power[tops] > np.median(power) * np.log(len(power)) / np.log(2)]
     tops = np.sort(tops[np.argsort(-power[tops])][:MOST_PEAKS])
     step = float(waves[1] - waves[0]) if len(waves) > 1 else float(waves[0])
-    return Peaks(waves[tops], step, len(waves), int(np.argmax(power[tops])))
+    return Peaks(waves[tops], step, len(waves), int(np.argmax(power[tops])) if len(tops) else 0)

@@ -25,6 +25,8 @@ def wave_peaks(
     experiments: Sequence[Experiment],
     states: Sequence[TorqueEvaluation],
     weighed: Weighed,
+    *,
+    lines: bool = False,
 ) -> Peaks | None:
     """Peaks of a residual's periodogram over the signal that a law repeats over; None where that does not move.
 
@@ -38,6 +40,8 @@ def wave_peaks(
         Recordings, and the model without the effect along each.
     weighed : callable
         The residual.
+    lines : bool
+        Leave out what is no higher than a continuum's peaks.
     """
     place = assembly.at(p)
     signals = [
@@ -64,4 +68,4 @@ def wave_peaks(
                 return e.to_band(found, c)
 
             runs.append(SampledSignal(signal, seen, *own))
-    return peaks(waves, periodogram(waves, runs))
+    return peaks(waves, periodogram(waves, runs), lines=lines)

@@ -75,3 +75,15 @@ def test_peaks_are_the_highest_tops_in_order_ends_included():
     many = peaks(np.arange(1.0, 41.0), np.tile([0.0, 1.0], 20) * np.arange(40))
     assert many.waves.tolist() == [float(w) for w in range(40 - 2 * (MOST_PEAKS - 1), 41, 2)]
     assert peaks(np.array([2.0]), np.array([1.0])).waves.tolist() == [2.0]
+
+
+def test_lines_stand_above_what_the_highest_of_a_continuums_trials_reaches():
+    """Median 1.5 of forty trials: 1.5 ln 40 / ln 2 = 7.98. In draws of a continuum the highest is there on average."""
+    power = np.tile([1.0, 2.0], 20)
+    assert not len(peaks(np.arange(1.0, 41.0), power, lines=True).waves)
+    power[[7, 21]] = 7.9, 8.1
+    found = peaks(np.arange(1.0, 41.0), power, lines=True)
+    assert (found.waves.tolist(), found.best) == ([22.0], 0)
+    drawn = np.random.default_rng(0).exponential(33.0, (400, 391))
+    several = [len(peaks(np.arange(1.0, 392.0), x, lines=True).waves) for x in drawn]
+    assert 0.5 < np.mean(several) < 1.5
