@@ -61,7 +61,7 @@ class Plant:
     armature: Mapping[str, float] = field(default_factory=dict)
     elasticity: Mapping[str, Elasticity] = field(default_factory=dict)
     beam: Mapping[str, Beam] = field(default_factory=dict)
-    ripple: Mapping[str, Ripple] = field(default_factory=dict)
+    ripple: Mapping[str, Ripple | tuple[Ripple, ...]] = field(default_factory=dict)
     harness: Mapping[str, Harness] = field(default_factory=dict)
     disturbance: Mapping[str, Disturbance] = field(default_factory=dict)
     payload: Payload | None = None
@@ -193,8 +193,9 @@ def _closed_loop(
     twist = np.array([model.joint(f"{joint}_twist").dofadr[0] for joint in plant.elasticity], int)
     elastic = np.array([joints.index(joint) for joint in plant.elasticity], int)
     backlash = [(d, spring) for d, spring in zip(twist, plant.elasticity.values(), strict=True) if spring.gap]
-    rippled = np.array([joints.index(j) for j in plant.ripple], int)
-    waves = [(wave.amplitude, wave.cycles, wave.phase) for wave in plant.ripple.values()]
+    ripples = [(j, w) for j, own in plant.ripple.items() for w in ((own,) if isinstance(own, Ripple) else own)]
+    rippled = np.array([joints.index(j) for j, _ in ripples], int)
+    waves = [(wave.amplitude, wave.cycles, wave.phase) for _, wave in ripples]
     amplitude, cycles, phase = np.array(waves).reshape(-1, 3).T
     bristles = Bristles(model, data, {j: law for j, law in plant.friction.items() if isinstance(law, LuGre)})
     step = plant.per_joint("encoder_step")
@@ -222,7 +223,7 @@ def _closed_loop(
         for share in shares:
             load = torque + push + share * (command - torque + later - push)
             if rippled.size:
-                load[rippled] += amplitude * np.sin(cycles * q[motor[rippled]] + phase)
+                np.add.at(load, rippled, amplitude * np.sin(cycles * q[motor[rippled]] + phase))
             for dof, spring in backlash:
                 applied[dof] = -spring.stiffness * (q[dof] - min(max(q[dof], -spring.gap / 2.0), spring.gap / 2.0))
             applied[motor] = load

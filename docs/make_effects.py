@@ -36,7 +36,10 @@ results and in reports. This page is written from the code by `python docs/make_
 - Units are those of a rotary joint. For a sliding joint read N for N·m, and m for rad. U is the channel's own unit.
 - `q`, `qd` and `qdd` are the joint's position, speed and acceleration. `load` is the rigid-body torque at the joint,
   from the model. `sgn` is the direction of motion, smoothed over 0.1 % of the joint's peak speed.
-- *Shape* marks a parameter in which the law is nonlinear. Its starting values come from a grid.
+- *Shape* marks a parameter in which the law is nonlinear. Its starting values come from a grid, or,
+  for the length of a wave, from a periodogram.
+- A *series* may act more than once at a place: its further terms have its name and a number from 2 on
+  (`torque_ripple_2`). The next is tried where a model has those before it.
 - An effect *contains* its special cases. They are named first; the containing effect is named only for what they leave.
 
 How to add an effect: [adding-an-effect.md](adding-an-effect.md).
@@ -94,7 +97,7 @@ def _laws(members: Iterable[Effect]) -> list[Effect]:
 
 def _row(effect: Effect) -> str:
     contains = f"<br>Contains {', '.join(f'`{name}`' for name in effect.contains)}." if effect.contains else ""
-    law = f"`{effect.equation}`{contains}"
+    law = f"`{effect.equation}`{', series' if effect.series else ''}{contains}"
     parameters = "<br>".join(map(_parameter, effect.parameters))
     what = f"`{effect.name}`<br>{effect.sentence}<br>Where: {effect.at}<br>Source: {effect.source}"
     return _cells(what, f"{law}<br>{parameters}")

@@ -27,7 +27,7 @@ Hidden state (a spring's twist, a delayed signal) is a system of ordinary differ
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import casadi as ca
@@ -58,6 +58,9 @@ class Parameter:
     relative_to : "", "speed", "travel", "torque", "rate" or "per_torque"
         Unit of the bounds' finite ends and of the grid: the joint's peak speed, its travel, its peak torque,
         peak torque per travel, or one over its peak torque; "" for absolute numbers in SI units.
+    periodic_over : str
+        Of a shape that is the length of a wave: the signal that the law repeats over. Where a residual is at hand, the
+        starting values are the peaks of its periodogram over that signal, and not the grid.
     alone : bool
         False where this parameter alone would be another effect: a spring's rest torque alone is a bias.
     """
@@ -70,6 +73,7 @@ class Parameter:
     high: float = float("inf")
     grid: tuple[float, ...] = ()
     relative_to: Literal["", "speed", "travel", "torque", "rate", "per_torque"] = ""
+    periodic_over: str = ""
     alone: bool = True
 
 
@@ -148,6 +152,9 @@ class Effect:
     contains : tuple of str
         Simpler effects that are special cases of this one. A search names the simpler one first, and this one only for
         what the simpler one leaves (the principle of marginality: Nelder 1977).
+    series : bool
+        Joint effects only: True where the law is a term of a series. Where a model has a term, a search tries one more
+        of the same law at the same place, by the names that `term` gives.
     at_rest : bool
         True where the effect shows mainly near rest. It must pass in motion like any other. But the share of the
         residual that makes it worth a name includes samples near rest, and its columns come from the measured motion,
@@ -184,8 +191,14 @@ class Effect:
     others: tuple[str, ...] = ()
     dissipates: bool = False
     contains: tuple[str, ...] = ()
+    series: bool = False
     at_rest: bool = False
     remembers: bool = False
     exceeds_at_rest: bool = False
     elsewhere: "Effect | None" = None
     experiment: str = ""
+
+
+def term(effect: Effect, number: int) -> Effect:
+    """A further term of a series, from the second on: the same law and parameters as ``name_2``, ``name_3``, ..."""
+    return replace(effect, name=f"{effect.name}_{number}")

@@ -254,3 +254,20 @@ def test_parameters_count_if_they_move_the_torque_once_the_amplitudes_are_on(ask
     assert free_parameters(*model, variant("joint_elasticity", [])) == ("stiffness", "damping")
     asked.columns = COLUMNS * [1.0, 0.0]
     assert free_parameters(*model, variant("stribeck_friction", [0])) == ("level",)
+
+
+def test_of_a_series_the_next_term_is_tried_where_there_is_one():
+    """At the first joint a second, then a third; at the other the first alone. All terms are one law."""
+    ripple = get_effect("torque_ripple")
+
+    def tried(*there):
+        found = library(arm(*((name, "joint1") for name in there)))
+        return {p.key: p.effect for p in found if p.key.startswith("torque_ripple")}
+
+    assert set(tried()) == {"torque_ripple.joint1", "torque_ripple.joint2"}
+    assert set(tried("torque_ripple")) == {"torque_ripple_2.joint1", "torque_ripple.joint2"}
+    third = tried("torque_ripple", "torque_ripple_2")
+    assert set(third) == {"torque_ripple_3.joint1", "torque_ripple.joint2"}
+    assert third["torque_ripple_3.joint1"].law is ripple.law
+    assert set(tried("torque_ripple_2")) == {"torque_ripple.joint1", "torque_ripple.joint2"}
+    assert "torque_ripple_3.joint1" not in tried("torque_ripple", *(f"torque_ripple_{k}" for k in range(2, 10)))

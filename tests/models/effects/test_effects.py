@@ -93,6 +93,13 @@ def test_members_are_the_files_in_order_of_family():
 
 def test_unknown_effect_names_the_nearest_and_all():
     assert get_effect("torque_ripple").name == "torque_ripple"
+    assert (get_effect("torque_ripple_2").name, get_effect("torque_ripple_2").law) == (
+        "torque_ripple_2",
+        get_effect("torque_ripple").law,
+    )
+    for none in ("torque_ripple_1", "torque_ripple_10", "torque_ripple_x", "viscous_friction_2"):
+        with pytest.raises(InputError, match="unknown effect"):
+            get_effect(none)
     with pytest.raises(InputError) as caught:
         get_effect("columb_friction")
     message = str(caught.value)
