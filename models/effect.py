@@ -53,9 +53,10 @@ class Parameter:
     grid : tuple of float
         Empty for an amplitude. For a shape parameter (in which the law is nonlinear): starting values over the range
         of real hardware, relative to the scale named by ``relative_to`` if that is set.
-    relative_to : "", "speed", "travel", "torque", "rate" or "per_torque"
+    relative_to : "", "speed", "travel", "place", "torque", "rate" or "per_torque"
         Unit of the bounds' finite ends and of the grid: the joint's peak speed, its travel, its peak torque,
-        peak torque per travel, or one over its peak torque; "" for absolute numbers in SI units.
+        peak torque per travel, or one over its peak torque; "" for absolute numbers in SI units. "place": a position,
+        from the middle of the travel on, in travels: the ends are at -0.5 and 0.5.
     alone : bool
         False where this parameter alone would be another effect: a spring's rest torque alone is a bias.
     """
@@ -67,7 +68,7 @@ class Parameter:
     low: float = float("-inf")
     high: float = float("inf")
     grid: tuple[float, ...] = ()
-    relative_to: Literal["", "speed", "travel", "torque", "rate", "per_torque"] = ""
+    relative_to: Literal["", "speed", "travel", "place", "torque", "rate", "per_torque"] = ""
     alone: bool = True
 
 
@@ -143,6 +144,8 @@ class Effect:
     contains : tuple of str
         Simpler effects that are special cases of this one. A search names the simpler one first, and this one only for
         what the simpler one leaves (the principle of marginality: Nelder 1977).
+    exclusive : bool
+        True where only one of the amplitudes can be there: a stop is above its place or below it.
     at_rest : bool
         True where the effect shows mainly near rest. It must pass in motion like any other. But the share of the
         residual that makes it worth a name includes samples near rest, and its columns come from the measured motion,
@@ -177,6 +180,7 @@ class Effect:
     others: tuple[str, ...] = ()
     dissipates: bool = False
     contains: tuple[str, ...] = ()
+    exclusive: bool = False
     at_rest: bool = False
     remembers: bool = False
     exceeds_at_rest: bool = False

@@ -53,7 +53,9 @@ class Problem:
             position = {self.assembly.slots[i].name: int(i) for i in self.assembly.index_of(p)}
             own = [(position[x.name], x) for x in p.effect.parameters if x.grid and x.name in position]
             if own:
-                found.append([(i, np.array(x.grid) * self.assembly.scale(p, x)) for i, x in own])
+                found.append(
+                    [(i, self.assembly.origin(p, x) + np.array(x.grid) * self.assembly.scale(p, x)) for i, x in own]
+                )
         return found
 
     @cached_property

@@ -27,7 +27,7 @@ rotor_inertia link_torsion link_bending payload_mass com_offset inertia_error ha
 sling_tension_error suspension_sway hang_point_clearance external_torque flexible_appendage propellant_slosh
 wheel_friction contact_friction contact_damping contact_stiffness cable_damping cable_pretension umbilical_stiffness
 sensor_bias sensor_drift sensor_gain sensor_delay carriage_friction docking_friction groove_misalignment latch_play
-preload_loss gear_efficiency motor_saturation heating_friction joint_spring suspension_stiffness
+preload_loss gear_efficiency motor_saturation heating_friction end_stop joint_spring suspension_stiffness
 """
 NAMES = list(effects())
 
@@ -44,7 +44,7 @@ def reference_of(name):
 def scale_of(parameter, s):
     travel, torque = np.ptp(s["q"]), np.abs(s["value" if parameter.unit == "U" else "load"]).max()
     scales = {"": 1.0, "speed": s["speed_scale"][0], "travel": travel, "torque": torque, "rate": torque / travel}
-    scales["per_torque"] = 1 / torque
+    scales |= {"per_torque": 1 / torque, "place": travel}  # the motion's middle is near zero
     return scales[parameter.relative_to]
 
 
