@@ -1,5 +1,7 @@
 """Forward dynamics of an arm with elastic links: MuJoCo with springs inside the links, and rest under gravity."""
 
+# pyright: reportAttributeAccessIssue=false
+
 from dataclasses import replace
 
 import mujoco

@@ -1,6 +1,7 @@
 """Stops that MuJoCo's arms meet are named as stops, and springs across a joint are not."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -32,8 +33,8 @@ def diagnosed(folder, seed, make):
         encoder_step=dict.fromkeys(LEVELS, 2 * np.pi / 2**20),
         tau_noise=dict.fromkeys(LEVELS, 0.1),
         disturbance=dict.fromkeys(LEVELS, Disturbance(RMS, 0.3, 15.0)),
-        **{part: {"joint2": value}},
     )
+    plant = replace(plant, **{part: {"joint2": value}})
     (folder / "arm.urdf").write_text(arm.urdf())
     listed = ", ".join(f'"{e}"' for e in FRICTION)
     (folder / "arm.toml").write_text(f'system = "arm"\nurdf = "arm.urdf"\neffects = [{listed}]\n')

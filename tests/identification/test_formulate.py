@@ -78,7 +78,7 @@ def test_what_recordings_cannot_tell_a_formula_does_not_say():
     columns = table.weights([q])
     columns -= np.outer(line, line @ columns)
     curvature, score = columns.T @ columns / 0.25, columns.T @ torque / 0.25
-    shrunk = np.linalg.solve(curvature + np.eye(35), score)
+    shrunk = np.asarray(np.linalg.solve(curvature + np.eye(35), score), float)
     found = formulate_table("joint1", table, shrunk, None, (curvature, score))
     assert [t.kind for t in found.best.terms] == ["wave"]
     assert np.hypot(*found.best.values[0]) == pytest.approx(0.8, rel=0.1)

@@ -1,5 +1,7 @@
 """Virtual joints at a link's far end: closed forms of an L-shaped arm, MuJoCo with hinges there, and what is a beam."""
 
+# pyright: reportAttributeAccessIssue=false
+
 import mujoco
 import numpy as np
 import pytest

@@ -1,5 +1,7 @@
 """Elastic links of an arm without slings: against MuJoCo with springs in the link, and which law a name stands for."""
 
+# pyright: reportAttributeAccessIssue=false
+
 import mujoco
 import numpy as np
 import pytest

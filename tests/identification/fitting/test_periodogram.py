@@ -72,7 +72,7 @@ def test_peaks_are_the_highest_tops_in_order_ends_included():
     found = peaks(waves, np.array([5.0, 1.0, 2.0, 1.0, 9.0, 8.0, 8.5, 7.0]))
     assert found.waves.tolist() == [1.0, 3.0, 5.0, 7.0]
     assert (found.best, found.step, found.trials) == (2, 1.0, 8)
-    many = peaks(np.arange(1.0, 41.0), np.tile([0.0, 1.0], 20) * np.arange(40))
+    many = peaks(np.arange(1.0, 41.0), np.tile([0.0, 1.0], 20) * np.arange(40.0))
     assert many.waves.tolist() == [float(w) for w in range(40 - 2 * (MOST_PEAKS - 1), 41, 2)]
     assert peaks(np.array([2.0]), np.array([1.0])).waves.tolist() == [2.0]
 
