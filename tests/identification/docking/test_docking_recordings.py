@@ -201,6 +201,5 @@ def test_an_effect_concealed_in_mujoco_is_named_alone(sliding):
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(strict=True, reason="29 % low, cause not shown (docs/docking-recordings.md)")
 def test_friction_concealed_in_mujoco_has_its_size(sliding):
     assert sliding["found"]["coefficient"] == pytest.approx(sliding["truth"]["coefficient"], rel=0.25)
