@@ -23,14 +23,14 @@ from scipy import signal
 from .arm import STANDARD_GRAVITY, Arm
 from .lugre import Bristles, LuGre
 from .motion import Motion
-from .parts import Disturbance, Drift, Elasticity, Harness, Payload, Ripple, Servo, SolverFriction
+from .parts import Beam, Disturbance, Drift, Elasticity, Harness, Payload, Ripple, Servo, SolverFriction
 
 CONTROL_RATE = 1000
 
 
 @dataclass(frozen=True, eq=False)
 class Plant:
-    """An arm and all that its URDF does not say, each by joint name (``com_offset``: by link name).
+    """An arm and all that its URDF does not say, each by joint name (``com_offset``, ``beam``: by link name).
 
     Parameters
     ----------
@@ -60,7 +60,8 @@ class Plant:
     friction: Mapping[str, LuGre | SolverFriction] = field(default_factory=dict)
     armature: Mapping[str, float] = field(default_factory=dict)
     elasticity: Mapping[str, Elasticity] = field(default_factory=dict)
-    ripple: Mapping[str, Ripple] = field(default_factory=dict)
+    beam: Mapping[str, Beam] = field(default_factory=dict)
+    ripple: Mapping[str, Ripple | tuple[Ripple, ...]] = field(default_factory=dict)
     harness: Mapping[str, Harness] = field(default_factory=dict)
     disturbance: Mapping[str, Disturbance] = field(default_factory=dict)
     payload: Payload | None = None
@@ -79,7 +80,7 @@ class Plant:
         """Refuse names that would be ignored."""
         for name, value in vars(self).items():
             if isinstance(value, Mapping):
-                prefix = "link" if name == "com_offset" else "joint"
+                prefix = "link" if name in ("com_offset", "beam") else "joint"
                 known = {f"{prefix}{k}" for k in range(1, len(self.arm.links) + 1)}
                 if unknown := set(value) - known:
                     raise ValueError(f"{name}: {sorted(unknown)} not in the arm; it has {sorted(known)}")
@@ -106,7 +107,8 @@ class Plant:
             joint: f'stiffness="{0.0 if spring.gap else spring.stiffness!r}" damping="{spring.damping!r}"'
             for joint, spring in self.elasticity.items()
         }
-        text = real.mjcf(timestep=timestep, gravity=self.gravity, attributes=attributes, twist=twist)
+        turns = {link: beam.hinges for link, beam in self.beam.items()}
+        text = real.mjcf(timestep=timestep, gravity=self.gravity, attributes=attributes, twist=twist, turns=turns)
         return mujoco.MjModel.from_xml_string(text)
 
 
@@ -191,8 +193,9 @@ def _closed_loop(
     twist = np.array([model.joint(f"{joint}_twist").dofadr[0] for joint in plant.elasticity], int)
     elastic = np.array([joints.index(joint) for joint in plant.elasticity], int)
     backlash = [(d, spring) for d, spring in zip(twist, plant.elasticity.values(), strict=True) if spring.gap]
-    rippled = np.array([joints.index(j) for j in plant.ripple], int)
-    waves = [(wave.amplitude, wave.cycles, wave.phase) for wave in plant.ripple.values()]
+    ripples = [(j, w) for j, own in plant.ripple.items() for w in ((own,) if isinstance(own, Ripple) else own)]
+    rippled = np.array([joints.index(j) for j, _ in ripples], int)
+    waves = [(wave.amplitude, wave.cycles, wave.phase) for _, wave in ripples]
     amplitude, cycles, phase = np.array(waves).reshape(-1, 3).T
     bristles = Bristles(model, data, {j: law for j, law in plant.friction.items() if isinstance(law, LuGre)})
     step = plant.per_joint("encoder_step")
@@ -220,7 +223,7 @@ def _closed_loop(
         for share in shares:
             load = torque + push + share * (command - torque + later - push)
             if rippled.size:
-                load[rippled] += amplitude * np.sin(cycles * q[motor[rippled]] + phase)
+                np.add.at(load, rippled, amplitude * np.sin(cycles * q[motor[rippled]] + phase))
             for dof, spring in backlash:
                 applied[dof] = -spring.stiffness * (q[dof] - min(max(q[dof], -spring.gap / 2.0), spring.gap / 2.0))
             applied[motor] = load

@@ -21,6 +21,24 @@ class Elasticity:
 
 
 @dataclass(frozen=True)
+class Beam:
+    """Springs at a link's far end [N·m/rad] about its length and, alike, about two axes across it; none: rigid.
+
+    ``damping`` [N·m·s/rad] is beside each spring.
+    """
+
+    torsion: float | None = None
+    bending: float | None = None
+    damping: float = 0.0
+
+    @property
+    def hinges(self) -> dict[int, str]:
+        """MuJoCo's attributes of the hinges, by axis."""
+        springs = {0: self.torsion, 1: self.bending, 2: self.bending}
+        return {k: f'stiffness="{x!r}" damping="{self.damping!r}"' for k, x in springs.items() if x is not None}
+
+
+@dataclass(frozen=True)
 class Harness:
     """A spring across a joint [T/S], relaxed at ``rest`` [S]."""
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...models.axes import Place, place
+from ...models.beam import carried_joint
 from ...models.effect import Parameter, written_unit
 from ...models.model import PlacedEffect
 from ...models.tree import Tree
@@ -165,7 +166,9 @@ class TorqueModel:
         return place(self.tree, p.at.removeprefix("tau.").removeprefix("q."))
 
     def _own(self, p: PlacedEffect) -> str:
-        """Name of the joint or axis whose scales an effect refers to."""
+        """Name of the joint or axis whose scales an effect refers to; a beam's is the joint that it carries."""
+        if p.effect.at == "beam":
+            return self._joints[carried_joint(self.tree, self.joint_of(p))]
         return p.at if p.at in self.scales else self._joints[self.joint_of(p)]
 
     def speed_scale(self, p: PlacedEffect) -> float:

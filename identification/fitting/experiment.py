@@ -295,5 +295,6 @@ def scales(experiments: Sequence[Experiment]) -> Mapping[str, Scales]:
         motions = [e.motion for e in experiments]
         ends = [(here.coordinate(m.qd), here.coordinate(m.q), here.load(m.tau)) for m in motions]
         qd, q, tau = (np.concatenate(x) for x in zip(*ends, strict=True))
-        found[axis.name] = Scales(*(max(float(x), 1e-9) for x in (np.abs(qd).max(), np.ptp(q), np.abs(tau).max())))
+        speed, travel, torque = (max(float(x), 1e-9) for x in (np.abs(qd).max(), np.ptp(q), np.abs(tau).max()))
+        found[axis.name] = Scales(speed, travel, torque)
     return found

@@ -2,6 +2,7 @@
 
 import functools
 from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, product
 
@@ -9,9 +10,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.effect import Effect, Parameter
-from ...models.effects import effects
-from ...models.model import Model, PlacedEffect, all_places
+from ...models.effect import Effect, Parameter, term
+from ...models.effects import MOST_TERMS, effects
+from ...models.model import Model, PlacedEffect, all_places, effect_on
 from ..fitting.assembly import TorqueEvaluation, TorqueModel
 from ..fitting.effect_places import EffectTerms, TorqueState
 from ..fitting.experiment import Experiment
@@ -73,7 +74,7 @@ def library(model: Model) -> list[PlacedEffect]:
             # The first joint's slides act on it alone, so that the same law at the joint is the same column.
             have |= {f"{name}.{p.at}" for name in _at_joints(p.effect)}
     found = []
-    for effect in effects().values():
+    for effect in (effect_on(e, model.tree) for e in effects().values()):
         if effect.at == "link" and model.inertia == "free":
             continue  # the identified inertia already holds whatever a link effect could add
         if model.inertia == "free" and len(model.joints) == 1 and _scales(effect):
@@ -85,6 +86,19 @@ def library(model: Model) -> list[PlacedEffect]:
             other = {f"tau.{j}": f"q.{j}" for j in arm} | {f"q.{j}": f"tau.{j}" for j in arm}
             spots = tuple(at for at in other if f"{effect.name}.{other[at]}" not in have)
         found += [PlacedEffect(effect, at) for at in spots if f"{effect.name}.{at}" not in have]
+        if effect.series:
+            found += _further(effect, spots, have)
+    return found
+
+
+def _further(effect: Effect, spots: Sequence[str], have: set[str]) -> list[PlacedEffect]:
+    """The next term of a series at each place that has those before it."""
+    found = []
+    for at in spots:
+        names = [effect.name, *(f"{effect.name}_{k}" for k in range(2, MOST_TERMS + 1))]
+        there = [f"{name}.{at}" in have for name in names]
+        if there[0] and not all(there):
+            found.append(PlacedEffect(term(effect, there.index(False) + 1), at))
     return found
 
 

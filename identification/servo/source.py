@@ -55,8 +55,9 @@ class Servos:
         moves = [np.abs(np.diff(r.position)) for r in own]
         self._step = min((float(x[x > 0].min()) for x in moves if np.any(x > 0)), default=0.0)
         travel = max(float(np.ptp(r.position)) for r in own)
-        self._scales = Scales(*(max(x, LEAST) for x in (float(np.abs(self._qd).max()), travel,
-                                                        float(np.abs(self._load).max()))))  # fmt: skip
+        sizes = float(np.abs(self._qd).max()), travel, float(np.abs(self._load).max())
+        speed, travel, load = (max(x, LEAST) for x in sizes)
+        self._scales = Scales(speed, travel, load)
         self._laws = [e for e in laws() if not self._alias(e)]
 
     def measured(self, i: int) -> Array:
