@@ -23,7 +23,7 @@ from scipy import signal
 from .arm import STANDARD_GRAVITY, Arm
 from .lugre import Bristles, LuGre
 from .motion import Motion
-from .parts import Beam, Disturbance, Drift, Elasticity, Harness, Payload, Ripple, Servo, SolverFriction
+from .parts import Beam, Disturbance, Drift, Elasticity, Harness, Payload, Ripple, Servo, SolverFriction, Stop
 
 CONTROL_RATE = 1000
 
@@ -63,6 +63,7 @@ class Plant:
     beam: Mapping[str, Beam] = field(default_factory=dict)
     ripple: Mapping[str, Ripple | tuple[Ripple, ...]] = field(default_factory=dict)
     harness: Mapping[str, Harness] = field(default_factory=dict)
+    stop: Mapping[str, Stop] = field(default_factory=dict)
     disturbance: Mapping[str, Disturbance] = field(default_factory=dict)
     payload: Payload | None = None
     com_offset: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
@@ -197,6 +198,7 @@ def _closed_loop(
     rippled = np.array([joints.index(j) for j, _ in ripples], int)
     waves = [(wave.amplitude, wave.cycles, wave.phase) for _, wave in ripples]
     amplitude, cycles, phase = np.array(waves).reshape(-1, 3).T
+    stops = [(joints.index(j), int(motor[joints.index(j)]), s) for j, s in plant.stop.items()]
     bristles = Bristles(model, data, {j: law for j, law in plant.friction.items() if isinstance(law, LuGre)})
     step = plant.per_joint("encoder_step")
     quantised = step > 0.0
@@ -224,6 +226,8 @@ def _closed_loop(
             load = torque + push + share * (command - torque + later - push)
             if rippled.size:
                 np.add.at(load, rippled, amplitude * np.sin(cycles * q[motor[rippled]] + phase))
+            for joint, dof, stop in stops:
+                load[joint] -= stop.stiffness * max(q[dof] - stop.where, 0.0)
             for dof, spring in backlash:
                 applied[dof] = -spring.stiffness * (q[dof] - min(max(q[dof], -spring.gap / 2.0), spring.gap / 2.0))
             applied[motor] = load

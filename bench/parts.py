@@ -47,6 +47,14 @@ class Harness:
 
 
 @dataclass(frozen=True)
+class Stop:
+    """A bumper that a joint meets from ``where`` [S] on, upwards: ``stiffness`` [T/S] times how far it is pressed."""
+
+    stiffness: float
+    where: float
+
+
+@dataclass(frozen=True)
 class Ripple:
     """A motor torque ``amplitude`` [T] · sin(``cycles`` [1/S] · q + ``phase``) that the drive does not know of."""
 

@@ -55,9 +55,10 @@ class Parameter:
     grid : tuple of float
         Empty for an amplitude. For a shape parameter (in which the law is nonlinear): starting values over the range
         of real hardware, relative to the scale named by ``relative_to`` if that is set.
-    relative_to : "", "speed", "travel", "torque", "rate" or "per_torque"
+    relative_to : "", "speed", "travel", "place", "torque", "rate" or "per_torque"
         Unit of the bounds' finite ends and of the grid: the joint's peak speed, its travel, its peak torque,
-        peak torque per travel, or one over its peak torque; "" for absolute numbers in SI units.
+        peak torque per travel, or one over its peak torque; "" for absolute numbers in SI units. "place": a position,
+        from the middle of the travel on, in travels: the ends are at -0.5 and 0.5.
     periodic_over : str
         Of a shape that is the length of a wave: the signal that the law repeats over. Where a residual is at hand, the
         starting values are the peaks of its periodogram over that signal, and not the grid.
@@ -72,7 +73,7 @@ class Parameter:
     low: float = float("-inf")
     high: float = float("inf")
     grid: tuple[float, ...] = ()
-    relative_to: Literal["", "speed", "travel", "torque", "rate", "per_torque"] = ""
+    relative_to: Literal["", "speed", "travel", "place", "torque", "rate", "per_torque"] = ""
     periodic_over: str = ""
     alone: bool = True
 
@@ -155,6 +156,8 @@ class Effect:
     series : bool
         Joint effects only: True where the law is a term of a series. Where a model has a term, a search tries one more
         of the same law at the same place, by the names that `term` gives.
+    exclusive : bool
+        True where only one of the amplitudes can be there: a stop is above its place or below it.
     at_rest : bool
         True where the effect shows mainly near rest. It must pass in motion like any other. But the share of the
         residual that makes it worth a name includes samples near rest, and its columns come from the measured motion,
@@ -192,6 +195,7 @@ class Effect:
     dissipates: bool = False
     contains: tuple[str, ...] = ()
     series: bool = False
+    exclusive: bool = False
     at_rest: bool = False
     remembers: bool = False
     exceeds_at_rest: bool = False

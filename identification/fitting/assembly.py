@@ -179,10 +179,14 @@ class TorqueModel:
         """Unit of a parameter's bounds and grid at this place."""
         return self.scales[self._own(p)].of(parameter.relative_to)
 
+    def origin(self, p: PlacedEffect, parameter: Parameter) -> float:
+        """Where a parameter's bounds and grid are counted from at this place."""
+        return self.scales[self._own(p)].origin(parameter.relative_to)
+
     def bounds(self, p: PlacedEffect, parameter: Parameter) -> tuple[float, float]:
         """Physical bounds of a parameter at a place."""
-        scale = self.scale(p, parameter)
-        return parameter.low * scale, parameter.high * scale
+        scale, origin = self.scale(p, parameter), self.origin(p, parameter)
+        return origin + parameter.low * scale, origin + parameter.high * scale
 
     def unit(self, p: PlacedEffect, parameter: Parameter) -> str:
         """A parameter's unit with the joint's torque and position units written out."""
@@ -190,9 +194,8 @@ class TorqueModel:
 
     def usual(self, p: PlacedEffect, parameter: Parameter) -> float:
         """Start of a parameter: middle of its grid, or the value at which the effect vanishes."""
-        if parameter.grid:
-            return parameter.grid[len(parameter.grid) // 2] * self.scale(p, parameter)
-        return parameter.zero * self.scale(p, parameter)
+        share = parameter.grid[len(parameter.grid) // 2] if parameter.grid else parameter.zero
+        return self.origin(p, parameter) + share * self.scale(p, parameter)
 
     def values(self, theta: Array) -> dict[str, float]:
         """Every effect parameter by key, and the speed scales that laws refer to, as a model file stores them."""

@@ -72,7 +72,7 @@ class Problem:
 
     def _starts(self, p: PlacedEffect, x: Parameter) -> Array:
         """Starting values of a shape: its grid, or the lengths of waves at the peaks of a periodogram."""
-        usual = np.array(x.grid) * self.assembly.scale(p, x)
+        usual = self.assembly.origin(p, x) + np.array(x.grid) * self.assembly.scale(p, x)
         return self._lengths(p, x, usual) if x.periodic_over else usual
 
     def _lengths(self, p: PlacedEffect, x: Parameter, usual: Array) -> Array:

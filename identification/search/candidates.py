@@ -46,13 +46,16 @@ class EffectVariant:
     high: Array
 
     def subsets(self) -> list[NDArray[np.int_]]:
-        """Positions of the columns to try together: all and single ones; of a vector's few components, every set."""
+        """Positions of the columns to try together: all and single ones; of a vector's few components, every set;
+        of amplitudes that exclude each other, single ones."""
         n = max(len(self.amplitudes), 1)
         parameters = [self.placed.effect.parameters[i] for i in self.amplitudes]
         alone = {k for k, p in enumerate(parameters) if p.alone and not p.grid}
         if not alone:
             return [np.arange(n)]
-        counts = range(1, n + 1) if self.placed.effect.at == "link" and n <= MOST_COMBINED else sorted({1, n})
+        effect = self.placed.effect
+        counts = range(1, n + 1) if effect.at == "link" and n <= MOST_COMBINED else sorted({1, n})
+        counts = (1,) if effect.exclusive else counts
         return [np.array(some) for k in counts for some in combinations(range(n), k) if alone & set(some)]
 
     def start(self, amplitudes: Array) -> Array:
@@ -125,8 +128,8 @@ def variants(assembly: TorqueModel, placed: PlacedEffect) -> list[EffectVariant]
     """The grid over an effect's shape parameters at a place, amplitudes at zero."""
     axes, amplitudes = [], []
     for i, p in enumerate(placed.effect.parameters):
-        scale = assembly.scale(placed, p)
-        axes.append([g * scale for g in p.grid] or [p.zero * scale])
+        scale, origin = assembly.scale(placed, p), assembly.origin(placed, p)
+        axes.append([origin + g * scale for g in p.grid] or [p.zero * scale])
         if _is_linear(p):
             amplitudes.append(i)
     masses = [i for i in amplitudes if not placed.effect.parameters[i].grid]

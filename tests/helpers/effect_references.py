@@ -169,6 +169,10 @@ def warmed(s, fall, per_kelvin, time):
     return -(fall * np.ravel(warmth) + per_kelvin * (s["temperature"] - 20.0)) * np.sign(s["qd"])
 
 
+def bumper(s, above, below, where):
+    return np.interp(s["q"], [where - 9, where, where + 9], [-9 * below, 0.0, 9 * above])
+
+
 def sprung_link(s, stiffness, damping):
     inertia = s["inertia"][0]
 
@@ -356,6 +360,7 @@ REFERENCES = {
     "gear_efficiency": Reference({"driving_loss": 0.25, "braking_loss": 0.1}, by_quadrant),
     "motor_saturation": Reference({"excess": 0.6, "knee": 1.4, "no_load_speed": 9.0}, saturated, likeness=0.1),
     "heating_friction": Reference({"fall": 3.0, "per_kelvin": 0.2, "time": 5.0}, warmed, tolerance=0.1),
+    "end_stop": Reference({"above": 30.0, "below": 4.0, "where": 0.6}, bumper, likeness=0.01),
     "joint_spring": Reference({"stiffness": 6.0, "torque_at_zero": 2.4}, spring),
     "rotor_inertia": Reference({"inertia": 0.4}, lambda s, inertia: np.gradient(inertia * s["qd"], DT, edge_order=2)),
     "torque_ripple": Reference({"cosine": 0.3, "sine": 0.5, "period": 0.21}, ripple),

@@ -71,6 +71,7 @@ def assembly(**scales) -> Any:
     """Scales by the word that a parameter refers to them; bounds ten times its own."""
     return Made(
         scale=lambda _placed, x: scales.get(x.relative_to, 1.0),
+        origin=lambda _placed, x: scales.get("middle", 0.0) if x.relative_to == "place" else 0.0,
         bounds=lambda _placed, x: (10 * x.low, 10 * x.high),
         place_of=lambda _: Made(channels=(1,)),
         joint_of=lambda _: 1,
@@ -87,6 +88,15 @@ def test_a_grid_is_every_combination_of_shapes_in_the_joints_scale():
     np.testing.assert_allclose([v.parameters for v in found], [(0.0, 4.0 * x) for x in (0.01, 0.03, 0.1, 0.3)])
     assert [v.amplitudes.tolist() for v in found] == 4 * [[0]]
     assert (found[0].low[0], found[0].high[0]) == (0.0, np.inf)
+
+
+def test_a_stop_stands_inside_the_travel_on_one_side():
+    """Outside it would be a straight line or nothing, and on both sides a spring."""
+    found = variants(assembly(place=2.0, middle=7.0), PlacedEffect(get_effect("end_stop"), "joint1"))
+    places = [v.parameters[2] for v in found]
+    assert 6.0 < min(places) < 6.1
+    assert 7.9 < max(places) < 8.0
+    assert {tuple(map(tuple, v.subsets())) for v in found} == {((0,), (1,))}
 
 
 def shape(name, n):

@@ -19,7 +19,7 @@ rotor_inertia link_torsion link_bending payload_mass com_offset inertia_error ha
 sling_tension_error suspension_sway hang_point_clearance external_torque flexible_appendage propellant_slosh
 wheel_friction contact_friction contact_damping contact_stiffness cable_damping cable_pretension umbilical_stiffness
 sensor_bias sensor_drift sensor_gain sensor_delay carriage_friction docking_friction groove_misalignment latch_play
-preload_loss gear_efficiency motor_saturation heating_friction joint_spring suspension_stiffness
+preload_loss gear_efficiency motor_saturation heating_friction end_stop joint_spring suspension_stiffness
 """
 LAWS = {law: e for name, e in effects().items() for law, e in ((name, e), (f"{name} elsewhere", e.elsewhere)) if e}
 """Every law by its effect's name; one that holds on trees without the effect's kind of place under a name more."""
