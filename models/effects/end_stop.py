@@ -1,8 +1,8 @@
 """End stop: from a place of the travel on, a bumper or a cable at its end pushes the joint back.
 
 The stop is above ``where`` or below it, never both: that would be a spring. It lies inside the recorded travel, in its
-outer fifths. Beyond one end it acts nowhere; beyond the other it acts everywhere, as a straight line, and is a spring. A joint that
-meets a stop at both ends has the effect for the stronger. Rounded over the travel of 2 ms at peak speed.
+outer fifths. Beyond one end it acts nowhere; beyond the other it acts everywhere, as a straight line, and is a spring.
+A joint that meets a stop at both ends has the effect for the stronger. Rounded over the travel of 2 ms at peak speed.
 """
 
 import casadi as ca
