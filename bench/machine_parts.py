@@ -22,10 +22,14 @@ class Push:
     start: float = 0.0
 
     def __call__(self, run: Running) -> Callable[[], None]:
-        """Held between the instants; ``start`` [s] is the first one's time."""
-        dofs = list(run.dof.values())
+        """Held between the instants; ``start`` [s] is the first one's time. ValueError where MuJoCo starts again."""
+        dofs, seen = list(run.dof.values()), [-1.0]
 
         def act() -> None:
+            # A simulation that has become unstable is reset by MuJoCo, and goes on as if nothing had been.
+            if run.data.time <= seen[0]:
+                raise ValueError(f"the simulation became unstable at {seen[0]:g} s")
+            seen[0] = run.data.time
             k = min(int((run.data.time - self.start) * CONTROL_RATE + 1e-6), len(self.table) - 1)
             run.data.qfrc_applied[dofs] += self.table[k]
 

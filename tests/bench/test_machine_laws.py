@@ -155,3 +155,10 @@ def test_a_law_and_a_push_add_to_the_drive():
     """Both at a slide that the servo holds still: the drive bears their sum."""
     plant = Plant(lift(0), mechanisms=(Law("joint1", lambda q, qd: 4.0 + q), Push(np.full((2501, 1), -1.5))))
     assert run(plant, 0.0)["tau.joint1"][-20:] == pytest.approx(-2.5, abs=0.05)
+
+
+def test_a_run_that_becomes_unstable_is_refused():
+    """A negative damping that no step can follow; MuJoCo would set the arm back to its first pose."""
+    law = Law("joint1", lambda q, qd: 1e6 * (1.0 + qd))
+    with pytest.raises(ValueError, match="unstable"):
+        run(Plant(lift(0), mechanisms=(law, Push(np.zeros((2501, 1))))), 0.1)
