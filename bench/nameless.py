@@ -109,7 +109,7 @@ def neighbour(k: int) -> int:
 
 
 def in_mujoco(kind: Nameless, size: float, seed: int, number: int, folder: Path, twin: Path) -> tuple[int, str]:
-    """Record an arm with a law, and the same without; numbers of the joint that has it, and of the other, from 1."""
+    """Record an arm in MuJoCo, with a law and without; joint (from 0) and channel that have it."""
     plan, makers = ("outside", (kind.name,), size), {kind.name: stepped(kind)}
     for attempt in range(ATTEMPTS):
         case = draw(plan, seed, number, attempt, makers)
@@ -123,7 +123,7 @@ def in_mujoco(kind: Nameless, size: float, seed: int, number: int, folder: Path,
 
 
 def on_played(kind: Nameless, size: float, seed: int, number: int, folder: Path, twin: Path) -> tuple[int, str]:
-    """The same on a published arm, beside recorded residuals."""
+    """Record a published arm beside recorded residuals, with a law and without; joint and channel that have it."""
     plan, makers = played.Plan(played.LAWLESS, ((kind.name, size),)), {kind.name: along(kind)}
     attempt = played.write(plan, seed, number, folder, makers)
     played.write(replace(plan, concealed=((kind.name, 0.0),)), seed, number, twin, makers, attempt)
