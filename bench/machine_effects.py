@@ -16,6 +16,7 @@ from snarelab.errors import InputError
 from snarelab.models.effects import get_effect
 
 from .concealed import Planned, Rng, TooMuch
+from .machine_beams import beam
 from .machine_laws import Grease, froehlich, froehlich_asked, gear_loss, slots, tanh_asked, tanh_motor
 from .machine_parts import Gear, Heating, Iron, Law, Queue
 from .parts import Bumper, Tie
@@ -189,6 +190,14 @@ def _two_ripples(m: Planned, rms: float, rng: Rng) -> Hidden:
     return Hidden(truths, rms, {"mechanisms": tuple(parts)})
 
 
+def _link(name: str, part: str, axes: tuple[int, ...]) -> Maker:
+    def make(m: Planned, rms: float, rng: Rng) -> Hidden:
+        link, stiffness, part_of = beam(part, axes)(m, rms, rng)
+        return Hidden(((name, link),), stiffness, {"beam": {link: part_of}})
+
+    return make
+
+
 @dataclass(frozen=True)
 class Entry:
     """A mechanism: the effects that the vocabulary needs to have a name for it, and its maker."""
@@ -219,5 +228,7 @@ ENTRIES: dict[str, Entry] = {
     "command_delay": Entry(("command_delay",), _command_delay),
     "end_stop": Entry(("end_stop",), _end_stop),
     "two_ripples": Entry(("torque_ripple", "torque_ripple_2"), _two_ripples),
+    "link_torsion": Entry(("link_torsion",), _link("link_torsion", "torsion", (0,))),
+    "link_bending": Entry(("link_bending",), _link("link_bending", "bending", (1, 2))),
     "clean": Entry((), _nothing),
 }
