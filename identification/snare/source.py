@@ -41,7 +41,7 @@ FEWEST_BLOCKS = 4
 class Captures:
     """Captures of a model, the training recordings first, while their processes run."""
 
-    anew, bent, steps = False, True, 4
+    anew, bent, steps = False, True, 8
 
     def __init__(self, model: Model, records: Sequence[CaptureRecording], n_train: int, runs: CaptureRuns) -> None:
         """Simulate nothing yet."""
