@@ -11,7 +11,7 @@ channels are not skewed against each other unless ``tau_delay`` asks for it.
 
 # pyright: reportAttributeAccessIssue=false
 # (pyright does not see the names that mujoco takes from its compiled module)
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -23,9 +23,26 @@ from scipy import signal
 from .arm import STANDARD_GRAVITY, Arm
 from .lugre import Bristles, LuGre
 from .motion import Motion
-from .parts import Disturbance, Drift, Elasticity, Harness, Payload, Ripple, Servo, SolverFriction
+from .parts import Bumper, Disturbance, Drift, Elasticity, Harness, Payload, Ripple, Servo, SolverFriction, Tie
 
 CONTROL_RATE = 1000
+
+
+@dataclass(frozen=True, eq=False)
+class Running:
+    """A run for what acts in it: ``dof`` by joint name, and the bristles, whose friction is on the joints already."""
+
+    model: mujoco.MjModel
+    data: mujoco.MjData
+    dof: Mapping[str, int]
+    bristles: Bristles
+
+
+Mechanism = Callable[[Running], Callable[[], None]]
+"""Made anew for each run: what it gives back is called before each MuJoCo step and adds to ``data.qfrc_applied``."""
+
+Motor = Callable[[], Callable[[float], float]]
+"""Made anew for each run: from the torque that a motor's current stands for, at each MuJoCo step, to what it gives."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +64,12 @@ class Plant:
         Quantum and RMS of the position reading [S]; the servo sees the same readings.
     tau_gain, tau_bias, tau_drift, tau_delay, tau_noise
         The torque channel reads gain · torque(t − delay [s]) + bias [T] + drift + white noise of this RMS [T].
+    ties : tuple of Tie or Bumper
+        MuJoCo's own couplings of two joints, and soft ends of a joint's travel.
+    motor : Motor
+        What the drive gives of the torque that is commanded and logged; the servo does not know.
+    mechanisms : tuple of Mechanism
+        Torques of any other law.
     servo : Servo or None
         None leaves the arm to itself.
 
@@ -72,6 +95,9 @@ class Plant:
     tau_drift: Mapping[str, Drift] = field(default_factory=dict)
     tau_delay: Mapping[str, float] = field(default_factory=dict)
     tau_noise: Mapping[str, float] = field(default_factory=dict)
+    ties: tuple[Tie | Bumper, ...] = ()
+    motor: Mapping[str, Motor] = field(default_factory=dict)
+    mechanisms: tuple[Mechanism, ...] = ()
     gravity: tuple[float, float, float] = STANDARD_GRAVITY
     servo: Servo | None = field(default_factory=Servo)
 
@@ -107,6 +133,8 @@ class Plant:
             for joint, spring in self.elasticity.items()
         }
         text = real.mjcf(timestep=timestep, gravity=self.gravity, attributes=attributes, twist=twist)
+        tendons = "".join(tie.mjcf(timestep) for tie in self.ties)
+        text = text.replace("</worldbody>", f"</worldbody><tendon>{tendons}</tendon>") if tendons else text
         return mujoco.MjModel.from_xml_string(text)
 
 
@@ -195,6 +223,9 @@ def _closed_loop(
     waves = [(wave.amplitude, wave.cycles, wave.phase) for wave in plant.ripple.values()]
     amplitude, cycles, phase = np.array(waves).reshape(-1, 3).T
     bristles = Bristles(model, data, {j: law for j, law in plant.friction.items() if isinstance(law, LuGre)})
+    running = Running(model, data, dict(zip(joints, motor.tolist(), strict=True)), bristles)
+    acting = [begin(running) for begin in plant.mechanisms]
+    giving = [(joints.index(joint), begin()) for joint, begin in plant.motor.items()]
     step = plant.per_joint("encoder_step")
     quantised = step > 0.0
     forward, kp, kd = _servo_gains(plant, target)
@@ -219,12 +250,17 @@ def _closed_loop(
         push, later = later, disturbance[k]
         for share in shares:
             load = torque + push + share * (command - torque + later - push)
+            for j, given in giving:
+                asked = torque[j] + share * (command[j] - torque[j])
+                load[j] += given(asked) - asked
             if rippled.size:
                 load[rippled] += amplitude * np.sin(cycles * q[motor[rippled]] + phase)
             for dof, spring in backlash:
                 applied[dof] = -spring.stiffness * (q[dof] - min(max(q[dof], -spring.gap / 2.0), spring.gap / 2.0))
             applied[motor] = load
             bristles.act()
+            for act in acting:
+                act()
             mujoco.mj_step(model, data)
             bristles.slip()
         torque = command
