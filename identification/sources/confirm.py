@@ -23,7 +23,7 @@ from ..evidence.rounds import as_names, share_of_residual
 from ..evidence.search import MemberOdds, Search
 from ..evidence.selection import Remainder
 from ..evidence.tolerant import searched
-from .fit import fit, linearised, shift_columns
+from .fit import fit, kept_columns, linearised
 from .search import Naming, Selection, opened
 from .source import GridPoint, Linearisation, ModelPoint, Source
 from .weigh import covariances, point_key, weigh
@@ -68,10 +68,10 @@ def confirm(
 ) -> Confirmation:
     """Remove the name with the smallest held-out loss, until every name's loss is beyond its scatter."""
     held, last, names = source.held, found.last, list(found.names)
-    shifted, own = shift_columns(last), covariances(found.weighed)
+    shifted, own = kept_columns(source, last), covariances(found.weighed)
     progress("confirming on the held-out recordings")
     there = linearised(source, held, source.settled(last.at, held))
-    beside = shift_columns(there)
+    beside = kept_columns(source, there)
     could = [[x[:, c] for x in there.columns] for c in range(len(source.channels))]
     noise = replace(found.weighed, runs=[*found.weighed.runs, *source.noise_channels(held, there, could)])
     whole = _forecast(source, given, last, there, noise)
