@@ -80,7 +80,7 @@ def test_a_twin_is_the_same_arm_without_the_law(tmp_path):
         one, other = (
             np.genfromtxt(tmp_path / at / f"{name}.csv", delimiter=",", names=True) for at in ("case", "twin")
         )
-        apart = {c for c in one.dtype.names if not np.array_equal(one[c], other[c])}
+        apart = {c for c in one.dtype.names or () if not np.array_equal(one[c], other[c])}
         assert apart == {channel.replace(".", "")}
     known = json.loads((tmp_path / "case" / "truth.json").read_text())
     assert known["effects"][0]["law"] == kind.name
@@ -111,8 +111,9 @@ def test_what_is_told_is_read_from_tables_and_words():
 
 def test_the_table_counts_every_case():
     line = {"size": 2.0, "seen": True, "named": [], "told": [["load"]], "over": ["load"], "closure": 0.9, "gap": 1.5}
+    line["background"] = ["payload_mass"]
     other = line | {"seen": False, "told": [], "named": [["sensor_gain", "tau.joint1"]], "closure": 0.0}
-    wrong = line | {"told": [["position"]], "closure": 0.4}
+    wrong = line | {"told": [["position"]], "closure": 0.4, "named": [["payload_mass", "link2"]]}
     rows = {x[:46].strip(): x[46:].split() for x in summary([line, other, wrong, line]).splitlines()}
     assert rows["2x: seen"][:5] == ["85", "%", "75", "%", "4"]
     assert rows["2x: a wrong name"][:3] == ["25", "%", "4"]
