@@ -98,17 +98,32 @@ class Arm:
         gravity: ArrayLike = STANDARD_GRAVITY,
         attributes: Mapping[str, str] | None = None,
         twist: Mapping[str, str] | None = None,
+        turns: Mapping[str, Mapping[int, str]] | None = None,
     ) -> str:
         """The arm as MJCF text.
 
         ``attributes`` adds text to a joint's element. ``twist`` splits a joint in two about one axis, a massless motor
-        body and the link behind it, and gives the text of the joint between them, named ``<joint>_twist``.
+        body and the link behind it, and gives the text of the joint between them, named ``<joint>_twist``. ``turns``
+        puts hinges at a link's far end, where the next joint sits, named ``<link>_turn<k>``: about its length (0) and
+        two axes across it (1, 2), each with its text.
         """
-        attributes, twist = attributes or {}, twist or {}
+        attributes, twist, turns = attributes or {}, twist or {}, turns or {}
         opened, bodies = 0, []
         for k, (joint, link) in enumerate(zip(self.joints, self.links, strict=True), 1):
             kind = {"revolute": "hinge", "prismatic": "slide"}[link.kind]
             place = f'pos="{_text(link.origin)}" euler="{_text(link.rpy)}"'
+            if hinges := turns.get(f"link{k - 1}"):
+                axes = length_axes(link.origin)
+                bodies += [
+                    f'<body name="end{k - 1}" pos="{_text(link.origin)}">',
+                    '<inertial pos="0 0 0" mass="1e-9" diaginertia="1e-9 1e-9 1e-9"/>',
+                    *(
+                        f'<joint name="link{k - 1}_turn{a}" type="hinge" axis="{_text(axes[a])}" {own}/>'
+                        for a, own in hinges.items()
+                    ),
+                ]
+                opened += 1
+                place = f'euler="{_text(link.rpy)}"'
             moves = f'type="{kind}" axis="{_text(link.axis)}"'
             if joint in twist:
                 bodies += [
@@ -170,6 +185,13 @@ def random_arm(rng: np.random.Generator, n_joints: int, prismatic_share: float =
         )
         last_axis = axis
     return Arm(tuple(links))
+
+
+def length_axes(end: NDArray) -> NDArray:
+    """Unit vectors by rows: along a vector (3,), and two across it."""
+    along = end / np.linalg.norm(end)
+    across = np.linalg.svd(along[None])[2][1:]
+    return np.array([along, *across])
 
 
 def _small_rotation(vector: NDArray) -> NDArray:

@@ -72,6 +72,7 @@ class Bristles:
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, laws: Mapping[str, LuGre]) -> None:
         """``laws`` by joint name; all bristles start unbent."""
+        self._joints = list(laws)
         self._dofs = np.array([model.joint(joint).dofadr[0] for joint in laws], int)
         self._step = model.opt.timestep
         self._acting = data.qpos, data.qvel, data.qfrc_applied, model.dof_damping
@@ -90,6 +91,10 @@ class Bristles:
     def act(self) -> None:
         """Subtract friction from ``qfrc_applied`` for the step to come."""
         _act(self._dofs, self._step, self._law, self._state, *self._acting)
+
+    def resistance(self, joint: str) -> float:
+        """Friction of a joint [T] that ``act`` subtracted, viscous part and all: positive where the joint moves on."""
+        return float(self._state[RESISTANCE, self._joints.index(joint)])
 
     def slip(self) -> None:
         """Move the bristles by the step just made, and note the torque that was handed to each link."""

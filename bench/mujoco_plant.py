@@ -11,7 +11,7 @@ channels are not skewed against each other unless ``tau_delay`` asks for it.
 
 # pyright: reportAttributeAccessIssue=false
 # (pyright does not see the names that mujoco takes from its compiled module)
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -23,14 +23,44 @@ from scipy import signal
 from .arm import STANDARD_GRAVITY, Arm
 from .lugre import Bristles, LuGre
 from .motion import Motion
-from .parts import Disturbance, Drift, Elasticity, Harness, Payload, Ripple, Servo, SolverFriction
+from .parts import (
+    Beam,
+    Bumper,
+    Disturbance,
+    Drift,
+    Elasticity,
+    Harness,
+    Payload,
+    Ripple,
+    Servo,
+    SolverFriction,
+    Stop,
+    Tie,
+)
 
 CONTROL_RATE = 1000
 
 
 @dataclass(frozen=True, eq=False)
+class Running:
+    """A run for what acts in it: ``dof`` by joint name, and the bristles, whose friction is on the joints already."""
+
+    model: mujoco.MjModel
+    data: mujoco.MjData
+    dof: Mapping[str, int]
+    bristles: Bristles
+
+
+Mechanism = Callable[[Running], Callable[[], None]]
+"""Made anew for each run: what it gives back is called before each MuJoCo step and adds to ``data.qfrc_applied``."""
+
+Motor = Callable[[], Callable[[float], float]]
+"""Made anew for each run: from the torque that a motor's current stands for, at each MuJoCo step, to what it gives."""
+
+
+@dataclass(frozen=True, eq=False)
 class Plant:
-    """An arm and all that its URDF does not say, each by joint name (``com_offset``: by link name).
+    """An arm and all that its URDF does not say, each by joint name (``com_offset``, ``beam``: by link name).
 
     Parameters
     ----------
@@ -45,11 +75,14 @@ class Plant:
         Shift of a link's centre of mass [m, link frame].
     encoder_step, encoder_noise : float
         Quantum and RMS of the position reading [S]; the servo sees the same readings.
-    drive_delay : float
-        The drive moves as said above, but this long [s] after it should. The recorded torque is what it should be then:
-        the command, ahead of what the joint gets.
     tau_gain, tau_bias, tau_drift, tau_delay, tau_noise
         The torque channel reads gain · torque(t − delay [s]) + bias [T] + drift + white noise of this RMS [T].
+    ties : tuple of Tie or Bumper
+        MuJoCo's own couplings of two joints, and soft ends of a joint's travel.
+    motor : Motor
+        What the drive gives of the torque that is commanded and logged; the servo does not know.
+    mechanisms : tuple of Mechanism
+        Torques of any other law.
     servo : Servo or None
         None leaves the arm to itself.
 
@@ -63,19 +96,23 @@ class Plant:
     friction: Mapping[str, LuGre | SolverFriction] = field(default_factory=dict)
     armature: Mapping[str, float] = field(default_factory=dict)
     elasticity: Mapping[str, Elasticity] = field(default_factory=dict)
-    ripple: Mapping[str, Ripple] = field(default_factory=dict)
+    beam: Mapping[str, Beam] = field(default_factory=dict)
+    ripple: Mapping[str, Ripple | tuple[Ripple, ...]] = field(default_factory=dict)
     harness: Mapping[str, Harness] = field(default_factory=dict)
+    stop: Mapping[str, Stop] = field(default_factory=dict)
     disturbance: Mapping[str, Disturbance] = field(default_factory=dict)
     payload: Payload | None = None
     com_offset: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
     encoder_step: Mapping[str, float] = field(default_factory=dict)
     encoder_noise: Mapping[str, float] = field(default_factory=dict)
-    drive_delay: Mapping[str, float] = field(default_factory=dict)
     tau_gain: Mapping[str, float] = field(default_factory=dict)
     tau_bias: Mapping[str, float] = field(default_factory=dict)
     tau_drift: Mapping[str, Drift] = field(default_factory=dict)
     tau_delay: Mapping[str, float] = field(default_factory=dict)
     tau_noise: Mapping[str, float] = field(default_factory=dict)
+    ties: tuple[Tie | Bumper, ...] = ()
+    motor: Mapping[str, Motor] = field(default_factory=dict)
+    mechanisms: tuple[Mechanism, ...] = ()
     gravity: tuple[float, float, float] = STANDARD_GRAVITY
     servo: Servo | None = field(default_factory=Servo)
 
@@ -83,7 +120,7 @@ class Plant:
         """Refuse names that would be ignored."""
         for name, value in vars(self).items():
             if isinstance(value, Mapping):
-                prefix = "link" if name == "com_offset" else "joint"
+                prefix = "link" if name in ("com_offset", "beam") else "joint"
                 known = {f"{prefix}{k}" for k in range(1, len(self.arm.links) + 1)}
                 if unknown := set(value) - known:
                     raise ValueError(f"{name}: {sorted(unknown)} not in the arm; it has {sorted(known)}")
@@ -110,7 +147,10 @@ class Plant:
             joint: f'stiffness="{0.0 if spring.gap else spring.stiffness!r}" damping="{spring.damping!r}"'
             for joint, spring in self.elasticity.items()
         }
-        text = real.mjcf(timestep=timestep, gravity=self.gravity, attributes=attributes, twist=twist)
+        turns = {link: beam.hinges for link, beam in self.beam.items()}
+        text = real.mjcf(timestep=timestep, gravity=self.gravity, attributes=attributes, twist=twist, turns=turns)
+        tendons = "".join(tie.mjcf(timestep) for tie in self.ties)
+        text = text.replace("</worldbody>", f"</worldbody><tendon>{tendons}</tendon>") if tendons else text
         return mujoco.MjModel.from_xml_string(text)
 
 
@@ -195,11 +235,15 @@ def _closed_loop(
     twist = np.array([model.joint(f"{joint}_twist").dofadr[0] for joint in plant.elasticity], int)
     elastic = np.array([joints.index(joint) for joint in plant.elasticity], int)
     backlash = [(d, spring) for d, spring in zip(twist, plant.elasticity.values(), strict=True) if spring.gap]
-    rippled = np.array([joints.index(j) for j in plant.ripple], int)
-    waves = [(wave.amplitude, wave.cycles, wave.phase) for wave in plant.ripple.values()]
+    ripples = [(j, w) for j, own in plant.ripple.items() for w in ((own,) if isinstance(own, Ripple) else own)]
+    rippled = np.array([joints.index(j) for j, _ in ripples], int)
+    waves = [(wave.amplitude, wave.cycles, wave.phase) for _, wave in ripples]
     amplitude, cycles, phase = np.array(waves).reshape(-1, 3).T
+    stops = [(joints.index(j), int(motor[joints.index(j)]), s) for j, s in plant.stop.items()]
     bristles = Bristles(model, data, {j: law for j, law in plant.friction.items() if isinstance(law, LuGre)})
-    late = [(j, CONTROL_RATE * x) for j, x in enumerate(plant.per_joint("drive_delay")) if x]
+    running = Running(model, data, dict(zip(joints, motor.tolist(), strict=True)), bristles)
+    acting = [begin(running) for begin in plant.mechanisms]
+    giving = [(joints.index(joint), begin()) for joint, begin in plant.motor.items()]
     step = plant.per_joint("encoder_step")
     quantised = step > 0.0
     forward, kp, kd = _servo_gains(plant, target)
@@ -224,28 +268,23 @@ def _closed_loop(
         push, later = later, disturbance[k]
         for share in shares:
             load = torque + push + share * (command - torque + later - push)
-            for j, steps in late:
-                due = torque[j] + share * (command[j] - torque[j])
-                load[j] += _queued(drive[: k + 1, j], command[j], k + share - steps) - due
+            for j, given in giving:
+                asked = torque[j] + share * (command[j] - torque[j])
+                load[j] += given(asked) - asked
             if rippled.size:
-                load[rippled] += amplitude * np.sin(cycles * q[motor[rippled]] + phase)
+                np.add.at(load, rippled, amplitude * np.sin(cycles * q[motor[rippled]] + phase))
+            for joint, dof, stop in stops:
+                load[joint] -= stop.stiffness * max(q[dof] - stop.where, 0.0)
             for dof, spring in backlash:
                 applied[dof] = -spring.stiffness * (q[dof] - min(max(q[dof], -spring.gap / 2.0), spring.gap / 2.0))
             applied[motor] = load
             bristles.act()
+            for act in acting:
+                act()
             mujoco.mj_step(model, data)
             bristles.slip()
         torque = command
     return read_q, read_link, drive
-
-
-def _queued(told: NDArray, last: float, step: float) -> float:
-    """What a drive was told for a step of the servo, which may lie between two; ``last`` follows what it was told."""
-    if step <= 0.0:
-        return told[0]
-    before = int(step)
-    after = told[before + 1] if before + 1 < len(told) else last
-    return told[before] + (step - before) * (after - told[before])
 
 
 def _servo_gains(plant: Plant, target: tuple[NDArray, NDArray, NDArray]) -> tuple[NDArray, NDArray, NDArray]:

@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections.abc import Iterable
 from pathlib import Path
 
 from snarelab.models.effect import Effect, Parameter
@@ -22,6 +23,9 @@ results and in reports. This page is written from the code by `python docs/make_
   that moves it; its effect is a friction force at the contacts. A *boom* is a link with slings beyond it, and has the
   link's name. `slings` is the whole suspension, for what all slings do alike. The rig's geometry gives the torque of
   each effect at every joint that it can turn.
+- On an arm without slings a *beam* is a link that carries one joint some way from its own, and has the link's name. Its
+  effect is how far the far end turns about three axes; the tree with virtual joints there gives what every joint feels,
+  to first order. `link_torsion` and `link_bending` have a law for booms and one for beams: the arm decides which holds.
 - On a free-floating arm (`system = "free_floating_arm"`) an effect at the *base* is a force and moment on the base, in
   the base's axes, about the origin of its frame.
 - In a capture (`system = "snare_capture"`) effects of the contact act at the *pin*, effects of the cables themselves at
@@ -32,7 +36,10 @@ results and in reports. This page is written from the code by `python docs/make_
 - Units are those of a rotary joint. For a sliding joint read N for N·m, and m for rad. U is the channel's own unit.
 - `q`, `qd` and `qdd` are the joint's position, speed and acceleration. `load` is the rigid-body torque at the joint,
   from the model. `sgn` is the direction of motion, smoothed over 0.1 % of the joint's peak speed.
-- *Shape* marks a parameter in which the law is nonlinear. Its starting values come from a grid.
+- *Shape* marks a parameter in which the law is nonlinear. Its starting values come from a grid, or,
+  for the length of a wave, from a periodogram.
+- A *series* may act more than once at a place: its further terms have its name and a number from 2 on
+  (`torque_ripple_2`). The next is tried where a model has those before it.
 - An effect *contains* its special cases. They are named first; the containing effect is named only for what they leave.
 
 How to add an effect: [adding-an-effect.md](adding-an-effect.md).
@@ -68,9 +75,10 @@ def page() -> str:
         members = [e for e in effects().values() if e.family == family]
         parts.append(f"## {family[:1].upper()}{family[1:]}\n")
         heads = "| effect, where, source | law, parameters |\n| --- | --- |"
-        parts.append("\n".join([heads, *map(_row, members)]) + "\n")
+        laws = _laws(members)
+        parts.append("\n".join([heads, *map(_row, laws)]) + "\n")
     parts.append(CONFUSIONS + "\n".join(_confusions()) + "\n")
-    parts.append(EXPERIMENTS + "\n".join(map(_experiment, effects().values())) + "\n")
+    parts.append(EXPERIMENTS + "\n".join(map(_experiment, _laws(effects().values()))) + "\n")
     return "\n".join(parts)
 
 
@@ -82,9 +90,14 @@ def families() -> str:
     return "\n".join([_cells("family", "can be named"), _cells("---", "---"), *rows]) + "\n"
 
 
+def _laws(members: Iterable[Effect]) -> list[Effect]:
+    """Every law, where an effect has two one after the other."""
+    return [law for e in members for law in (e, e.elsewhere) if law]
+
+
 def _row(effect: Effect) -> str:
     contains = f"<br>Contains {', '.join(f'`{name}`' for name in effect.contains)}." if effect.contains else ""
-    law = f"`{effect.equation}`{contains}"
+    law = f"`{effect.equation}`{', series' if effect.series else ''}{contains}"
     parameters = "<br>".join(map(_parameter, effect.parameters))
     what = f"`{effect.name}`<br>{effect.sentence}<br>Where: {effect.at}<br>Source: {effect.source}"
     return _cells(what, f"{law}<br>{parameters}")
@@ -110,7 +123,8 @@ def _confusions() -> list[str]:
 
 
 def _experiment(effect: Effect) -> str:
-    return _cells(f"`{effect.name}`", effect.experiment.format(at="*X*"))
+    where = f" at a {effect.at}" if effect.at in ("boom", "beam") else ""  # one name, two laws
+    return _cells(f"`{effect.name}`{where}", effect.experiment.format(at="*X*"))
 
 
 def _cells(*cells: str) -> str:

@@ -11,10 +11,11 @@ less what acts from outside, ``load = M a + c`` the rigid-body torque, w the wre
 by Newton's method with the symmetric matrix ``M + diag((d friction / d qdd) / (1 + d friction / d load))``, less
 ``d w / d a_base``; one step is exact where friction is linear in acceleration and load, as w is (Featherstone 2008,
 chapters 6 and 8, for M, c and M's factors).
-At a springy joint ``q`` is the motor, as an encoder reads it, and ``q_link`` the link.
+At a springy joint ``q`` is the motor, as an encoder reads it, and ``q_link`` the link. An elastic link is cut, and
+joined by rigid joints that its springs drive (`beams`).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
@@ -28,6 +29,7 @@ from ..models.model import Model, PlacedEffect
 from ..models.rig.rig import Rig
 from .accelerations import JointForces, accelerations_of
 from .base import Base
+from .beams import Turns, with_turns
 from .equations import Equations, Ledger
 from .placed_laws import PlacedLaws, identifier, summed
 from .rigid_arm import RigidArm, body_outputs, rigid
@@ -71,23 +73,30 @@ def arm_equations(
     InputError
         A parameter without a value, or a springy joint whose motor has no inertia.
     """
-    if arm.floating and not isinstance(model.tree, FloatingTree):
+    arm, turns = with_turns(model, arm)
+    if arm.floating and (turns or not isinstance(model.tree, FloatingTree)):
         model = replace(model, tree=replace(floating_tree(arm), axes=model.tree.axes))
-    return _Writer(model, arm).written(stiff, servo, [0.0] * arm.n_joints if start is None else start)
+    elif turns:
+        model = replace(model, tree=arm.tree)
+    return _Writer(model, arm, turns).written(stiff, servo, start)
 
 
 class _Writer:
     """Writes one arm into a ledger."""
 
-    def __init__(self, model: Model, arm: FloatingArm) -> None:
-        self.model, self.arm, self.ledger = model, arm, Ledger()
+    def __init__(self, model: Model, arm: FloatingArm, turns: tuple[Turns, ...]) -> None:
+        self.model, self.arm, self.ledger, self.turns = model, arm, Ledger(), turns
         self.joints, self.n = model.joints[model.tree.carriers :], arm.n_joints
         self.units = ["m" if j.kind == "prismatic" else "rad" for j in arm.tree.joints]
         self.torque_units = ["N" if unit == "m" else "N*m" for unit in self.units]
+        virtual = {j for x in turns for j in x.joints}
+        self.real = [j for j in range(self.n) if j not in virtual]
+        """Joints that a drive moves; the others are springs in links."""
 
-    def written(self, stiff: bool | None, servo: ServoGains | None, start: Sequence[float]) -> Equations:
+    def written(self, stiff: bool | None, servo: ServoGains | None, given: Sequence[float] | None) -> Equations:
         ledger, n, arm, tree = self.ledger, self.n, self.arm, self.model.tree
-        self.tau = ca.vertcat(*self._inputs())
+        start = dict(zip(self.real, [0.0] * len(self.real) if given is None else given, strict=True))
+        self.tau = self._inputs()
         words = f"on the tip ({arm.tree.links[arm.tip_link].name}), in the world frame"
         at_tip = ca.vertcat(
             ledger.vector_input("force.tip", "N", f"force from outside {words}"),
@@ -97,8 +106,13 @@ class _Writer:
         phi = ca.vertcat(*laws.link_parameters())
         springy = {laws.joint_of(p): p for p in laws.at("joint") if p.effect.acts_on == "position"}
         start_q, start_qd = self._starts(start)
+        load = rigid(tree, arm, phi, start_q, ca.SX(n, 1)).terms[-n:] if self.turns else ca.SX(n, 1)
+        for x in self.turns:
+            start_q[list(x.joints)] = x.start(laws, load)
         q, qd = (ca.vertcat(*(ledger.state(s) for s in ca.vertsplit(x))) for x in (start_q, start_qd))
         self.base = base = Base(arm, ledger, laws)
+        for x in self.turns:
+            self.tau[list(x.joints)] = x.spring(laws, q, qd)
         if servo is not None:
             self.tau += self._servo(servo, q, qd, start)
         command = self.tau
@@ -136,7 +150,11 @@ class _Writer:
             rates += ca.vertsplit(self._hidden_rate(p, motion, qdd, load, now, hidden))
         rates += rig_rates
 
-        for k, joint in enumerate(self.joints):
+        for x in self.turns:
+            for j in x.joints:
+                ledger.output(f"turn.{self.joints[j]}", "rad", q[j], f"turn of the far end of {x.placed.at}")
+        for k in self.real:
+            joint = self.joints[k]
             unit, what = self.units[k], "motor position" if k in springy else "position"
             ledger.output(f"q.{joint}", unit, q[k], f"{what} of {joint}")
             ledger.output(f"qd.{joint}", f"{unit}/s", qd[k], f"rate of q.{joint}")
@@ -153,44 +171,46 @@ class _Writer:
         rates += read_sensors(laws, ledger, signals, {"q": start_q, "q_link": start_link})
         kind = "floating" if arm.floating else "fixed"
         words = ", ".join(dict.fromkeys(p.effect.name for p in self.model.effects)) or "no effects"
-        description = f"Arm of {n} joints on a {kind} base: drive torques in, motion out; with {words}."
+        description = f"Arm of {len(self.real)} joints on a {kind} base: drive torques in, motion out; with {words}."
         return ledger.equations(
             identifier(self.model.name), description, rates, self._stiff(rates) if stiff is None else stiff
         )
 
-    def _inputs(self) -> list[ca.SX]:
-        """Torque that each drive delivers, or is told to deliver."""
-        late = {p.at for p in self.model.effects if p.effect.leads}
-        units = dict(zip((f"tau.{joint}" for joint in self.joints), self.torque_units, strict=True))
-        words = {name: "commanded" if name in late else "delivered" for name in units}
-        return [
-            self.ledger.input(x, u, f"drive torque {words[x]} at {x.removeprefix('tau.')}") for x, u in units.items()
-        ]
+    def _inputs(self) -> ca.SX:
+        """Torque that each drive delivers, or is told to deliver (J,)."""
+        late, found = {p.at for p in self.model.effects if p.effect.leads}, ca.SX(self.n, 1)
+        for j in self.real:
+            joint, unit = self.joints[j], self.torque_units[j]
+            words = "commanded" if f"tau.{joint}" in late else "delivered"
+            found[j] = self.ledger.input(f"tau.{joint}", unit, f"drive torque {words} at {joint}")
+        return found
 
-    def _starts(self, start: Sequence[float]) -> tuple[ca.SX, ca.SX]:
-        """Positions and speeds at the start (J,)."""
-        found = ([], [])
+    def _starts(self, start: Mapping[int, float]) -> tuple[ca.SX, ca.SX]:
+        """Positions and speeds at the start (J,), zero where a spring decides."""
+        found = ca.SX(self.n, 1), ca.SX(self.n, 1)
         for k, (quantity, rate) in enumerate((("q", ""), ("qd", "/s"))):
-            for j, joint in enumerate(self.joints):
+            for j in self.real:
+                joint = self.joints[j]
                 words, unit = f"{quantity}.{joint} at the start", self.units[j] + rate
                 value, own = 0.0 if k else float(start[j]), self.arm.tree.joints[j]
                 bounds = (-inf, inf) if k else (own.lower, own.upper)
                 name = f"start.{quantity}.{joint}"
-                found[k].append(self.ledger.parameter(name, unit, value, words, bounds, fixed=True))
-        return ca.vertcat(*found[0]), ca.vertcat(*found[1])
+                found[k][j] = self.ledger.parameter(name, unit, value, words, bounds, fixed=True)
+        return found
 
-    def _servo(self, servo: ServoGains, q: ca.SX, qd: ca.SX, start: Sequence[float]) -> ca.SX:
+    def _servo(self, servo: ServoGains, q: ca.SX, qd: ca.SX, start: Mapping[int, float]) -> ca.SX:
         """Torque (J,) of the joints' servo."""
-        ledger, total = self.ledger, []
+        ledger, total = self.ledger, ca.SX(self.n, 1)
         on = ledger.input("servo", "1", "1: the servo holds the joints at their targets, 0: only tau drives them")
-        for j, joint in enumerate(self.joints):
+        for i, j in enumerate(self.real):
+            joint = self.joints[j]
             target = ledger.input(f"target.{joint}", self.units[j], f"where the servo moves {joint}", float(start[j]))
             gains = []
-            for word, unit, value in (("stiffness", "T/S", servo.stiffness[j]), ("damping", "T*s/S", servo.damping[j])):
+            for word, unit, value in (("stiffness", "T/S", servo.stiffness[i]), ("damping", "T*s/S", servo.damping[i])):
                 name, full = f"servo.{joint}.{word}", self.laws.unit(j, unit)
                 gains.append(ledger.parameter(name, full, float(value), f"{word} of the servo", (0.0, inf)))
-            total.append(on * (gains[0] * (target - q[j]) - gains[1] * qd[j]))
-        return ca.vertcat(*total)
+            total[j] = on * (gains[0] * (target - q[j]) - gains[1] * qd[j])
+        return total
 
     def _spring(self, p: PlacedEffect, joint: int, stretch: ca.SX, rate: ca.SX) -> ca.SX:
         """Torque of a springy joint: what its law balances the load with, ``inertia * stretch'' = load - spring``."""

@@ -17,6 +17,7 @@ import casadi as ca
 import numpy as np
 
 from ..models.axes import Place
+from ..models.beam import symbolic_beam
 from ..models.empirical import TableLaw
 from ..models.hidden_state import ros2
 from ..models.model import Model, PlacedEffect
@@ -164,7 +165,7 @@ class _Follower:
         slopes = [self.slopes(q, qd, qdd) for q, qd, qdd in motions]
         readings, rig = list(loads), self.model.tree
         # Sensors read what all the others add up to, so they come last.
-        for p in laws.at("joint", "base", *PLACES) + laws.at("sensor"):
+        for p in laws.at("joint", "beam", "base", *PLACES) + laws.at("sensor"):
             if p.at.startswith("q_link.") or p.effect.leads:
                 continue  # neither torque nor motor's position; or ahead of the motion
             j = self.first + laws.joint_of(p)
@@ -175,6 +176,13 @@ class _Follower:
             ]
             if isinstance(rig, Rig) and p.effect.at in PLACES:
                 signals = [s | rig_signals(rig, p, m[0], m[1]) for s, m in zip(signals, motions, strict=True)]
+            turns: list[ca.SX] = []
+            if p.effect.at == "beam":
+                nominal = ca.SX(self.model.tree.phi)
+                found = [symbolic_beam(self.model.tree, j, m, self._gravity, nominal) for m in motions]
+                own = [{"moment": x[0], "inertia_beyond": ca.vec(x[1])} for x in found]
+                signals = [s | x for s, x in zip(signals, own, strict=True)]
+                turns = [ca.horzcat(*x[2:]) for x in found]
             if encoder:
                 signals = [s | {"value": m[0][j]} for s, m in zip(signals, motions, strict=True)]
             states = states_at(p, signals) if p.effect.states else [ca.SX(0, 1)] * len(ends)
@@ -186,6 +194,8 @@ class _Follower:
                     change[j] = law - readings[k][j]
                 elif p.effect.at == "base":  # what the effect gives the base, nothing else has to
                     change[: self.first] = -law
+                elif p.effect.at == "beam":
+                    change = turns[k] @ law
                 elif isinstance(rig, Rig) and p.effect.at in PLACES:
                     change = rig_reach(rig, p, motions[k][0]) @ law
                 elif p.effect.acts_on == "torque":

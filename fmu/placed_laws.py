@@ -65,7 +65,7 @@ class PlacedLaws:
             found = self._model.tree.link_at(p.effect.at, p.at)
             assert found is not None
             return found
-        if p.effect.at in ("link", "boom", "base"):
+        if p.effect.at in ("link", "boom", "beam", "base"):
             return self._link_of(p) - self._model.tree.carriers
         return int(self.place_of(p).channels[0])
 

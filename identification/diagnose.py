@@ -8,7 +8,7 @@ import numpy as np
 
 from ..models.effects import effects
 from ..models.hidden_state import prepare
-from ..models.model import Model
+from ..models.model import Model, effect_on
 from ..models.rigid_body import RigidBody
 from .answer import report_on
 from .checks.run import early_checks, run_checks
@@ -79,7 +79,7 @@ def diagnose(
         return Answer(*simulated.diagnose(model, recordings, held, progress=progress, jobs=jobs))
     demand_one_process(model, jobs)
     progress("reading and conditioning the recordings")
-    prepare(effects().values())
+    prepare(effect_on(effect, model.tree) for effect in effects().values())
     read = read_all(model, [*recordings, *held])
     model = with_recorded_joints(model, read)
     body = RigidBody(model.tree)

@@ -7,6 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..models.effects import term_of
 from .checks.finding import CheckFinding
 from .verdict import Verdict
 
@@ -322,9 +323,11 @@ class Diagnosis:
 
 
 def _finding(finding: Finding) -> dict[str, Any]:
+    name, term = term_of(finding.name)
     return {
-        "name": finding.name,
+        "name": name,
         "at": finding.at,
+        **({"term": term} if term > 1 else {}),
         "margin": finding.margin,
         "gain": finding.gain,
         "explained": finding.explained,

@@ -17,8 +17,9 @@ from ..models.empirical import NAME, placed_tables, read_along, tables_of
 from ..models.model import PlacedEffect
 from ..models.table import Table, read_words
 from .deciding import GATE
-from .evidence.confirm import blocks, scatter
+from .evidence.confirm import blocks
 from .evidence.diagnose import ArmDecision
+from .evidence.gain import Remaining, scatter
 from .fitting.assembly import FreeParameter, TorqueModel
 from .fitting.experiment import Experiment
 from .fitting.fit import Fit, fit
@@ -140,13 +141,16 @@ def _confirmed(
     decided: ArmDecision, before: Fit, after: Fit, train: Sequence[Experiment], held: Sequence[Experiment], c: int
 ) -> tuple[float, float]:
     """Log density that the held-out recordings gain on a channel, and that in its standard errors over blocks."""
-    rows, parts = decided.best.found.weighed.evidence.channels[len(train) :], []
-    for e, row in zip(held, rows, strict=True):
-        without, with_it = (f.assembly.residual(e, f.theta)[0][:, c] for f in (before, after))
-        solve = row[c].covariance.solve
-        parts.append(blocks(0.5 * (without * solve(without) - with_it * solve(with_it)), e))
-    every = np.concatenate(parts)
-    return float(every.sum()), float(every.sum()) / max(scatter(every), 1e-12)
+    rows = decided.best.found.weighed.evidence.channels[len(train) :]
+    without, with_it = (
+        [
+            Remaining.of([f.assembly.residual(e, f.theta)[0][:, c]], [row[c].covariance])
+            for e, row in zip(held, rows, strict=True)
+        ]
+        for f in (before, after)
+    )
+    gain = 0.5 * sum(float(np.sum(a.energy - b.energy)) for a, b in zip(without, with_it, strict=True))
+    return gain, gain / max(scatter(without, with_it, [partial(blocks, e) for e in held]), 1e-12)
 
 
 def beyond(assembly: TorqueModel, e: Experiment, theta: Array) -> list[str]:

@@ -11,6 +11,8 @@ place (a joint, a link, a sling, a sensor channel) and one instant, in CasADi sy
   torsion and for bending of a link (2,), the upward force per lever [N/m] on the slings beyond it;
   ``at="suspension"``, the force [N/m] that every sling loses per rise of its hang point. The rig's geometry gives the
   torque of each at every joint.
+- On an arm without slings: ``at="beam"``, how far the far end of a link turns (9,): about its length and two axes
+  across it, the angles [rad], their rates and their accelerations.
 - On a free-floating arm: ``at="base"``, the wrench (6,) on the base, force [N] and moment [N·m] about the origin of its
   frame, in its own axes.
 - In a docking: ``at="carriage"``, the friction force [N] on the carriage; ``at="grooves"``, the friction force (2,) on
@@ -25,7 +27,7 @@ Hidden state (a spring's twist, a delayed signal) is a system of ordinary differ
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import casadi as ca
@@ -53,9 +55,13 @@ class Parameter:
     grid : tuple of float
         Empty for an amplitude. For a shape parameter (in which the law is nonlinear): starting values over the range
         of real hardware, relative to the scale named by ``relative_to`` if that is set.
-    relative_to : "", "speed", "travel", "torque", "rate" or "per_torque"
+    relative_to : "", "speed", "travel", "place", "torque", "rate" or "per_torque"
         Unit of the bounds' finite ends and of the grid: the joint's peak speed, its travel, its peak torque,
-        peak torque per travel, or one over its peak torque; "" for absolute numbers in SI units.
+        peak torque per travel, or one over its peak torque; "" for absolute numbers in SI units. "place": a position,
+        from the middle of the travel on, in travels: the ends are at -0.5 and 0.5.
+    periodic_over : str
+        Of a shape that is the length of a wave: the signal that the law repeats over. Where a residual is at hand, the
+        starting values are the peaks of its periodogram over that signal, and not the grid.
     alone : bool
         False where this parameter alone would be another effect: a spring's rest torque alone is a bias.
     """
@@ -67,7 +73,8 @@ class Parameter:
     low: float = float("-inf")
     high: float = float("inf")
     grid: tuple[float, ...] = ()
-    relative_to: Literal["", "speed", "travel", "torque", "rate", "per_torque"] = ""
+    relative_to: Literal["", "speed", "travel", "place", "torque", "rate", "per_torque"] = ""
+    periodic_over: str = ""
     alone: bool = True
 
 
@@ -89,8 +96,8 @@ class Effect:
         The vocabulary's word; also the file's name.
     family : str
         Heading of the vocabulary it stands under.
-    at : "joint", "link", "sensor", "sling", "slide", "boom", "suspension", "base", "pin", "cables", "target",
-        "carriage", "grooves", "groove" or "latches"
+    at : "joint", "link", "sensor", "sling", "slide", "boom", "suspension", "beam", "base", "pin", "cables",
+        "target", "carriage", "grooves", "groove" or "latches"
         Where it acts; a slide goes by the name of its joint, a boom by that of its link.
     sentence : str
         What a test engineer would say: "friction that does not depend on speed".
@@ -108,6 +115,8 @@ class Effect:
         returns 10. Sensor: ``value`` (true value), ``time``, and the joint signals of its joint. Sling: ``velocity``
         (3 numbers [m/s], of the hang point), ``weight`` and ``tension`` [N] in balance, ``time``. Slide: the signals of
         its joint. Boom: ``spread``, the sum of squared levers of the slings beyond it [m²], in torsion and in bending.
+        Beam: ``moment`` (3 numbers [N·m]) that the link transmits to all beyond it, about its length and two axes
+        across it, and ``inertia_beyond`` (9 numbers [kg·m²], by columns) of that about them, ``time``.
         Base: ``spin`` [rad/s], ``spin_rate`` [rad/s²], ``acceleration`` [m/s²] (of the frame's origin), the spin gained
         since the start ``spin_gained`` and the angular ``impulse`` that wheels were told to give by now [N·m·s], 3
         numbers each in the base's axes, and ``time``. Pin: ``overlap`` [m] and its rate ``approach`` [m/s], the
@@ -135,8 +144,9 @@ class Effect:
         simulation puts it between the torque input and the joint; a fit, which knows the torque that the motion needs
         and asks for the reading, follows the states in reverse time.
     acts_on : "torque" or "position"
-        Joint effects only: the law gives a torque at the joint, or a displacement of the link behind the joint
-        (a vector: displacement, its rate, its second rate), which changes the torque of every joint.
+        Joint effects: the law gives a torque at the joint, or a displacement of the link behind the joint (a vector:
+        displacement, its rate, its second rate), which changes the torque of every joint. A beam's gives such
+        displacements.
     neighbours : "", "too" or "only"
         Joint effects only: whether a search tries the effect along the sum and the difference of two joints of
         which one carries the other; "too": also at every joint, "only": at no joint.
@@ -148,6 +158,11 @@ class Effect:
     contains : tuple of str
         Simpler effects that are special cases of this one. A search names the simpler one first, and this one only for
         what the simpler one leaves (the principle of marginality: Nelder 1977).
+    series : bool
+        Joint effects only: True where the law is a term of a series. Where a model has a term, a search tries one more
+        of the same law at the same place, by the names that `term` gives.
+    exclusive : bool
+        True where only one of the amplitudes can be there: a stop is above its place or below it.
     at_rest : bool
         True where the effect shows mainly near rest. It must pass in motion like any other. But the share of the
         residual that makes it worth a name includes samples near rest, and its columns come from the measured motion,
@@ -158,6 +173,8 @@ class Effect:
     exceeds_at_rest : bool
         True where the effect raises friction near rest above its level in motion. Samples near rest count for such an
         effect: a joint that sticks stays below the level. All other effects are compared in motion only.
+    elsewhere : Effect or None
+        The law under the same name on a tree that has no place of the kind ``at``; None where there is none.
     experiment : str
         The motion or measurement that shows this effect apart from others, as an instruction: "move {at} slowly ...".
     """
@@ -165,8 +182,8 @@ class Effect:
     name: str
     family: str
     at: Literal[
-        "joint", "link", "sensor", "sling", "slide", "boom", "suspension", "base", "pin", "cables", "target",
-        "carriage", "grooves", "groove", "latches",
+        "joint", "link", "sensor", "sling", "slide", "boom", "suspension", "beam", "base", "pin", "cables",
+        "target", "carriage", "grooves", "groove", "latches",
     ]  # fmt: skip
     sentence: str
     equation: str
@@ -183,7 +200,15 @@ class Effect:
     others: tuple[str, ...] = ()
     dissipates: bool = False
     contains: tuple[str, ...] = ()
+    series: bool = False
+    exclusive: bool = False
     at_rest: bool = False
     remembers: bool = False
     exceeds_at_rest: bool = False
+    elsewhere: "Effect | None" = None
     experiment: str = ""
+
+
+def term(effect: Effect, number: int) -> Effect:
+    """A further term of a series, from the second on: the same law and parameters as ``name_2``, ``name_3``, ..."""
+    return replace(effect, name=f"{effect.name}_{number}")

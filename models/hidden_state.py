@@ -44,6 +44,7 @@ SIGNALS = {
     "slide": _JOINT,
     "boom": {"spread": 2, "time": 1},
     "suspension": {"time": 1},
+    "beam": {"moment": 3, "inertia_beyond": 9, "time": 1},
     "base": {"spin": 3, "spin_rate": 3, "acceleration": 3, "spin_gained": 3, "impulse": 3, "time": 1},
     "pin": {"overlap": 1, "approach": 1, "elastic_force": 1, "normal_force": 1, "slip": 3, "slip_velocity": 1},
     "cables": {"bending_stiffness": 1, "curvature_rate": 1},

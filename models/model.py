@@ -9,6 +9,7 @@ from ..errors import InputError
 from ..recordings.cuts import Cuts
 from ..recordings.signals import Signal
 from .axes import neighbours
+from .beam import beams
 from .docking.bench_setup import DockingTree, docking_places
 from .effect import Effect
 from .hidden_state import rows
@@ -129,6 +130,8 @@ def places(effect: Effect, tree: Tree) -> tuple[str, ...]:
         return tuple(j.name for j in tree.joints[carriers:])
     if effect.at == "link":
         return tuple(link.name for link in tree.links[max(carriers - 1, 0) : tree.n_joints])
+    if effect.at == "beam":
+        return beams(tree)
     if effect.at == "base":
         return ("base",) if carriers else ()
     if effect.at != "sensor":
@@ -137,6 +140,11 @@ def places(effect: Effect, tree: Tree) -> tuple[str, ...]:
         every = places_of(tree, effect.at)
         return tuple(at for at in every if reached_joints(tree, effect.at, at, rows(effect)))
     return tuple(f"tau.{j.name}" for j in tree.joints[carriers:])
+
+
+def effect_on(effect: Effect, tree: Tree) -> Effect:
+    """The law that an effect's name stands for on a tree: its own, or the one for a tree without such places."""
+    return effect if effect.elsewhere is None or places(effect, tree) else effect.elsewhere
 
 
 def all_places(effect: Effect, tree: Tree) -> tuple[str, ...]:

@@ -20,7 +20,7 @@ from .effects import get_effect
 from .empirical import read_empirical
 from .floating.tree import UNNAMED, read_floating
 from .holding import Holding, read_holding
-from .model import Model, PlacedEffect, places
+from .model import Model, PlacedEffect, effect_on, places
 from .published_inertia import Fix
 from .rig.file import read_slings
 from .rig.rig import Rig, built_in_rig
@@ -237,7 +237,7 @@ def _placed(path: Path, entries: Any, tree: Tree) -> tuple[PlacedEffect, ...]:
         if not isinstance(name, str):
             raise InputError(f"{path}: effects has {entry!r}; allowed is a name, or {{ name = ..., at = ... }}")
         try:
-            effect = get_effect(name)
+            effect = effect_on(get_effect(name), tree)
         except InputError as error:
             raise InputError(f"{path}: {error}") from None
         everywhere = places(effect, tree)

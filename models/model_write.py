@@ -8,7 +8,6 @@ from typing import Any
 from ..files import written_whole
 from ..recordings.mixes import signal_fields
 from .docking.bench_setup import DockingTree
-from .effects import get_effect
 from .empirical import NAME, empirical_tables, of_a_table, tables_of
 from .floating.tree import FloatingTree
 from .holding import Holding
@@ -34,7 +33,7 @@ def save_model(model: Model, path: str | Path, note: str) -> None:
         by_name.setdefault(placed.effect.name, []).append(placed)
     listed = []
     for name, members in by_name.items():
-        everywhere = sorted(p.at for p in members) == sorted(places(get_effect(name), model.tree))
+        everywhere = sorted(p.at for p in members) == sorted(places(members[0].effect, model.tree))
         if everywhere and not any(p.hold for p in members):
             listed.append(toml_text(name))
             continue

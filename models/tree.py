@@ -153,7 +153,7 @@ class Tree:
 
     def link_at(self, kind: str, name: str) -> int | None:
         """Index of the link that a place of a kind belongs to, by the place's name; None for a joint or an axis."""
-        if kind not in ("link", "boom", "base"):
+        if kind not in ("link", "boom", "beam", "base"):
             return None
         return [link.name for link in self.links].index(name)
 

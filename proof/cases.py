@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.concealed import Concealed, Planned, Rng, TooMuch
+from bench.concealed import Concealed, Maker, Planned, Rng, TooMuch
 from bench.lugre import LuGre
 from bench.motion import Motion, fourier_motion, point_to_point_motion
 from bench.mujoco_plant import Servo, write_csv
@@ -152,12 +152,21 @@ def planned_cases(count: int, seed: int) -> list[tuple[str, tuple[str, ...], flo
     return [ROUND[i] for i in order[:count]]
 
 
-def draw(plan: tuple[str, tuple[str, ...], float], seed: int, number: int, attempt: int) -> Case:
-    """The case of this number, the same each time; redrawn where hardware has no such effect on such an arm."""
+def draw(
+    plan: tuple[str, tuple[str, ...], float],
+    seed: int,
+    number: int,
+    attempt: int,
+    outside: Mapping[str, Maker] = OUTSIDE,
+) -> Case:
+    """The case of this number, the same each time; redrawn where hardware has no such effect on such an arm.
+
+    ``outside``: laws without a name by what they are.
+    """
     rng = np.random.default_rng([seed, number, attempt])
     while True:
         try:
-            return _drawn(plan, number, rng)
+            return _drawn(plan, number, rng, outside)
         except (TooMuch, ValueError):
             continue
 
@@ -165,12 +174,12 @@ def draw(plan: tuple[str, tuple[str, ...], float], seed: int, number: int, attem
 def planned_case(plan: tuple[str, tuple[str, ...], float], seed: int, number: int, attempt: int) -> Case | None:
     """One attempt at a case, whose arm does not depend on the size; or None where hardware has no such effect on it."""
     try:
-        return _drawn(plan, number, np.random.default_rng([seed, number, attempt]))
+        return _drawn(plan, number, np.random.default_rng([seed, number, attempt]), OUTSIDE)
     except (TooMuch, ValueError):
         return None
 
 
-def _drawn(plan: tuple[str, tuple[str, ...], float], number: int, rng: Rng) -> Case:
+def _drawn(plan: tuple[str, tuple[str, ...], float], number: int, rng: Rng, outside: Mapping[str, Maker]) -> Case:
     group, kinds, size = plan
     n = int(rng.choice(N_JOINTS))
     arm = random_robot(rng, n)
@@ -184,7 +193,8 @@ def _drawn(plan: tuple[str, tuple[str, ...], float], number: int, rng: Rng) -> C
     friction = random_friction(rng, arm, peak)
     spots = [int(k) for k in rng.permutation(n)[: len(kinds)]]
     planned = tuple(Planned(arm, k, friction[arm.joints[k]], *states, 1.0 / RATE) for k in spots)
-    hidden = [_make(group, kind, m, size * rms, rng) for kind, m in zip(kinds, planned, strict=True)]
+    makers = outside if group == "outside" else MAKERS
+    hidden = [_make(group, kind, m, size * rms, rng, makers) for kind, m in zip(kinds, planned, strict=True)]
     laws, parts = dict(friction), {}
     for made, m in zip(hidden, planned, strict=True):
         if made.law:
@@ -230,15 +240,13 @@ def _drawn(plan: tuple[str, tuple[str, ...], float], number: int, rng: Rng) -> C
     return Case(plant, (*motions, last), model, answer, tuple(hidden), planned, noises, twin, twin_model)
 
 
-def _make(group: str, kind: str, m: Planned, rms: float, rng: Rng) -> Concealed:
-    if group == "outside":
-        return OUTSIDE[kind](m, rms, rng)
+def _make(group: str, kind: str, m: Planned, rms: float, rng: Rng, makers: Mapping[str, Maker]) -> Concealed:
     if group == "wrong":
         return _wrong(kind, m, rms, rng)
     if group == "sensor":
         x = m.amount(np.gradient(m.smooth_torque, m.period), rms, 0.03)
         return Concealed(f"q.{m.name}", x, plant={"q_delay": {m.name: x}})
-    made = MAKERS[kind](m, rms, rng)
+    made = makers[kind](m, rms, rng)
     if group == "decoy" and not _shows_elsewhere(m, made):
         raise TooMuch("shows most at its own joint")
     if group == "swallowed":

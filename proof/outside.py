@@ -14,7 +14,8 @@ SMOOTH = 0.03
 """Speed over which these laws' friction turns round [rad/s]: MuJoCo steps through it without bristles."""
 
 
-def _sized(m: Planned, torque: np.ndarray, rms: float, most: float) -> float:
+def sized(m: Planned, torque: np.ndarray, rms: float, most: float) -> float:
+    """Multiple of a torque (n_samples,) of which the nearest named laws leave this RMS; refused above ``most``."""
     q, qd, qdd = m.own
     time = m.period * np.arange(len(q))
     sign, load = np.sign(qd), np.abs(m.torque()[:, m.joint])
@@ -26,7 +27,7 @@ def _running_time(m: Planned, rms: float, rng: Rng) -> Concealed:
     """A seal that swells as it warms: its friction grows with the time since the start."""
     slow = float(rng.uniform(4.0, 12.0))
     time = m.period * np.arange(len(m.q))
-    x = _sized(m, (1.0 - np.exp(-time / slow)) * np.sign(m.own[1]), rms, 8.0)
+    x = sized(m, (1.0 - np.exp(-time / slow)) * np.sign(m.own[1]), rms, 8.0)
 
     def law(t, q, qd):
         return -x * (1.0 - np.exp(-max(t, 0.0) / slow)) * np.tanh(qd / SMOOTH)
@@ -43,7 +44,7 @@ def _damaged_tooth(m: Planned, rms: float, rng: Rng) -> Concealed:
     def shape(q):
         return np.exp(-(((q - middle) / wide) ** 2)) * np.sin(cycles * (q - middle))
 
-    x = _sized(m, shape(q), rms, 25.0)
+    x = sized(m, shape(q), rms, 25.0)
     return Concealed(m.name, x, plant={"laws": (at_joint(m, lambda t, q, qd: x * shape(q)),)})
 
 
@@ -60,13 +61,13 @@ def _bursts(m: Planned, rms: float, rng: Rng) -> Concealed:
         return np.sum(parts, axis=0)
 
     waves = list(zip(starts.tolist(), phases.tolist(), strict=True))
-    x = _sized(m, shape(m.period * np.arange(len(m.q))), rms, 25.0)
+    x = sized(m, shape(m.period * np.arange(len(m.q))), rms, 25.0)
     return Concealed(m.name, x, plant={"laws": (at_joint(m, lambda t, q, qd: x * float(shape(t))),)})
 
 
 def _hardening(m: Planned, rms: float, rng: Rng) -> Concealed:
     """A cable bundle that goes stiff near the end of the travel: a spring of the fifth power."""
-    x = _sized(m, m.own[0] ** 5, rms, 300.0)
+    x = sized(m, m.own[0] ** 5, rms, 300.0)
     return Concealed(m.name, x, plant={"laws": (at_joint(m, lambda t, q, qd: -x * q**5),)})
 
 
@@ -80,7 +81,7 @@ def _seal(m: Planned, rms: float, rng: Rng) -> Concealed:
         inside = 0.25 * (1.0 + np.tanh((q - low) / edge)) * (1.0 + np.tanh((high - q) / edge))
         return inside * np.maximum(np.tanh(qd / SMOOTH), 0.0)
 
-    x = _sized(m, shape(q, qd), rms, 8.0)
+    x = sized(m, shape(q, qd), rms, 8.0)
     return Concealed(m.name, x, plant={"laws": (at_joint(m, lambda t, q, qd: -x * shape(q, qd)),)})
 
 
@@ -88,7 +89,7 @@ def _shared_cable(m: Planned, rms: float, rng: Rng) -> Concealed:
     """A cable over two joints that pulls on one by the other's position: a joint's torque that its own state lacks."""
     other = (m.joint + 1) % len(m.arm.links)
     q = m.q[:, other]
-    x = _sized(m, np.sin(2.0 * q) * np.cos(m.own[0]), rms, 25.0)
+    x = sized(m, np.sin(2.0 * q) * np.cos(m.own[0]), rms, 25.0)
     unit, k = np.eye(len(m.arm.links))[m.joint], m.joint
 
     def law(t, q, qd):

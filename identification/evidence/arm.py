@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...models.model import Model, PlacedEffect
-from ..deciding import LEAST_LEVEL
+from ..deciding import LEAST_LEVEL, TOLERANCES
 from ..fitting.assembly import TorqueModel
 from ..fitting.experiment import Experiment, Scales
 from ..fitting.fit import Fit
@@ -16,9 +16,11 @@ from ..nuisance.curve import SMALL
 from ..nuisance.encoder import encoder_noise
 from ..nuisance.noise import Noise, NoiseChannel, learn
 from ..nuisance.rest import SETTLES, STICKS, share
+from ..search.candidates import library
 from .evidence import Evidence, ResidualChannel
 from .hypotheses import ColumnSource, Curves, curves, names, pool
 from .nuisance_columns import NuisanceColumns, beside, regressor_columns
+from .periods import Periods, rough_noise
 from .pool import CandidateColumns, Hypothesis, Item
 
 Array = NDArray[np.float64]
@@ -103,12 +105,23 @@ def weigh(
     columns = CandidateColumns([len(e.measured) for e in experiments])
     nameless = nameless or {}
     by_words = curves(along, columns, small=not search, more={words for _, words in nameless})
-    named = names(along, by_words, columns) if search else {}
     others = beside(along, found, by_words, columns, nameless)
     residuals = [assembly.residual(e, found.theta)[0] for e in experiments]
     if runs is None:
         runs = _runs(model, found, experiments, residuals, n_train, along.scale)
     J = len(along.scale)
+    named = {}
+    if search:
+        rough = [rough_noise([r[:, c] for r in residuals[:n_train]], [x[c] for x in runs[:n_train]]) for c in range(J)]
+        periods = Periods(
+            along,
+            residuals[:n_train],
+            [[x.covariance(own[c]) for c, x in enumerate(noises or rough)] for own in runs[:n_train]],
+            others,
+            others.weight(max(TOLERANCES)),
+        )
+        along = replace(along, peaks=periods.of(library(model)))
+        named = names(along, by_words, columns)
     if noises is None:
         noises = [_noise(c, along, residuals, runs, others, by_words, named, columns) for c in range(J)]
     channels = [

@@ -9,6 +9,7 @@ error.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from ..fitting.experiment import Experiment, Scales
 from ..fitting.fit import Fit, channel_rms
 from ..search.refit import without
 from .arm import weigh
+from .gain import Remaining, scatter
 from .projected import ProjectedEvidence
 from .selection import ArmNaming, ArmSelection
 
@@ -29,12 +31,12 @@ FEWEST_BLOCKS = 4
 
 @dataclass(frozen=True)
 class PredictiveDensity:
-    """Log density of the held-out recordings given the training ones, and the part of each block of time; what the
-    training recordings say of the parameters, about their fit: mean (P,) and covariance (P, P).
+    """Log density of the held-out recordings given the training ones, and what is left of each; what the training
+    recordings say of the parameters, about their fit: mean (P,) and covariance (P, P).
     """
 
     density: float
-    blocks: Array
+    left: tuple[Remaining, ...]
     mean: Array
     covariance: Array
 
@@ -158,9 +160,8 @@ def forecast(
     unit = weighed.beside.spread
     on = ProjectedEvidence(weighed.evidence, range(n, n + len(held)), weight, known)
     always = on.beside([])
-    parts = [weighed.evidence.left(n + i, always, []) for i in range(len(held))]
-    by_block = np.concatenate([blocks(x, e) for x, e in zip(parts, held, strict=True)])
-    return PredictiveDensity(on.null, by_block, unit * mean, covariance * np.outer(unit, unit))
+    left = tuple(weighed.evidence.left(n + i, always, []) for i in range(len(held)))
+    return PredictiveDensity(on.null, left, unit * mean, covariance * np.outer(unit, unit))
 
 
 def known_to(fit: Fit, told: PredictiveDensity) -> Fit:
@@ -177,16 +178,11 @@ def known_to(fit: Fit, told: PredictiveDensity) -> Fit:
     return replace(fit, covariance=covariance, std=std)
 
 
-def blocks(x: Array, e: Experiment) -> Array:
+def blocks(e: Experiment, x: Array) -> Array:
     """Sums over blocks of time."""
     return np.array(
         [part.sum() for part in np.array_split(x, max(int(len(x) / (2 * e.motion.band) / BLOCK), FEWEST_BLOCKS))]
     )
-
-
-def scatter(x: Array) -> float:
-    """Standard error of a sum over blocks."""
-    return float(np.std(x, ddof=1) * np.sqrt(len(x)))
 
 
 def _without(model: Model, key: str) -> Model:
@@ -216,7 +212,8 @@ def _missed(
     size = float(apart[worst] / measured[worst])
     gain = whole.density - other.density
     explained = _explained(found, final, rest, held, worst)
-    return ArmLoss(gain, scatter(0.5 * (other.blocks - whole.blocks)), size, trial, explained, rest)
+    error = scatter(other.left, whole.left, [partial(blocks, e) for e in held])
+    return ArmLoss(gain, error, size, trial, explained, rest)
 
 
 def _explained(found: ArmSelection, final: Fit, rest: Fit, held: Sequence[Experiment], c: int) -> float:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..nuisance.covariance import Covariance
+from .gain import Remaining
 from .pool import CandidateColumns, Hypothesis, Item
 
 Array = NDArray[np.float64]
@@ -246,17 +247,15 @@ class Evidence:
             return np.zeros(len(self.channels[i][c].residual))
         return self._pools[i][c][:, here] @ (item.spread * amplitudes)
 
-    def left(self, i: int, always: Array, members: Sequence[tuple[Item, Array]]) -> Array:
-        """Each sample's part of e' K⁻¹ e over all channels of a recording (n,); e is the remaining residual at these
-        amplitudes.
-        """
-        total = np.zeros(len(self.channels[i][0].residual))
+    def left(self, i: int, always: Array, members: Sequence[tuple[Item, Array]]) -> Remaining:
+        """What the nuisances and members leave of a recording at these amplitudes."""
+        residuals = []
         for c, own in enumerate(self.channels[i]):
             e = own.residual - own.columns @ always[own.index]
             for item, amplitudes in members:
                 e = e - self.contribution(i, c, item, amplitudes)
-            total += e * own.covariance.solve(e)
-        return total
+            residuals.append(e)
+        return Remaining.of(residuals, [own.covariance for own in self.channels[i]])
 
 
 def _rows(n: int) -> Iterator[slice]:

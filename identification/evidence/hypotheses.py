@@ -16,6 +16,7 @@ from ...models.model import Model, PlacedEffect
 from ..deciding import BENDS, ELSEWHERE, ODDS_OF_CURVES, ODDS_OF_NAMES, SLOPE
 from ..fitting.assembly import TorqueEvaluation, TorqueModel
 from ..fitting.experiment import Experiment, Scales
+from ..fitting.periodogram import Peaks
 from ..nuisance.curve import SMALL, Coordinates, family
 from ..search.candidates import MOST_OF_WHOLE, EffectVariant, candidate_columns, library, reduced, variants
 from .pool import CandidateColumns, Hypothesis, Item
@@ -47,6 +48,8 @@ class ColumnSource:
     scales: Mapping[str, Scales]
     tuned: Mapping[str, Array] = field(default_factory=dict)
     """Parameters of laws that were fitted by themselves, by their key: a point more of their grid."""
+    peaks: Mapping[str, Peaks] = field(default_factory=dict)
+    """Of the residual's periodogram, for laws with a wave's length, by their key: these lengths replace their grid."""
 
     def coordinates(self, c: int) -> list[Coordinates]:
         """What a joint's curves run over, along each instrument motion."""
@@ -144,15 +147,27 @@ def log_share_of_places(k: int, n: int) -> float:
 
 
 def _items(along: ColumnSource, p: PlacedEffect, by_words: Curves, columns: CandidateColumns) -> list[Item]:
-    grid, between = _grid(along.assembly, p)
+    own_peaks = along.peaks.get(p.key)
+    if own_peaks is not None and not len(own_peaks.waves):
+        return []
+    if own_peaks is None:
+        grid, between = _grid(along.assembly, p)
+        tried, prior = list(range(len(grid))), 0.0
+    else:
+        # Between any two peaks are trials that explain less: their share of the prior is not the peaks'.
+        grid, between = _about_peaks(along.assembly, p, own_peaks), True
+        # The highest stands in the middle, as the usual point of a grid does.
+        tried = [int(k) for k in np.roll(range(1, len(grid), 3), len(own_peaks.waves) // 2 - own_peaks.best)]
+        prior = float(np.log(len(own_peaks.waves) / own_peaks.trials))
     made = [_made(along, v) for v in grid]
     extra = None
-    if len(grid) <= FINE:
+    if own_peaks is None and len(grid) <= FINE:
         extra = by_words.get((along.assembly.joint_of(p), coordinate(p.effect) or ""))
     # What a law with memory has wrong is mostly its lag.
     lags = remembers(p)
     items: list[Item] = []
-    for k, (v, parts) in enumerate(zip(grid, made, strict=True)):
+    for k in tried:
+        v, parts = grid[k], made[k]
         size = None if parts is None else _size(along, parts)
         if parts is None or size is None or not np.any(size > 1e-12):
             continue
@@ -185,19 +200,19 @@ def _items(along: ColumnSource, p: PlacedEffect, by_words: Curves, columns: Cand
                 at, spread = np.concatenate([at, index[n + subset]]), np.tile(spread, 2)
                 positive = np.concatenate([positive, np.zeros(len(subset), bool)])
             if bent is None or whole:
-                items.append(Item(at, spread, positive, whole, some))
+                items.append(Item(at, spread, positive, whole, some, prior))
                 continue
             free = np.zeros(len(bent.index), bool)
             for bend in BENDS:
                 more = np.concatenate([at, bent.index]), np.concatenate([spread, bend * bent.spread])
-                items.append(Item(*more, np.concatenate([positive, free]), whole, some))
+                items.append(Item(*more, np.concatenate([positive, free]), whole, some, prior))
     fitted = _fitted(along, p, columns) if p.key in along.tuned else None
     return items if fitted is None else [*items, fitted]
 
 
 def remembers(p: PlacedEffect) -> bool:
-    """Whether a law has a memory that is no joint's own: a sling's carriage, a tank, a late sensor."""
-    return bool(p.effect.states) and p.effect.at != "joint"
+    """Whether a law has a memory that is no drive's or link's own: a sling's carriage, a tank, a late sensor."""
+    return bool(p.effect.states) and p.effect.at != "joint" and p.effect.acts_on == "torque"
 
 
 def lagging(along: ColumnSource, parts: Mapping[int, Sequence[Array]], columns: CandidateColumns) -> Item:
@@ -237,6 +252,14 @@ def _grid(assembly: TorqueModel, p: PlacedEffect) -> tuple[list[EffectVariant], 
         middle[i] = 2 / (1 / one + 1 / other) if one * other > 0 else 0.5 * (one + other)
         finer += [replace(a, parameters=middle), b]
     return finer, True
+
+
+def _about_peaks(assembly: TorqueModel, p: PlacedEffect, peaks: Peaks) -> list[EffectVariant]:
+    """A law at each peak of a periodogram, between the trials before and after it."""
+    v = variants(assembly, p)[0]
+    at = [x.periodic_over != "" for x in p.effect.parameters]
+    waves = (peaks.waves[:, None] + peaks.step * np.array([-1, 0, 1])).ravel()
+    return [replace(v, parameters=np.where(at, 1 / w, v.parameters)) for w in waves]
 
 
 def rings(p: PlacedEffect) -> bool:

@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,8 @@ from ..deciding import DISCREPANCY, GATE
 from ..fitting.experiment import Experiment, Scales
 from ..nuisance.bursts import Bursts, ChannelResidual, bursts
 from .arm import weigh
-from .confirm import ArmConfirmation, blocks, scatter
+from .confirm import ArmConfirmation, blocks
+from .gain import Remaining, scatter
 from .members import Members
 from .projected import ProjectedEvidence
 from .rounds import share_of_residual
@@ -37,14 +39,13 @@ def remainders(found: ArmSelection, train: Sequence[Experiment], held: Sequence[
     some = evidence.of_items([s.taken.item for s in slots])
     both = ProjectedEvidence(some, range(n + len(held)), found.weighed.beside.weight(found.tolerance))
 
-    def beside(chosen: Sequence[int]) -> tuple[float, Array]:
+    def beside(chosen: Sequence[int]) -> tuple[float, list[Remaining]]:
         taken = [(slots[k].taken.item, slots[k].taken.size) for k in chosen]
         own, all_of_it = Members(search.on, taken), Members(both, [(k, slots[k].taken.size) for k in chosen])
         mean = [(item, own.of(item)) for item, _ in taken]
         always = search.on.beside(mean)
         pairs = [(evidence.items[item], a) for item, a in mean]
-        parts = [blocks(evidence.left(n + i, always, pairs), e) for i, e in enumerate(held)]
-        return all_of_it.value - own.value, np.concatenate(parts)
+        return all_of_it.value - own.value, [evidence.left(n + i, always, pairs) for i in range(len(held))]
 
     kept = list(range(len(slots)))
     made: dict[int, Remainder] = {}
@@ -57,7 +58,7 @@ def remainders(found: ArmSelection, train: Sequence[Experiment], held: Sequence[
             if found.weighed.pool[slots[k].taken.hypothesis].named:
                 continue
             other, rest = beside([x for x in kept if x != k])
-            error = scatter(0.5 * (rest - whole))
+            error = scatter(rest, whole, [partial(blocks, e) for e in held])
             c, curve = evidence.items[item].label
             explained = share_of_residual(search, item, members.of(item))
             made[k] = Remainder(c, curve.words, slots[k].gain, explained, (density - other) / max(error, 1e-12))

@@ -20,7 +20,8 @@ class Item:
 
     ``spread`` (k,) is the prior standard deviation of each amplitude for an effect of relative size one; ``positive``
     (k,) marks amplitudes that cannot be negative. ``whole``: the one column is the whole law, with an amplitude of one.
-    ``label`` is for the caller.
+    ``label`` is for the caller. ``prior``: log of its prior odds to an item of an even share of the hypothesis's, where
+    an item stands for more, or fewer, points of a grid than it is itself.
     """
 
     index: NDArray[np.int_]
@@ -28,6 +29,7 @@ class Item:
     positive: NDArray[np.bool_]
     whole: bool = False
     label: Any = None
+    prior: float = 0.0
 
 
 @dataclass(frozen=True)

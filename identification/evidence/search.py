@@ -69,6 +69,7 @@ class Search:
         counts = np.array([len(h.items) for h in pool], int)
         self._starts = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(int)
         self._counts = counts
+        self._item_priors = np.array([x.prior for h in pool for x in h.items])
         self._scans: dict[frozenset[tuple[int, float]], Scan] = {}
         self._sets: dict[frozenset[tuple[int, float]], Members] = {}
 
@@ -84,14 +85,16 @@ class Search:
         key = _key(taken)
         if key not in self._scans:
             gains = self.members(taken).gains()
-            best = gains.max(axis=1)
+            likely = gains + self._item_priors[:, None]
+            best = likely.max(axis=1)
             pairs = zip(self._starts, self._counts, strict=True)
             item = np.array([start + int(np.argmax(best[start : start + n])) for start, n in pairs])
-            top = best[item]
-            weight = np.exp(gains - np.repeat(top, self._counts)[:, None])
+            highest = best[item]
+            weight = np.exp(likely - np.repeat(highest, self._counts)[:, None])
             cases = np.add.reduceat(np.isfinite(gains).sum(axis=1), self._starts)
-            mean = np.log(np.add.reduceat(weight.sum(axis=1), self._starts) / cases) + top
-            self._scans[key] = Scan(mean + self._prior(taken), item, SIZES[np.argmax(gains[item], axis=1)], top)
+            mean = np.log(np.add.reduceat(weight.sum(axis=1), self._starts) / cases) + highest
+            size = np.argmax(gains[item], axis=1)
+            self._scans[key] = Scan(mean + self._prior(taken), item, SIZES[size], gains[item, size])
         return self._scans[key]
 
     def total(self, taken: Sequence[Member]) -> float:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...models.axes import Place, place
+from ...models.beam import carried_joint
 from ...models.effect import Parameter, written_unit
 from ...models.model import PlacedEffect
 from ...models.tree import Tree
@@ -165,7 +166,9 @@ class TorqueModel:
         return place(self.tree, p.at.removeprefix("tau.").removeprefix("q."))
 
     def _own(self, p: PlacedEffect) -> str:
-        """Name of the joint or axis whose scales an effect refers to."""
+        """Name of the joint or axis whose scales an effect refers to; a beam's is the joint that it carries."""
+        if p.effect.at == "beam":
+            return self._joints[carried_joint(self.tree, self.joint_of(p))]
         return p.at if p.at in self.scales else self._joints[self.joint_of(p)]
 
     def speed_scale(self, p: PlacedEffect) -> float:
@@ -176,10 +179,14 @@ class TorqueModel:
         """Unit of a parameter's bounds and grid at this place."""
         return self.scales[self._own(p)].of(parameter.relative_to)
 
+    def origin(self, p: PlacedEffect, parameter: Parameter) -> float:
+        """Where a parameter's bounds and grid are counted from at this place."""
+        return self.scales[self._own(p)].origin(parameter.relative_to)
+
     def bounds(self, p: PlacedEffect, parameter: Parameter) -> tuple[float, float]:
         """Physical bounds of a parameter at a place."""
-        scale = self.scale(p, parameter)
-        return parameter.low * scale, parameter.high * scale
+        scale, origin = self.scale(p, parameter), self.origin(p, parameter)
+        return origin + parameter.low * scale, origin + parameter.high * scale
 
     def unit(self, p: PlacedEffect, parameter: Parameter) -> str:
         """A parameter's unit with the joint's torque and position units written out."""
@@ -187,9 +194,8 @@ class TorqueModel:
 
     def usual(self, p: PlacedEffect, parameter: Parameter) -> float:
         """Start of a parameter: middle of its grid, or the value at which the effect vanishes."""
-        if parameter.grid:
-            return parameter.grid[len(parameter.grid) // 2] * self.scale(p, parameter)
-        return parameter.zero * self.scale(p, parameter)
+        share = parameter.grid[len(parameter.grid) // 2] if parameter.grid else parameter.zero
+        return self.origin(p, parameter) + share * self.scale(p, parameter)
 
     def values(self, theta: Array) -> dict[str, float]:
         """Every effect parameter by key, and the speed scales that laws refer to, as a model file stores them."""

@@ -2,6 +2,7 @@
 
 from ...models.model import PlacedEffect
 from ...models.tree import Tree
+from .beam_place import BeamPlace
 from .effect_places import BasePlace, EffectPlace, EncoderPlace, JointPlace, LinkPlace, SensorPlace
 from .rig_places import BoomPlace, SlidePlace, SlingPlace, SuspensionPlace
 
@@ -13,6 +14,7 @@ KINDS: dict[str, type[EffectPlace]] = {
     "slide": SlidePlace,
     "boom": BoomPlace,
     "suspension": SuspensionPlace,
+    "beam": BeamPlace,
     "base": BasePlace,
 }
 """By what effects name in ``at``."""

@@ -132,11 +132,13 @@ class Experiment:
 
 @dataclass(frozen=True)
 class Scales:
-    """Peak speed, travel and peak torque of a joint in the training recordings; bounds and grids refer to them."""
+    """Peak speed, travel and peak torque of a joint in the training recordings, and the middle of its travel; bounds
+    and grids refer to them."""
 
     speed: float
     travel: float
     torque: float
+    middle: float = 0.0
 
     def of(self, kind: str) -> float:
         """The scale that a parameter's ``relative_to`` names."""
@@ -144,10 +146,15 @@ class Scales:
             "": 1.0,
             "speed": self.speed,
             "travel": self.travel,
+            "place": self.travel,
             "torque": self.torque,
             "rate": self.torque / self.travel,
             "per_torque": 1 / self.torque,
         }[kind]
+
+    def origin(self, kind: str) -> float:
+        """Where numbers in this scale are counted from: places from the middle of the travel, all others from zero."""
+        return self.middle if kind == "place" else 0.0
 
 
 def load_experiments(
@@ -288,12 +295,20 @@ def scales(experiments: Sequence[Experiment]) -> Mapping[str, Scales]:
         if k in undriven:
             tau = np.concatenate([m[:, k] for m in modelled])
         found[joint] = Scales(
-            max(float(np.max(np.abs(qd))), 1e-9), max(float(np.ptp(q)), 1e-9), max(float(np.max(np.abs(tau))), 1e-9)
+            max(float(np.max(np.abs(qd))), 1e-9),
+            max(float(np.ptp(q)), 1e-9),
+            max(float(np.max(np.abs(tau))), 1e-9),
+            _middle(q),
         )
     for axis in experiments[0].body.tree.axes:
         here = place(experiments[0].body.tree, axis.name)
         motions = [e.motion for e in experiments]
         ends = [(here.coordinate(m.qd), here.coordinate(m.q), here.load(m.tau)) for m in motions]
         qd, q, tau = (np.concatenate(x) for x in zip(*ends, strict=True))
-        found[axis.name] = Scales(*(max(float(x), 1e-9) for x in (np.abs(qd).max(), np.ptp(q), np.abs(tau).max())))
+        speed, travel, torque = (max(float(x), 1e-9) for x in (np.abs(qd).max(), np.ptp(q), np.abs(tau).max()))
+        found[axis.name] = Scales(speed, travel, torque, _middle(q))
     return found
+
+
+def _middle(q: Array) -> float:
+    return 0.5 * float(np.min(q) + np.max(q))

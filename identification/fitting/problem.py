@@ -4,7 +4,7 @@ Friction of one joint says nothing about friction of another while the inertia i
 each at its own pace, and none waits for, or is evaluated for, the slowest.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import cast
@@ -12,6 +12,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from ...models.effect import Parameter
 from ...models.hidden_state import rows
 from ...models.model import PlacedEffect
 from ...models.rig.kinematics import reached_joints
@@ -19,8 +20,9 @@ from ...models.rig.rig import Rig
 from .assembly import Block, TorqueModel
 from .experiment import Experiment
 from .least_squares import NormalEquations, Objective, Solution
-from .projection import minimise_projected
+from .projection import minimise_projected, project
 from .rig_places import PLACES
+from .wave_lengths import wave_peaks
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int_]
@@ -48,20 +50,48 @@ class Problem:
     @cached_property
     def grids(self) -> list[list[tuple[int, Array]]]:
         """Of each placed effect with free shape parameters: their positions in theta and starting values."""
-        found = []
-        for p in self.assembly.placed:
-            position = {self.assembly.slots[i].name: int(i) for i in self.assembly.index_of(p)}
-            own = [(position[x.name], x) for x in p.effect.parameters if x.grid and x.name in position]
-            if own:
-                found.append([(i, np.array(x.grid) * self.assembly.scale(p, x)) for i, x in own])
-        return found
+        return [[(i, self._starts(p, x)) for i, x in own] for p, own in self._free_shapes]
 
     @cached_property
     def shapes(self) -> NDArray[np.bool_]:
         """Whether the torque is nonlinear in a parameter (P,)."""
         mask = np.zeros(len(self.index), bool)
-        mask[[i for grids in self.grids for i, _ in grids]] = True
+        mask[[i for _, own in self._free_shapes for i, _ in own]] = True
         return mask
+
+    @cached_property
+    def _free_shapes(self) -> list[tuple[PlacedEffect, list[tuple[int, Parameter]]]]:
+        """Each placed effect with its free shape parameters and their positions in theta."""
+        found = []
+        for p in self.assembly.placed:
+            position = {self.assembly.slots[i].name: int(i) for i in self.assembly.index_of(p)}
+            own = [(position[x.name], x) for x in p.effect.parameters if x.grid and x.name in position]
+            if own:
+                found.append((p, own))
+        return found
+
+    def _starts(self, p: PlacedEffect, x: Parameter) -> Array:
+        """Starting values of a shape: its grid, or the lengths of waves at the peaks of a periodogram."""
+        usual = self.assembly.origin(p, x) + np.array(x.grid) * self.assembly.scale(p, x)
+        return self._lengths(p, x, usual) if x.periodic_over else usual
+
+    def _lengths(self, p: PlacedEffect, x: Parameter, usual: Array) -> Array:
+        """Lengths at the peaks of what a fit without an effect leaves, with every other shape where it starts."""
+        kept = self.assembly.keep([o for o in self.assembly.placed if o.key != p.key], self.assembly.start)
+        rest = Problem(kept, self.experiments, self.channels, np.arange(len(kept.slots)))
+        sigma = rest.rms(kept.start) + 1e-12
+        theta, _, _ = project(rest.objective(sigma), kept.start, rest.shapes)
+        states = [kept.evaluate(e, theta) for e in self.experiments]
+        residuals = [e.measured - e.all_to_band(s.tau) for e, s in zip(self.experiments, states, strict=True)]
+        levels = dict(zip(map(int, self.channels), sigma, strict=True))
+
+        def weighed(i: int, c: int) -> tuple[Array, Callable[[Array], Array]] | None:
+            if c not in levels:
+                return None
+            return residuals[i][:, c] / levels[c] ** 2, lambda columns: columns.T @ columns / levels[c] ** 2
+
+        found = wave_peaks(self.assembly, p, x, self.experiments, states, weighed)
+        return usual if found is None else 1 / found.waves
 
     def minimise(self, theta: Array, sigma: Array, tolerance: float = 1e-8) -> Solution:
         """Best parameters from one start, channels weighted by 1 / sigma (c,)."""

@@ -2,6 +2,7 @@
 
 import functools
 from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, product
 
@@ -9,9 +10,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.effect import Effect, Parameter
-from ...models.effects import effects
-from ...models.model import Model, PlacedEffect, all_places
+from ...models.effect import Effect, Parameter, term
+from ...models.effects import MOST_TERMS, effects
+from ...models.model import Model, PlacedEffect, all_places, effect_on
 from ..fitting.assembly import TorqueEvaluation, TorqueModel
 from ..fitting.effect_places import EffectTerms, TorqueState
 from ..fitting.experiment import Experiment
@@ -45,13 +46,16 @@ class EffectVariant:
     high: Array
 
     def subsets(self) -> list[NDArray[np.int_]]:
-        """Positions of the columns to try together: all and single ones; of a vector's few components, every set."""
+        """Positions of the columns to try together: all and single ones; of a vector's few components, every set;
+        of amplitudes that exclude each other, single ones."""
         n = max(len(self.amplitudes), 1)
         parameters = [self.placed.effect.parameters[i] for i in self.amplitudes]
         alone = {k for k, p in enumerate(parameters) if p.alone and not p.grid}
         if not alone:
             return [np.arange(n)]
-        counts = range(1, n + 1) if self.placed.effect.at == "link" and n <= MOST_COMBINED else sorted({1, n})
+        effect = self.placed.effect
+        counts = range(1, n + 1) if effect.at == "link" and n <= MOST_COMBINED else sorted({1, n})
+        counts = (1,) if effect.exclusive else counts
         return [np.array(some) for k in counts for some in combinations(range(n), k) if alone & set(some)]
 
     def start(self, amplitudes: Array) -> Array:
@@ -75,7 +79,7 @@ def library(model: Model) -> list[PlacedEffect]:
     delayed = [p.at.partition(".") for p in model.effects if p.effect.at == "sensor" and p.effect.states]
     shifted = {joint for kind, _, joint in delayed if kind in ("tau", "q")}
     found = []
-    for effect in effects().values():
+    for effect in (effect_on(e, model.tree) for e in effects().values()):
         if effect.at == "link" and model.inertia == "free":
             continue  # the identified inertia already holds whatever a link effect could add
         if model.inertia == "free" and len(model.joints) == 1 and _scales(effect):
@@ -86,6 +90,19 @@ def library(model: Model) -> list[PlacedEffect]:
             arm = [j for j in model.joints[model.tree.carriers :] if j not in shifted]
             spots = tuple(f"{kind}.{j}" for kind in (("tau",) if effect.leads else ("tau", "q")) for j in arm)
         found += [PlacedEffect(effect, at) for at in spots if f"{effect.name}.{at}" not in have]
+        if effect.series:
+            found += _further(effect, spots, have)
+    return found
+
+
+def _further(effect: Effect, spots: Sequence[str], have: set[str]) -> list[PlacedEffect]:
+    """The next term of a series at each place that has those before it."""
+    found = []
+    for at in spots:
+        names = [effect.name, *(f"{effect.name}_{k}" for k in range(2, MOST_TERMS + 1))]
+        there = [f"{name}.{at}" in have for name in names]
+        if there[0] and not all(there):
+            found.append(PlacedEffect(term(effect, there.index(False) + 1), at))
     return found
 
 
@@ -112,8 +129,8 @@ def variants(assembly: TorqueModel, placed: PlacedEffect) -> list[EffectVariant]
     """The grid over an effect's shape parameters at a place, amplitudes at zero."""
     axes, amplitudes = [], []
     for i, p in enumerate(placed.effect.parameters):
-        scale = assembly.scale(placed, p)
-        axes.append([g * scale for g in p.grid] or [p.zero * scale])
+        scale, origin = assembly.scale(placed, p), assembly.origin(placed, p)
+        axes.append([origin + g * scale for g in p.grid] or [p.zero * scale])
         if _is_linear(p):
             amplitudes.append(i)
     masses = [i for i in amplitudes if not placed.effect.parameters[i].grid]

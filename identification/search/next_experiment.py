@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...models.effects import get_effect
-from ...models.model import Model, PlacedEffect
+from ...models.model import Model, PlacedEffect, effect_on
 from ...models.rigid_body import RigidBody
 from ...models.tree import Joint
 from ...recordings.condition import condition
@@ -161,7 +161,7 @@ def rivals(model: Model, diagnosis: Diagnosis) -> list[tuple[PlacedEffect, Place
         for rival in sorted(finding.rivals, key=lambda r: -r.probability):
             # No motion parts an effect from what holds it and more.
             if placed and finding.name not in get_effect(rival.name).contains:
-                pair = placed[0], PlacedEffect(get_effect(rival.name), rival.at)
+                pair = placed[0], PlacedEffect(effect_on(get_effect(rival.name), model.tree), rival.at)
                 (likely if rival.separable else open_).append(pair)
     return open_[:PAIRS] or likely[:1]
 

@@ -55,8 +55,9 @@ class Servos:
         moves = [np.abs(np.diff(r.position)) for r in own]
         self._step = min((float(x[x > 0].min()) for x in moves if np.any(x > 0)), default=0.0)
         travel = max(float(np.ptp(r.position)) for r in own)
-        self._scales = Scales(*(max(x, LEAST) for x in (float(np.abs(self._qd).max()), travel,
-                                                        float(np.abs(self._load).max()))))  # fmt: skip
+        sizes = float(np.abs(self._qd).max()), travel, float(np.abs(self._load).max())
+        speed, travel, load = (max(x, LEAST) for x in sizes)
+        self._scales = Scales(speed, travel, load, 0.5 * float(self._q.min() + self._q.max()))
         self._laws = [e for e in laws() if not self._alias(e)]
 
     def measured(self, i: int) -> Array:
@@ -93,8 +94,8 @@ class Servos:
         return np.maximum(np.std(np.concatenate([self._measured[i] for i in self.train]), axis=0), LEAST)
 
     def bounds(self, p: PlacedEffect, x: Parameter) -> tuple[float, float]:
-        scale = self._scales.of(x.relative_to)
-        return x.low * scale, x.high * scale
+        scale, origin = self._scales.of(x.relative_to), self._scales.origin(x.relative_to)
+        return origin + x.low * scale, origin + x.high * scale
 
     def size(self, p: PlacedEffect, x: Parameter) -> float:
         """As much as changes the torque by `WIDE`, along the recorded motion."""
@@ -123,10 +124,14 @@ class Servos:
         rows = {"q": self._q, "qd": moving, "load": self._load, "speed_scale": np.full_like(self._q, LEAST)}
         # A law of symbols is one of numbers too.
         signals: Any = {k: ca.DM(v) for k, v in rows.items()}
-        shapes = {x.name: x.zero * self._scales.of(x.relative_to) for x in effect.parameters if x.grid}
+        shapes = {x.name: self._placed(x, x.zero) for x in effect.parameters if x.grid}
         names = [x.name for x in effect.parameters if not x.grid]
         units: list[Any] = [shapes | {other: float(other == name) for other in names} for name in names]
         return {k: np.array(effect.law(signals, x)).ravel() for k, x in zip(names, units, strict=True)}
+
+    def _placed(self, x: Parameter, share: float) -> float:
+        """A number of a parameter's grid in SI units."""
+        return self._scales.origin(x.relative_to) + share * self._scales.of(x.relative_to)
 
     def _alias(self, effect: Effect) -> bool:
         """Is a law, with another torque per volt, its own special case? No recording has a torque: a share of the load
@@ -152,7 +157,7 @@ class Servos:
         """A parameter without a grid is an amplitude."""
         shapes = [x for x in p.effect.parameters if x.grid]
         amplitudes = tuple(f"{p.key}.{x.name}" for x in p.effect.parameters if not x.grid)
-        axes = [[g * self._scales.of(x.relative_to) for g in x.grid] for x in shapes]
+        axes = [[self._placed(x, g) for g in x.grid] for x in shapes]
         return [
             GridPoint(p, {f"{p.key}.{x.name}": v for x, v in zip(shapes, point, strict=True)}, amplitudes)
             for point in product(*axes)

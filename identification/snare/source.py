@@ -41,7 +41,7 @@ FEWEST_BLOCKS = 4
 class Captures:
     """Captures of a model, the training recordings first, while their processes run."""
 
-    anew, bent, steps = False, True, 4
+    anew, bent, steps = False, True, 8
 
     def __init__(self, model: Model, records: Sequence[CaptureRecording], n_train: int, runs: CaptureRuns) -> None:
         """Simulate nothing yet."""
@@ -96,7 +96,7 @@ class Captures:
         return self._differences(i, at, here, np.diag(np.where(at.values + steps > highs, -steps, steps)), "values")
 
     def own_shifts(self, p: PlacedEffect) -> tuple[int, ...]:
-        return ()
+        return tuple(k for k, name in enumerate(TOLERANCES) if name.startswith(f"{p.key}."))
 
     def shift_slopes(self, i: int, at: ModelPoint, here: Array) -> Array:
         own = self._own(i)

@@ -7,6 +7,7 @@ the same rule a nameless curve of the last search stays.
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..deciding import DISCREPANCY, GATE, TOLERANCES
 from ..evidence.arm import WeighedRecordings
-from ..evidence.confirm import scatter
+from ..evidence.gain import Blocks, Remaining, scatter
 from ..evidence.members import Members
 from ..evidence.pool import Item
 from ..evidence.projected import ProjectedEvidence
@@ -22,7 +23,7 @@ from ..evidence.rounds import as_names, share_of_residual
 from ..evidence.search import MemberOdds, Search
 from ..evidence.selection import Remainder
 from ..evidence.tolerant import searched
-from .fit import fit, linearised, shift_columns
+from .fit import fit, kept_columns, linearised
 from .search import Naming, Selection, opened
 from .source import GridPoint, Linearisation, ModelPoint, Source
 from .weigh import covariances, point_key, weigh
@@ -67,10 +68,10 @@ def confirm(
 ) -> Confirmation:
     """Remove the name with the smallest held-out loss, until every name's loss is beyond its scatter."""
     held, last, names = source.held, found.last, list(found.names)
-    shifted, own = shift_columns(last), covariances(found.weighed)
+    shifted, own = kept_columns(source, last), covariances(found.weighed)
     progress("confirming on the held-out recordings")
     there = linearised(source, held, source.settled(last.at, held))
-    beside = shift_columns(there)
+    beside = kept_columns(source, there)
     could = [[x[:, c] for x in there.columns] for c in range(len(source.channels))]
     noise = replace(found.weighed, runs=[*found.weighed.runs, *source.noise_channels(held, there, could)])
     whole = _forecast(source, given, last, there, noise)
@@ -81,8 +82,8 @@ def confirm(
             key = name.placed.key
             rest = fit(source, given, last.at.without(key), own, shifted)
             other = linearised(source, held, source.settled(rest.at, held), beside)
-            density, blocks = _forecast(source, given, rest, other, noise, source.own_shifts(name.placed))
-            missed[key] = HeldOutLoss(whole[0] - density, scatter(0.5 * (blocks - whole[1])), rest, other)
+            density, left = _forecast(source, given, rest, other, noise, source.own_shifts(name.placed))
+            missed[key] = HeldOutLoss(whole[0] - density, scatter(left, whole[1], _blocks(source)), rest, other)
         weakest = min(names, key=lambda n: missed[n.placed.key].sure)
         if missed[weakest.placed.key].sure > GATE:
             break
@@ -101,9 +102,9 @@ def _forecast(
     there: Linearisation,
     known: WeighedRecordings,
     tolerance_of_name: Collection[int] = (),
-) -> tuple[float, Array]:
+) -> tuple[float, list[Remaining]]:
     """Log density of the held-out recordings given the training ones, averaged over how exactly the shifts may be
-    known, and what each block of time takes off it.
+    known, and what is left of each.
 
     Without a name, the shifts that are its own tolerance are known to their deviations alone, and not from the training
     recordings: learnt there they would be the effect itself under another name, however many deviations it takes.
@@ -124,8 +125,12 @@ def _forecast(
         ons.append(ProjectedEvidence(evidence, every, weight, (mean, covariance)))
     both = np.array(priors) + [on.null for on in ons]
     always = ons[int(np.argmax(both))].beside([])
-    parts = [source.blocks(i, evidence.left(i, always, [])) for i in every]
-    return float(np.logaddexp.reduce(both) - np.logaddexp.reduce(priors)), np.concatenate(parts)
+    left = [evidence.left(i, always, []) for i in every]
+    return float(np.logaddexp.reduce(both) - np.logaddexp.reduce(priors)), left
+
+
+def _blocks(source: Source) -> list[Blocks]:
+    return [partial(source.blocks, i) for i in source.held]
 
 
 def _joined(here: Linearisation, there: Linearisation) -> Linearisation:
@@ -192,18 +197,17 @@ def _remainder(
     """One curve of a set: what it is, and what the held-out recordings gain by it; ``at``: numbers in ``both`` of what
     was searched."""
 
-    def beside(some: Sequence[MemberOdds]) -> tuple[float, Array]:
+    def beside(some: Sequence[MemberOdds]) -> tuple[float, list[Remaining]]:
         own, all_of_it = Members(made.on, _pairs(some)), Members(both, [(at[x], size) for x, size in _pairs(some)])
         mean = [(at[item], own.of(item)) for item, _ in _pairs(some)]
         # Shifts may be a recording's own: what stands beside is its mean on all of them.
         always, pairs = both.beside(mean), [(both.evidence.items[item], a) for item, a in mean]
-        parts = [source.blocks(i, both.evidence.left(i, always, pairs)) for i in source.held]
-        return all_of_it.value - own.value, np.concatenate(parts)
+        return all_of_it.value - own.value, [both.evidence.left(i, always, pairs) for i in source.held]
 
     density, whole = beside(kept)
     other, rest = beside([s for s in kept if s is not kept[k]])
     item = kept[k].taken.item
     c, words = made.on.evidence.items[item].label
     explained = share_of_residual(made, item, Members(made.on, _pairs(kept)).of(item))
-    held = (density - other) / max(scatter(0.5 * (rest - whole)), 1e-12)
+    held = (density - other) / max(scatter(rest, whole, _blocks(source)), 1e-12)
     return Remainder(c, words, kept[k].gain, explained, held)

@@ -84,6 +84,12 @@ def shift_columns(linear: Linearisation) -> list[Array]:
     return [x[:, :, len(linear.at.values) :] for x in linear.columns]
 
 
+def kept_columns(source: Source, linear: Linearisation) -> list[Array] | None:
+    """The shifts' columns of each recording as a fit from another point may keep them; None where they change on the
+    way, or with what the model has."""
+    return None if source.bent else shift_columns(linear)
+
+
 def sizes_of(source: Source, at: ModelPoint) -> Array:
     """A usual size of each free parameter (P,)."""
     return np.array([source.size(p, x) for p, x in at.free])
@@ -126,11 +132,11 @@ def fit(
     most: int = 0,
 ) -> Linearisation:
     """Maximise the posterior of the training recordings from a start, in ``most`` steps or as many as the source has;
-    ``known`` as in `linearised`.
+    ``known`` as in `linearised`; without it the shifts' columns are those of the start, or of each step if they bend.
     """
     numbers, prior, n = source.train, priors(source, given, at), len(at.values)
     here = linearised(source, numbers, at, known)
-    known = shift_columns(here) if known is None else known
+    known = kept_columns(source, here) if known is None else known
     now = cost(at, here.residuals, covariances, prior)
     size = np.concatenate([sizes_of(source, at), np.ones(len(at.shifts))])
     low, high = bounds_of(source, at)

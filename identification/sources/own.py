@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ...models.model import Model
 from ..deciding import ROUNDS
 from ..evidence.arm import WeighedRecordings
-from .fit import STILL, fit, linearised, shift_columns, sizes_of
+from .fit import STILL, fit, kept_columns, linearised, sizes_of
 from .source import Linearisation, ModelPoint, Source
 from .weigh import covariances, weigh
 
@@ -28,13 +28,13 @@ def fitted(source: Source, given: ModelPoint, start: ModelPoint) -> tuple[Weighe
     """The parameters fitted from a start, with the prior of what is ``given``; and the recordings as weighed."""
     here = linearised(source, source.train, start)
     weighed = weigh(source, source.train, given, here, search=False)
-    return refitted(source, given, start, weighed, shift_columns(here))
+    return refitted(source, given, start, weighed, kept_columns(source, here))
 
 
 def refitted(
-    source: Source, given: ModelPoint, start: ModelPoint, weighed: WeighedRecordings, shifted: Sequence[Array]
+    source: Source, given: ModelPoint, start: ModelPoint, weighed: WeighedRecordings, shifted: Sequence[Array] | None
 ) -> tuple[WeighedRecordings, Linearisation]:
-    """As `fitted`, in noise that is known at the start, with the shifts' ``shifted`` columns (n, c, S).
+    """As `fitted`, in noise that is known at the start, with the shifts' ``shifted`` columns (n, c, S) as in `fit`.
 
     Far from the truth a misfit is taken for noise: where a fit ends the noise is learnt anew, until that moves nothing.
     """
@@ -42,12 +42,10 @@ def refitted(
     for _ in range(ROUNDS):
         found = fit(source, given, at, covariances(weighed), shifted, STEPS)
         moved = np.abs(found.at.values - at.values) / sizes_of(source, found.at)
+        shifted_by = np.abs(found.at.shifts - at.shifts)
         at = found.at
-        if np.all(moved < STILL):
+        if np.all(moved < STILL) and np.all(shifted_by < STILL):
             break
-        if source.bent:
-            found = linearised(source, source.train, at)
-            shifted = shift_columns(found)
         weighed = weigh(source, source.train, given, found, search=False)
     return weighed, found
 

@@ -14,7 +14,7 @@ from ..evidence.rounds import as_names, share_of_residual
 from ..evidence.search import MemberOdds, Search
 from ..evidence.tolerant import searched
 from ..nuisance.noise import Noise
-from .fit import fit, linearised, shift_columns
+from .fit import fit, kept_columns, linearised
 from .own import refitted
 from .source import GridPoint, Linearisation, ModelPoint, Source
 from .weigh import by_themselves, covariances, weigh
@@ -74,7 +74,7 @@ def search(
     train = source.train
     progress(f"comparing {len(train)} recordings with the model as given")
     first = here = linearised(source, train, source.settled(given, train))
-    shifted = shift_columns(first)
+    shifted = kept_columns(source, first)
     names: list[Naming] = []
     trials: tuple[Trial, ...] = ()
     weighed: WeighedRecordings | None = None
@@ -97,10 +97,6 @@ def search(
         progress("fitting " + ", ".join(f"{p.effect.name} at {p.at}" for p in added))
         start = here.at.with_effects(added, values)
         _, here = refitted(source, given, start, weighed, shifted)
-        if source.bent:
-            # Beside old columns an effect of the same number would explain what only their change leaves.
-            here = linearised(source, train, here.at)
-            shifted = shift_columns(here)
     assert weighed is not None
     if not names:
         here = fit(source, given, here.at, covariances(weighed), shifted)

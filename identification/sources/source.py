@@ -133,7 +133,7 @@ class Source(Protocol):
 
     @property
     def bent(self) -> bool:
-        """Whether the derivatives by the shifts are computed again after each fit, since they change over it."""
+        """Whether the derivatives by the shifts change over a fit, and are computed again at each of its steps."""
         ...
 
     @property

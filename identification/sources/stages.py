@@ -1,7 +1,7 @@
 """The fits of a decision one after the other: as given, then with each effect more at all places where it was found."""
 
 from .decide import Decision
-from .fit import fit, residuals, shift_columns
+from .fit import fit, kept_columns, residuals
 from .source import Linearisation, Source
 from .weigh import covariances
 
@@ -19,7 +19,7 @@ def stages(source: Source, decided: Decision, given: str = "model as given") -> 
         own, there = best.train, best.held
         if later:
             noise = covariances(decided.found.weighed)
-            own = fit(source, decided.given, own.at.without(*later), noise, shift_columns(own))
+            own = fit(source, decided.given, own.at.without(*later), noise, kept_columns(source, own))
             at = source.settled(own.at, source.held)
             there = Linearisation(at, residuals(source, source.held, at), ())
         places = [n.placed.at for n in best.names if n.placed.effect.name == name]

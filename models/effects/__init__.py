@@ -9,7 +9,7 @@ from functools import cache
 from importlib import import_module
 
 from ...errors import InputError, nearest
-from ..effect import Effect
+from ..effect import Effect, term
 
 FAMILIES = (
     "joint friction",
@@ -21,6 +21,9 @@ FAMILIES = (
     "docking",
     "measurement",
 )
+
+MOST_TERMS = 9
+"""Terms of a series at one place."""
 
 
 @cache
@@ -36,7 +39,7 @@ def effects() -> dict[str, Effect]:
 
 
 def get_effect(name: str) -> Effect:
-    """The effect of that name.
+    """The effect of that name; ``name_2`` and so on are further terms of one that is a series.
 
     Raises
     ------
@@ -46,6 +49,19 @@ def get_effect(name: str) -> Effect:
     known = effects()
     if name in known:
         return known[name]
+    first, number = term_of(name)
+    if number > 1:
+        return term(known[first], number)
     near = nearest(name, known, 0.5)
     hint = f" (nearest: {near})" if near else ""
     raise InputError(f"unknown effect '{name}'{hint}; known effects: {', '.join(known)}")
+
+
+def term_of(name: str) -> tuple[str, int]:
+    """The vocabulary's word for an effect, and which term of a series it is, from 1: of ``torque_ripple_2`` the second
+    of ``torque_ripple``. Any other name is its own word."""
+    first, _, number = name.rpartition("_")
+    known = effects()
+    if name not in known and first in known and known[first].series and number in map(str, range(2, MOST_TERMS + 1)):
+        return first, int(number)
+    return name, 1

@@ -2,11 +2,14 @@
 
 As link torsion, about the horizontal axis across the boom: levers are those along the boom, the stiffness is that of
 its slope in bending. The misfit is between the slope that the joints hold and the one that the slings beyond do.
+
+On an arm without slings the link is a bending spring, as stiff in every direction across its length.
 """
 
 import casadi as ca
 
 from ..effect import Effect, Parameter, Symbols
+from ._elastic_link import elastic_link
 from .link_torsion import EFFECT as TORSION
 
 
@@ -34,5 +37,13 @@ EFFECT = Effect(
         ),
     ),
     law=_law,
+    elsewhere=elastic_link(
+        "link_bending",
+        (1, 2),
+        "the link bends under load, and all beyond it lags",
+        "inertia * slope'' + damping * slope' + stiffness * slope = moment across the link at its far end",
+        "Book (1984), small deflections",
+        "load the far end of {at} with a moment across its length and measure the slope, or excite its ringing",
+    ),
     experiment="measure the height of {at} at both its ends over the motion, or repeat it with softer slings",
 )

@@ -5,11 +5,14 @@ nothing comes of it; with a suspension of stiffness k, a boom of torsional stiff
 slings are springs in series: slings at levers b (sideways from the boom's line) change their pull by
 ``-torque * b / (radius^2 + sum b^2)`` with ``torque`` = K * misfit and ``radius``^2 = K / k. Stretched out, the levers
 are zero and nothing shows; it builds up as the arm folds sideways, and stays at rest.
+
+On an arm without slings the link is a torsion spring that all beyond its far end turns on.
 """
 
 import casadi as ca
 
 from ..effect import Effect, Parameter, Symbols
+from ._elastic_link import elastic_link
 
 
 def _law(s: Symbols, p: Symbols) -> ca.SX:
@@ -36,5 +39,13 @@ EFFECT = Effect(
         ),
     ),
     law=_law,
+    elsewhere=elastic_link(
+        "link_torsion",
+        (0,),
+        "the link twists about its length under load, and all beyond it lags",
+        "inertia * twist'' + damping * twist' + stiffness * twist = torque in the link at its far end",
+        "Book (1984), small deflections",
+        "load the far end of {at} with a torque about its length and measure the twist, or excite its ringing",
+    ),
     experiment="track the twist of {at} with targets at both its ends, or repeat the motion with softer slings",
 )

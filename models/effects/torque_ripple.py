@@ -24,19 +24,22 @@ EFFECT = Effect(
     parameters=(
         Parameter("cosine", "T", "ripple in phase with the cosine of position"),
         Parameter("sine", "T", "ripple in phase with the sine of position"),
-        # One start for each whole number of periods in the travel: a fit from further off locks on to a side lobe.
+        # Teeth and poles go by the turn, the travel by the motion: no period is a share of it. The grid is for those
+        # to whom each point is a simulation.
         Parameter(
             "period",
             "S",
             "travel after which the ripple repeats",
             zero=0.1,
-            low=0.002,
+            low=1e-4,
             high=0.6,
             grid=tuple(1 / periods for periods in range(2, 25)),
             relative_to="travel",
+            periodic_over="q",
         ),
     ),
     law=_law,
+    series=True,
     experiment="run {at} slowly to and fro over its whole travel and average the torques of both directions "
     "position by position",
 )

@@ -25,7 +25,7 @@ def made(
     plans: Sequence[Any],
     group: str,
     tell: Callable[[str], None],
-    write: Callable[[Any, int, int, Path], None],
+    write: Callable[[Any, int, int, Path], object],
     first: int = 0,
 ) -> list[Path]:
     """Folders of the plans of one group, or of all; ``write`` makes those that are not there, from plan, seed, number

@@ -1,6 +1,7 @@
 """The cases: which there are, how each is drawn, and what is written of it. All follows from seed and number."""
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from .concealed import NAMES, Concealed, TooMuch
 from .laws import Slip
 from .machine import Machine, TooSoft
 from .motions import STEP, motion
-from .outside import FAULTS, OUTSIDE, lawless
+from .outside import FAULTS, OUTSIDE, Outside, lawless
 from .residuals import play, residuals, rms
 from .robots import ARMS, Rng, load, published, true_arm
 
@@ -67,23 +68,27 @@ def planned(seed: int, count: int) -> list[Plan]:
     return plans[:count]
 
 
-def write(plan: Plan, seed: int, number: int, folder: Path) -> None:
-    """Draw a case, again where hardware has no such effect, and write it; ``truth.json`` last.
+def write(
+    plan: Plan, seed: int, number: int, folder: Path, outside: Mapping[str, Outside] = OUTSIDE, first: int = 0
+) -> int:
+    """Draw a case, again where hardware has no such effect, and write it; ``truth.json`` last. The attempt that was
+    drawn, of those from ``first`` on; ``outside``: laws without a name by what they are.
 
     Raises
     ------
     RuntimeError
         No such case in `ATTEMPTS` attempts.
     """
-    for attempt in range(ATTEMPTS):
+    for attempt in range(first, ATTEMPTS):
         try:
-            return _write(plan, seed, number, np.random.default_rng([seed, 2, number, attempt]), folder)
+            _write(plan, seed, number, np.random.default_rng([seed, 2, number, attempt]), folder, outside)
         except (TooMuch, TooSoft):
             continue
+        return attempt
     raise RuntimeError(f"case {number} ({plan}): no such case in {ATTEMPTS} attempts")
 
 
-def _write(plan: Plan, seed: int, number: int, rng: Rng, folder: Path) -> None:
+def _write(plan: Plan, seed: int, number: int, rng: Rng, folder: Path, outside: Mapping[str, Outside]) -> None:
     name, path = list(published().items())[int(rng.integers(len(published())))]
     arm = load(path, ARMS[name])
     J = len(arm.joints)
@@ -98,7 +103,7 @@ def _write(plan: Plan, seed: int, number: int, rng: Rng, folder: Path) -> None:
         spot = int(joints[k])
         wanted = float(size * level[spot])
         if plan.group == LAWLESS:
-            one = lawless(what, machine, train, spot, wanted, rng)
+            one = lawless(outside[what], machine, train, spot, wanted, rng)
         else:
             one = NAMES[what](machine, train, spot, wanted, rng)
         machine = one.machine

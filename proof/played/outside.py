@@ -77,7 +77,9 @@ def _detent(d: Drive, k: int, rng: Rng) -> Extra:
     return law
 
 
-OUTSIDE: dict[str, Callable[[Drive, int, Rng], Extra]] = {
+Outside = Callable[[Drive, int, Rng], Extra]
+
+OUTSIDE: dict[str, Outside] = {
     "hose over two joints": _hose,
     "grease stirred by another joint": _stirred,
     "damaged tooth": _tooth,
@@ -87,15 +89,15 @@ OUTSIDE: dict[str, Callable[[Drive, int, Rng], Extra]] = {
 }
 
 
-def lawless(name: str, machine: Machine, motion: Motion, k: int, wanted: float, rng: Rng) -> Concealed:
+def lawless(draw: Outside, machine: Machine, motion: Motion, k: int, wanted: float, rng: Rng) -> Concealed:
     """A law without a name at a joint, of the wanted RMS [N·m] beside the nearest named ones."""
     d = machine.drive(motion)
-    unit = OUTSIDE[name](d, k, rng)
+    unit = draw(d, k, rng)
     column = unit(d)
     size = wanted / max(beside_names(d, k, column), 1e-12)
     raw = size * rms(column)
     if not raw <= MOST * rms(machine.torque(motion)[:, k]):
-        raise TooMuch(name)
+        raise TooMuch(f"{raw:.3g} N·m")
     return Concealed(machine.with_extra(k, lambda e: size * unit(e)), f"joint{k + 1}", k, raw)
 
 

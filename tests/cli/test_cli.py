@@ -61,6 +61,7 @@ def test_the_program_itself(arm_folder):
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("default:the empirical law at")
 def test_diagnose_of_a_recording_in_pieces(arm_folder, capfd):
     """JSON alone on standard output. Every second a sample is missing, and the torque is no arm's: a hard case to get
     through, with joints whose friction ends at its bound.

@@ -51,6 +51,7 @@ SYSTEMS = {
             "harness_stiffness": {"stiffness": 20.0, "torque_at_zero": 1.0},
             "gear_efficiency": {"driving_loss": 0.2, "braking_loss": 0.05},
             "heating_friction": {"fall": 20.0, "time": 2.0},
+            "end_stop": {"above": 30.0, "below": 4.0, "where": 0.1},
             "joint_spring": {"stiffness": 8.0, "torque_at_zero": 1.5},
             "rotor_inertia": {"inertia": 0.8},
             "payload_mass": {"mass": 2.0, "x": 0.1, "y": -0.05, "z": 0.02},

@@ -226,3 +226,16 @@ def test_follows_a_floating_base_with_its_effects(tmp_path):
     for column, name in enumerate(names):
         size = np.abs(wanted[:, column]).max()
         np.testing.assert_allclose(found[:, column], wanted[:, column], rtol=0, atol=1e-9 * size, err_msg=name)
+
+
+def test_follows_an_arm_with_elastic_links(tmp_path):
+    """Torsion in one link and bending in two, beside an elastic joint: as `simulate` has it."""
+    effects = """[{ name = "link_torsion", at = "link1" }, "link_bending", { name = "joint_elasticity", at = "joint2" },
+        { name = "sensor_delay", at = "tau.joint1" }]"""
+    values = {"link_torsion.link1.stiffness": 900.0, "link_torsion.link1.damping": 3.0}
+    values |= {f"link_bending.link{k}.stiffness": 2000.0 / k for k in (1, 2)}
+    values |= {f"link_bending.link{k}.damping": 5.0 / k for k in (1, 2)}
+    values |= {"joint_elasticity.joint2.stiffness": 900.0, "joint_elasticity.joint2.damping": 4.0}
+    path = write_model(tmp_path, "arm", 3, effects, values | {"sensor_delay.tau.joint1.delay": 0.012})
+    t, q, _, _ = motion(3, 3.0, 0)
+    assert parted(path, 2, t, q) < 1e-9

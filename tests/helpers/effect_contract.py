@@ -18,7 +18,7 @@ from snarelab.models.hidden_state import THROUGH, LawEvaluation, evaluate_law
 def scale_of(parameter, s):
     travel, torque = np.ptp(s["q"]), np.abs(s["value" if parameter.unit == "U" else "load"]).max()
     scales = {"": 1.0, "speed": s["speed_scale"][0], "travel": travel, "torque": torque, "rate": torque / travel}
-    scales["per_torque"] = 1 / torque
+    scales |= {"per_torque": 1 / torque, "place": travel}  # the motion's middle is near zero
     return scales[parameter.relative_to]
 
 

@@ -4,7 +4,19 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from effect_signals import DT, TIME, hang_point, inertial_parameters, load, shaken, spin, told, value
+from effect_signals import (
+    BEYOND,
+    DT,
+    TIME,
+    hang_point,
+    inertial_parameters,
+    load,
+    shaken,
+    spin,
+    told,
+    transmitted,
+    value,
+)
 from scipy.integrate import solve_ivp
 from scipy.signal import lsim
 from scipy.spatial.transform import Rotation
@@ -157,6 +169,10 @@ def warmed(s, fall, per_kelvin, time):
     return -(fall * np.ravel(warmth) + per_kelvin * (s["temperature"] - 20.0)) * np.sign(s["qd"])
 
 
+def bumper(s, above, below, where):
+    return np.interp(s["q"], [where - 9, where, where + 9], [-9 * below, 0.0, 9 * above])
+
+
 def sprung_link(s, stiffness, damping):
     inertia = s["inertia"][0]
 
@@ -166,6 +182,32 @@ def sprung_link(s, stiffness, damping):
     start = [load(0.0) / stiffness, 0.0]
     twist, twist_rate = solve_ivp(rate, (0, TIME[-1]), start, "DOP853", TIME, rtol=1e-10, atol=1e-12).y
     return -np.column_stack([twist, twist_rate, rate(TIME, [twist, twist_rate])[1]])
+
+
+def sprung_beyond(axes):
+    """What is beyond a beam on springs about some of its axes, by its modes: each an oscillator of its own."""
+
+    def output(s, stiffness, damping):
+        square, modes = np.linalg.eigh(np.linalg.inv(BEYOND[np.ix_(axes, axes)]))
+        found = np.zeros((3, TIME.size, len(axes)))
+        for lightness, mode in zip(square, modes.T, strict=True):
+
+            def pull(time, mode=mode):
+                return transmitted(time)[..., axes] @ mode
+
+            def rate(time, state, lightness=lightness, pull=pull):
+                return [state[1], lightness * (pull(time) - damping * state[1] - stiffness * state[0])]
+
+            start = [pull(0.0) / stiffness, 0.0]
+            turn, turning = solve_ivp(rate, (0, TIME[-1]), start, "DOP853", TIME, rtol=1e-10, atol=1e-12).y
+            for x, own in zip(found, (turn, turning, rate(TIME, [turn, turning])[1]), strict=True):
+                x += np.outer(own, mode)
+        whole = np.zeros((TIME.size, 9))
+        for order, x in enumerate(found):
+            whole[:, [3 * order + k for k in axes]] = -x
+        return whole
+
+    return output
 
 
 def free_play(s, stiffness, damping, gap):
@@ -318,6 +360,7 @@ REFERENCES = {
     "gear_efficiency": Reference({"driving_loss": 0.25, "braking_loss": 0.1}, by_quadrant),
     "motor_saturation": Reference({"excess": 0.6, "knee": 1.4, "no_load_speed": 9.0}, saturated, likeness=0.1),
     "heating_friction": Reference({"fall": 3.0, "per_kelvin": 0.2, "time": 5.0}, warmed, tolerance=0.1),
+    "end_stop": Reference({"above": 30.0, "below": 4.0, "where": 0.6}, bumper, likeness=0.01),
     "joint_spring": Reference({"stiffness": 6.0, "torque_at_zero": 2.4}, spring),
     "rotor_inertia": Reference({"inertia": 0.4}, lambda s, inertia: np.gradient(inertia * s["qd"], DT, edge_order=2)),
     "torque_ripple": Reference({"cosine": 0.3, "sine": 0.5, "period": 0.21}, ripple),
@@ -329,6 +372,8 @@ REFERENCES = {
     "hang_point_clearance": Reference({"clearance": 0.015}, pin_in_a_hole, likeness=0.05),
     "link_torsion": Reference({"torque": 300.0, "radius": 2.0}, lambda s, t, r: springs_in_series(s, t, r, 0)),
     "link_bending": Reference({"torque": -500.0, "radius": 4.0}, lambda s, t, r: springs_in_series(s, t, r, 1)),
+    "link_torsion elsewhere": Reference({"stiffness": 3000.0, "damping": 15.0}, sprung_beyond([0])),
+    "link_bending elsewhere": Reference({"stiffness": 4000.0, "damping": 25.0}, sprung_beyond([1, 2])),
     "suspension_stiffness": Reference({"stiffness": 700.0}, lambda s, k: np.repeat(k, TIME.size)),
     "payload_mass": Reference({"mass": 1.7, "x": 0.05, "y": -0.1, "z": 0.15}, with_point),
     "com_offset": Reference({"x": 0.2, "y": -0.1, "z": 0.3}, with_shift),

@@ -30,6 +30,20 @@ def hang_point(time):
     return np.stack(paths, axis=-1)[:2]
 
 
+BEYOND = np.array([[1.2, 0.1, -0.2], [0.1, 2.5, 0.4], [-0.2, 0.4, 3.0]])
+"""Inertia of what a beam carries about its far end [kg·m²]."""
+
+
+def transmitted(time):
+    """Moment that a beam transmits about its three axes (n, 3) [N·m]."""
+    waves = (
+        [(15.0, 0.31, 0.4), (9.0, 1.7, 1.1)],
+        [(12.0, 0.5, 0.2), (8.0, 2.3, 1.0)],
+        [(14.0, 0.4, 2.0), (5.0, 1.2, 0.3)],
+    )
+    return np.stack([wave(time, *terms)[0] for terms in waves], axis=-1)
+
+
 def signals():
     """A joint's motion over 8 s, and 4000 random links; speeds from a crawl to about 4 rad/s."""
     q, qd, qdd = wave(TIME, (0.9, 0.23, 0.1), (0.4, 0.71, 1.3), (0.12, 1.9, 0.7))
@@ -56,6 +70,7 @@ def signals():
     links |= slings | {"spread": np.stack([4 + 3 * q**2, 20 + qd**2], axis=1)}
     links |= {"spin_rate": shaken(TIME)[0], "acceleration": shaken(TIME)[1]}
     links |= {"spin": spin(TIME), "spin_gained": spin(TIME), "impulse": told(TIME)[0]}
+    links |= {"moment": transmitted(TIME), "inertia_beyond": np.broadcast_to(BEYOND.ravel(), (TIME.size, 9))}
     return scalars | links | contacts() | {"points": points, "masses": masses}
 
 

@@ -41,11 +41,11 @@ def test_a_name_is_confirmed_from_one_standard_error_on(monkeypatch):
 def test_blocks_of_time(monkeypatch):
     run: Any = SimpleNamespace(motion=SimpleNamespace(band=50.0))
     x = np.ones(3000)
-    assert len(confirming.blocks(x, run)) == 20
+    assert len(confirming.blocks(run, x)) == 20
     for factor, count in zip(FACTORS, (40, 10), strict=True):
         with monkeypatch.context() as patch:
             move(patch, "BLOCK", factor)
-            assert len(confirming.blocks(x, run)) == count
+            assert len(confirming.blocks(run, x)) == count
 
 
 def rivals(share: float, cosine: float) -> list[bool]:

@@ -140,7 +140,8 @@ def shaped(monkeypatch, off: float, bent: float, curve: bool) -> float:
     columns = CandidateColumns([len(x)])
     over = Item(columns.add({0: [x[:, [2]]]}), np.ones(1), np.zeros(1, bool))
     words = hypothesising.coordinate(placed.effect) or ""
-    along: Any = SimpleNamespace(n_train=1, scale=np.ones(1), assembly=SimpleNamespace(joint_of=lambda _: 0), tuned={})
+    assembly = SimpleNamespace(joint_of=lambda _: 0)
+    along: Any = SimpleNamespace(n_train=1, scale=np.ones(1), assembly=assembly, tuned={}, peaks={})
     items = hypothesising._items(along, placed, {(0, words): over} if curve else {}, columns)
     own = made.pieces[0][0]
     residual = 0.3 * 10 * (x[:, 0] + off * x[:, 1] + bent * x[:, 2])

@@ -89,11 +89,12 @@ def test_bristles_under_load_are_told_near_rest_too(tmp_path):
 
 @pytest.mark.slow
 def test_a_cable_that_hardens_is_a_harness_and_more(tmp_path):
-    """Most of it is no spring's: what the spring leaves stands beside it, without a name."""
+    """Most of it is no spring's: what the spring leaves stands beside it, without a name. A stop may be named for the
+    end of the travel, where the cable is taut, but it is not the whole either."""
     answer, found = diagnosed(66, tmp_path / "case", 90300)
     assert answer.kinds == ("hardening cable",)
     (channel,) = answer.channels
-    assert {e.name for e in found.effects} <= {"harness_stiffness"}
+    assert {e.name for e in found.effects} <= {"harness_stiffness", "end_stop"}
     assert f"on {channel}, a smooth curve over position" in found.description
     # A table takes that part: it is in the model, and the names stay names.
     assert {t.at for t in found.empirical} == {channel.removeprefix("tau.")}

@@ -54,6 +54,14 @@ def test_a_diagnosis_hands_out_what_it_holds():
     assert one.to_json()["sentence"] == "It is so & so."
 
 
+def test_a_further_term_of_a_series_has_the_vocabularys_word():
+    first = SAID.effects[0]
+    second = replace(first, name="torque_ripple_2")
+    found = DiagnosisResult(replace(SAID, effects=(replace(first, name="torque_ripple"), second)), MODEL).to_json()
+    assert [e["name"] for e in found["effects"]] == ["torque_ripple", "torque_ripple"]
+    assert [e.get("term") for e in found["effects"]] == [None, 2]
+
+
 def test_json_has_null_for_what_is_no_number():
     """At a low band a channel was left without a sample, and its floor was infinite: the file could not be written."""
     nothing = replace(spelt("x"), steps=(Step("as given", float("inf"), float("nan")),))

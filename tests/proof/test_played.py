@@ -175,7 +175,7 @@ def test_law_without_a_name_is_as_large_beside_the_named_ones(name):
     arm = arm_of("ur5")
     asked = motion(np.random.default_rng(5), arm, 6.0)
     before = bare(arm)
-    made = lawless(name, before, asked, 1, 0.5, np.random.default_rng(7))
+    made = lawless(OUTSIDE[name], before, asked, 1, 0.5, np.random.default_rng(7))
     apart = made.machine.torque(asked) - before.torque(asked)
     assert beside_names(before.drive(asked), 1, apart[:, 1]) == pytest.approx(0.5, rel=1e-6)
     assert np.abs(apart[:, [0, 2, 3, 4, 5]]).max() == 0.0

@@ -113,10 +113,10 @@ def test_what_is_left_of_each_sample_adds_up_to_the_whitened_energy(case):
     left = evidence.left(1, always, [(made.items[1], amplitudes)])
     r, k, a, pool = made.stacked((1,))
     e = r - a @ always - pool[:, made.items[1].index] @ (made.items[1].spread * amplitudes)
-    assert left.sum() == pytest.approx(e @ np.linalg.solve(k, e), rel=1e-9)
+    assert left.energy.sum() == pytest.approx(e @ np.linalg.solve(k, e), rel=1e-9)
     n = len(made.pieces[1][0].residual)
     by_sample = (e * np.linalg.solve(k, e)).reshape(2, n).sum(axis=0)
-    np.testing.assert_allclose(left, by_sample, rtol=1e-7, atol=1e-9)
+    np.testing.assert_allclose(left.energy, by_sample, rtol=1e-7, atol=1e-9)
     for c in range(2):
         own = made.pieces[1][c]
         energy = own.residual @ np.linalg.solve(own.covariance.dense(), own.residual)

@@ -128,6 +128,23 @@ def test_a_hypothesis_is_the_average_of_its_shapes():
     assert alone.odds[2] - np.log(5) <= grid.odds[0] < alone.odds[2]
 
 
+def test_an_item_that_stands_for_more_of_a_grid_pays_for_it():
+    """Of twenty shapes two are kept, the right one and another: the odds are those of the whole grid, the rest of which
+    explains nothing; and the choice between a set's items is by their prior too."""
+    made = white(np.random.default_rng(7), 20, {2: 0.6})
+    on = ProjectedEvidence(made.evidence(), (0,))
+    whole = Search(on, [Hypothesis("grid", True, tuple(made.items), float(np.log(0.1)))]).scan([])
+    few = white(np.random.default_rng(7), 20, {2: 0.6})
+    few.items[:] = [replace(few.items[k], prior=float(np.log(2 / 20))) for k in (2, 7)]
+    on = ProjectedEvidence(few.evidence(), (0,))
+    kept = Search(on, [Hypothesis("grid", True, tuple(few.items), float(np.log(0.1)))])
+    assert kept.scan([]).odds[0] == pytest.approx(whole.odds[0], abs=0.01)
+    taken = kept.take([], 0)
+    assert kept.total([taken]) == pytest.approx(kept.scan([]).odds[0], rel=1e-9)
+    few.items[0] = replace(few.items[0], prior=-1e3)
+    assert Search(on, [Hypothesis("grid", True, tuple(few.items), 0.0)]).scan([]).item[0] == 1
+
+
 def test_without_a_hypothesis_nothing_is_found():
     made = white(np.random.default_rng(8), 1, {})
     assert Search(ProjectedEvidence(made.evidence(), (0,)), []).answer() == []

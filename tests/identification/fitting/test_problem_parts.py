@@ -28,6 +28,7 @@ def assembly(*placed, n_joints=3, blocks=()) -> Any:
         slots=slots,
         index_of=lambda p: index[p.key],
         scale=lambda p, x: 2.0 * int(p.at[-1]) if x.relative_to else 1.0,
+        origin=lambda p, x: 0.0,
         joint_of=lambda p: int(p.at[-1]) - 1,
         place_of=lambda p: Made(channels=np.array([0, 2] if p.at == "tie" else [int(p.at[-1]) - 1])),
         tree=Made(joints=range(n_joints), n_joints=n_joints, moves=MOVES, coupled=lambda c: (0, 1) if c < 2 else (2,)),

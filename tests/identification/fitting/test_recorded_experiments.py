@@ -123,10 +123,12 @@ def test_scales_are_peaks_over_all_recordings_and_never_zero():
     first = run([[1.0, 0], [-7.0, 0]], [[-1.0, 0], [2.0, 0]], [[3.0, 0], [-4.0, 0]], body)
     second = run([[6.0, 0], [0.0, 0]], [[5.0, 0], [4.0, 0]], [[1.0, 0], [1.0, 0]])
     found = scales([first, second])
-    assert found["joint1"] == Scales(speed=4.0, travel=6.0, torque=7.0)
+    assert found["joint1"] == Scales(speed=4.0, travel=6.0, torque=7.0, middle=2.0)
     assert found["joint2"] == Scales(1e-9, 1e-9, 1e-9)
     words = ("", "speed", "travel", "torque", "rate")
     assert [Scales(4.0, 5.0, 8.0).of(word) for word in words] == [1.0, 4.0, 5.0, 8.0, 1.6]
+    moved = Scales(4.0, 5.0, 8.0, middle=3.0)
+    assert [(moved.origin(word), moved.of(word)) for word in ("place", "travel")] == [(3.0, 5.0), (0.0, 5.0)]
 
 
 def arm(modelled, n_joints=2, carriers=0) -> Any:

@@ -136,6 +136,7 @@ MODEL: Any = Made(
         PlacedEffect(get_effect("viscous_friction"), "joint2"),
         PlacedEffect(get_effect("sensor_gain"), "tau.joint1"),
     ),
+    tree=Made(joints=()),
 )
 
 
@@ -223,8 +224,7 @@ def designed(monkeypatch):
     }
     for name, part in parts.items():
         monkeypatch.setattr(module, name, part)
-    tree = Made(joints=())
-    model: Any = Made(**vars(MODEL), tree=tree, inertia="fixed", values={"b": 8.0}, joints=("joint1",))
+    model: Any = Made(**vars(MODEL), inertia="fixed", values={"b": 8.0}, joints=("joint1",))
     both = [rival(name, "joint1", 0.5, False) for name in ("rotor_inertia", "harness_stiffness")]
     diagnosis: Any = Made(effects=(finding("viscous_friction", "joint1", *both),))
 

@@ -71,6 +71,7 @@ def assembly(**scales) -> Any:
     """Scales by the word that a parameter refers to them; bounds ten times its own."""
     return Made(
         scale=lambda _placed, x: scales.get(x.relative_to, 1.0),
+        origin=lambda _placed, x: scales.get("middle", 0.0) if x.relative_to == "place" else 0.0,
         bounds=lambda _placed, x: (10 * x.low, 10 * x.high),
         place_of=lambda _: Made(channels=(1,)),
         joint_of=lambda _: 1,
@@ -87,6 +88,15 @@ def test_a_grid_is_every_combination_of_shapes_in_the_joints_scale():
     np.testing.assert_allclose([v.parameters for v in found], [(0.0, 4.0 * x) for x in (0.01, 0.03, 0.1, 0.3)])
     assert [v.amplitudes.tolist() for v in found] == 4 * [[0]]
     assert (found[0].low[0], found[0].high[0]) == (0.0, np.inf)
+
+
+def test_a_stop_stands_inside_the_travel_on_one_side():
+    """Outside it would be a straight line or nothing, and on both sides a spring."""
+    found = variants(assembly(place=2.0, middle=7.0), PlacedEffect(get_effect("end_stop"), "joint1"))
+    places = [v.parameters[2] for v in found]
+    assert 6.0 < min(places) < 6.1
+    assert 7.9 < max(places) < 8.0
+    assert {tuple(map(tuple, v.subsets())) for v in found} == {((0,), (1,))}
 
 
 def shape(name, n):
@@ -147,7 +157,8 @@ def test_every_effect_is_tried_at_every_place_that_has_it_not():
     at_joints |= {f"{e.name}.joint1{sign}joint2" for e in joints if e.neighbours for sign in "+-"}
     at_links = {f"{e.name}.link{k}" for e in effects().values() if e.at == "link" for k in (1, 2)}
     sensors = {f"{e.name}.tau.joint{k}" for e in effects().values() if e.at == "sensor" for k in (1, 2)}
-    assert whole == at_joints | at_links | sensors | {"sensor_delay.q.joint1", "sensor_delay.q.joint2"}
+    at_beams = {f"{e.name}.link1" for e in effects().values() if e.elsewhere}  # the last link carries no joint
+    assert whole == at_joints | at_links | at_beams | sensors | {"sensor_delay.q.joint1", "sensor_delay.q.joint2"}
     assert keys(arm(inertia="free")) == whole - at_links
     assert keys(arm(("viscous_friction", "joint2"))) == whole - {"viscous_friction.joint2"}
 
@@ -254,3 +265,20 @@ def test_parameters_count_if_they_move_the_torque_once_the_amplitudes_are_on(ask
     assert free_parameters(*model, variant("joint_elasticity", [])) == ("stiffness", "damping")
     asked.columns = COLUMNS * [1.0, 0.0]
     assert free_parameters(*model, variant("stribeck_friction", [0])) == ("level",)
+
+
+def test_of_a_series_the_next_term_is_tried_where_there_is_one():
+    """At the first joint a second, then a third; at the other the first alone. All terms are one law."""
+    ripple = get_effect("torque_ripple")
+
+    def tried(*there):
+        found = library(arm(*((name, "joint1") for name in there)))
+        return {p.key: p.effect for p in found if p.key.startswith("torque_ripple")}
+
+    assert set(tried()) == {"torque_ripple.joint1", "torque_ripple.joint2"}
+    assert set(tried("torque_ripple")) == {"torque_ripple_2.joint1", "torque_ripple.joint2"}
+    third = tried("torque_ripple", "torque_ripple_2")
+    assert set(third) == {"torque_ripple_3.joint1", "torque_ripple.joint2"}
+    assert third["torque_ripple_3.joint1"].law is ripple.law
+    assert set(tried("torque_ripple_2")) == {"torque_ripple.joint1", "torque_ripple.joint2"}
+    assert "torque_ripple_3.joint1" not in tried("torque_ripple", *(f"torque_ripple_{k}" for k in range(2, 10)))

@@ -1,6 +1,6 @@
 """A kind of recording is one class: channels that are linear in two effects, searched and confirmed like any other."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,10 +9,11 @@ import pytest
 
 from snarelab.errors import InputError
 from snarelab.identification.deciding import BASELINE_OWN
+from snarelab.identification.nuisance.covariance import Covariance
 from snarelab.identification.nuisance.noise import NoiseChannel
 from snarelab.identification.sources.answer import rms
 from snarelab.identification.sources.decide import decide
-from snarelab.identification.sources.fit import priors
+from snarelab.identification.sources.fit import fit, kept_columns, linearised, priors
 from snarelab.identification.sources.own import known, settled
 from snarelab.identification.sources.source import GridPoint, ModelPoint
 from snarelab.identification.sources.stages import stages
@@ -134,6 +135,45 @@ def test_each_name_is_a_stage_and_every_other_is_fitted_again():
     expected = np.linalg.lstsq(both, beside, rcond=None)[0][0]
     assert second[1].at.values[0] == pytest.approx(expected, rel=0.05)
     assert rms(third[2])[0] < 0.5 * rms(second[2])[0] < rms(first[2])[0]
+
+
+class Grease(Slide):
+    """A carriage whose viscous friction is known to a tolerance, over which it bends, unless the effect has it."""
+
+    def coefficient(self, at):
+        (s,) = at.shifts
+        return at.all_values.get(f"{VISCOUS.key}.coefficient", 0.1 * s + 0.05 * s**2)
+
+    def predicted(self, i, at):
+        return self.coefficient(at) * self.columns_of(i)[VISCOUS.key][:, None]
+
+    def shift_slopes(self, i, at, here):
+        slope = 0.0 if at.placed else 0.1 + 0.1 * at.shifts[0]
+        return slope * self.columns_of(i)[VISCOUS.key][:, None, None]
+
+
+WHITE = [[Covariance(np.full(N, 0.05**2), [], None, STEP, (slice(0, N),))] for _ in range(2)]
+
+
+def test_a_tolerance_that_bends_is_fitted_to_where_it_ends():
+    """0.1 s + 0.05 s^2 = 0.8. Slopes of the start, a quarter of those there, would not settle."""
+    slide = Grease(((0.8, 0.0, 0.0),) * 3, bent=True)
+    found = fit(slide, NONE, NONE, WHITE, None, 8)
+    assert found.at.shifts == pytest.approx([(np.sqrt(0.17) - 0.1) / 0.1], abs=0.02)
+    np.testing.assert_allclose(found.columns[0], slide.shift_slopes(0, found.at, None))
+
+
+def test_an_effect_in_place_of_a_tolerance_is_fitted_although_the_tolerance_had_moved():
+    """Beside the column that the tolerance had, the effect stays where it starts: the tolerance moves, and does
+    nothing."""
+    slide = Grease(((0.8, 0.0, 0.0),) * 3, bent=True)
+    before = linearised(slide, slide.train, ModelPoint.of((), {}, 1))
+    start = replace(NONE, shifts=np.array([2.0])).with_effects([VISCOUS], {f"{VISCOUS.key}.coefficient": 0.3})
+    found = fit(slide, NONE, start, WHITE, kept_columns(slide, before), 8)
+    speed = np.concatenate([slide.columns_of(i)[VISCOUS.key] for i in slide.train])
+    force = np.concatenate([slide.measured(i)[:, 0] for i in slide.train])
+    assert found.at.values == pytest.approx([speed @ force / (speed @ speed)], rel=1e-3)
+    assert found.at.shifts == pytest.approx([0.0], abs=0.02)
 
 
 def named(found):
