@@ -32,7 +32,7 @@ def delivered(
         Positions and rates, now and at the start; the drives have had the command of the start for ever.
     """
     torque, rates = ca.SX(command), []
-    at_start = ca.substitute(command, ca.vertcat(*motion), ca.vertcat(*start))
+    at_start = ca.substitute(command, ca.vertcat(*motion), ca.densify(ca.vertcat(*start)))
     # The reading is the last effect's; what is delivered is before the first.
     late = [p for p in laws.at("sensor") if p.effect.leads]
     for p in reversed(late):

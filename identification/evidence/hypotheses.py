@@ -18,7 +18,7 @@ from ..fitting.assembly import TorqueEvaluation, TorqueModel
 from ..fitting.experiment import Experiment, Scales
 from ..fitting.periodogram import Peaks
 from ..nuisance.curve import SMALL, Coordinates, family
-from ..search.candidates import MOST_OF_WHOLE, EffectVariant, candidate_columns, library, reduced, variants
+from ..search.candidates import MOST_OF_WHOLE, EffectVariant, candidate_columns, library, reduced, shifts, variants
 from .pool import CandidateColumns, Hypothesis, Item
 
 Array = NDArray[np.float64]
@@ -129,6 +129,8 @@ def pool(
         if p.effect.at != "joint":
             steps = (float(np.log(odds / n)),)
         apart = parts_of(p) | {k for k, (x, _) in named.items() if key in parts_of(x)}
+        if joint := shifts(p):  # late or early: one of the two
+            apart |= {k for k, (x, _) in named.items() if k != key and shifts(x) == joint}
         found.append(Hypothesis(key, True, tuple(items), steps[0], p, name, steps[1:], apart))
     each = float(np.log(ODDS_OF_CURVES / max(len(by_words), 1)))
     return found + [

@@ -69,6 +69,12 @@ class EffectVariant:
         return full
 
 
+def shifts(p: PlacedEffect) -> str | None:
+    """The joint whose torque an effect makes late or early against its motion, if it does that."""
+    kind, _, joint = p.at.partition(".")
+    return joint if p.effect.at == "sensor" and p.effect.states and kind in ("tau", "q") else None
+
+
 def library(model: Model) -> list[PlacedEffect]:
     """Every effect at every place that the model does not have and that its kind of inertia allows."""
     have = {p.key for p in model.effects}
@@ -76,8 +82,7 @@ def library(model: Model) -> list[PlacedEffect]:
         if p.effect.at == "slide" and p.at == model.joints[0]:
             # The first joint's slides act on it alone, so that the same law at the joint is the same column.
             have |= {f"{name}.{p.at}" for name in _at_joints(p.effect)}
-    delayed = [p.at.partition(".") for p in model.effects if p.effect.at == "sensor" and p.effect.states]
-    shifted = {joint for kind, _, joint in delayed if kind in ("tau", "q")}
+    shifted = {shifts(p) for p in model.effects}
     found = []
     for effect in (effect_on(e, model.tree) for e in effects().values()):
         if effect.at == "link" and model.inertia == "free":

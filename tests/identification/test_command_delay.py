@@ -10,7 +10,7 @@ from bench.arm import random_arm
 from bench.lugre import LuGre
 from bench.machine_parts import Queue
 from bench.motion import fourier_motion, point_to_point_motion
-from bench.mujoco_plant import CONTROL_RATE, Plant, simulate, write_csv
+from bench.mujoco_plant import Plant, simulate, write_csv
 from bench.parts import Disturbance
 from snarelab.identification.diagnose import diagnose
 from snarelab.models.model_file import load_model
@@ -46,7 +46,7 @@ def diagnosed(folder, seed, joints, **concealed):
 @pytest.mark.parametrize(("seed", "delay"), [(5, 0.01), pytest.param(4, 0.02, marks=pytest.mark.slow)])
 def test_a_late_drive_of_an_arm_is_named_with_its_delay(tmp_path, seed, delay):
     """A late encoder would move the other joints' torque: it is no rival that cannot be told apart."""
-    found = diagnosed(tmp_path, seed, 3, motor={"joint2": Queue(round(delay * CONTROL_RATE))})
+    found = diagnosed(tmp_path, seed, 3, motor={"joint2": Queue(round(delay / 2.5e-4))})
     (only,) = found.effects
     assert (only.name, only.at) == ("command_delay", "tau.joint2"), found.sentence
     assert only.parameters["delay"].value == pytest.approx(delay, rel=0.15)
@@ -55,7 +55,7 @@ def test_a_late_drive_of_an_arm_is_named_with_its_delay(tmp_path, seed, delay):
 
 def test_of_one_joint_a_late_drive_and_a_late_encoder_are_one_answer(tmp_path):
     """Both are told, and what to measure: along one joint's own motion they make the same torque."""
-    found = diagnosed(tmp_path, 5, 1, motor={"joint1": Queue(round(0.02 * CONTROL_RATE))})
+    found = diagnosed(tmp_path, 5, 1, motor={"joint1": Queue(round(0.02 / 2.5e-4))})
     (only,) = found.effects
     rivals = [r for r in only.rivals if not r.separable]
     alike = {(only.name, only.at), *((r.name, r.at) for r in rivals)}
