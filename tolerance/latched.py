@@ -58,7 +58,7 @@ def outcome(
     whole = co_simulate_whole(
         start, passive, rubbing, docking, table, scale=scale, sizes=sizes, touching=TOUCHING, until=WAY_OUT
     )
-    if whole.fault and whole.final == "CLOSE":
+    if whole.fault:
         return Outcome.failed(whole.fault)
     d = docked_of(whole)
     row = min(int(np.searchsorted(d.times, END - 1e-9)), len(d.times) - 1)

@@ -11,9 +11,11 @@ from .enclosure import turned
 from .ground import AXES as HUNG
 from .latched import SEAT, SOURCES, outcome
 
-SCALE, SIZES = 0.25, {"CLOSE": 2.5e-3} | dict.fromkeys(("SETTLE", "SNUG", "SLIDE"), 5e-3)
+SCALE = 0.25
+SIZES = {"CLOSE": 2.5e-3} | dict.fromkeys(("SETTLE", "SNUG", "SLIDE"), 5e-3)
+SIZES |= dict.fromkeys(("PRELOAD", "LATCH", "LATCHED"), 2e-3)
 """Of the macro steps, and those [s] that differ from the orbits': the cables that hug its pin are coupled in steps to a
-target of 25 kg, and from 2 ms on that rings."""
+target of 25 kg. Slack, that rings from 2 ms on; taut, as carriage and grooves press it, from 1 ms on."""
 AXES = (*(a for a in HUNG if a.name != "wait"), SEAT)
 
 

@@ -1,6 +1,7 @@
 """Tolerances of the latch: where a case ends, fewer and coarser ways, and how failures are told."""
 
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -9,6 +10,7 @@ import pytest
 from snarelab.errors import InputError
 from snarelab.models.hanging import CRADLE, CRADLE_DAMPING, hanging_wrench
 from snarelab.models.snare.target import Target
+from snarelab.tolerance import latched
 from snarelab.tolerance.box import why_the_box_fails
 from snarelab.tolerance.capture import Outcome, find_capture
 from snarelab.tolerance.latched import ended_in
@@ -156,6 +158,18 @@ def test_a_run_ended_in_the_last_state_before_the_way_out():
     assert ended_in(Gone("CLOSE", "SEAT", "LATCHED")) == "LATCHED"  # pyright: ignore[reportArgumentType]
     assert ended_in(Gone("CLOSE", "SEAT", "UNLOAD")) == "SEAT"  # pyright: ignore[reportArgumentType]
     assert ended_in(Gone("CLOSE", "OPEN")) == "CLOSE"  # pyright: ignore[reportArgumentType]
+
+
+@pytest.mark.parametrize("state", ["CLOSE", "PRELOAD"])
+def test_a_run_that_could_not_be_computed_is_no_failure_to_latch(monkeypatch, state):
+    """In whichever state the solver gave up, nothing is known of the mechanism."""
+    capture = find_capture("latched-ground")
+    stopped = SimpleNamespace(fault="the solver did not converge", final=state)
+    monkeypatch.setattr(latched, "co_simulate_whole", lambda *_, **__: stopped)
+    found = capture.run({axis.name: axis.nominal for axis in capture.axes})
+    assert found.reason == stopped.fault
+    assert not found.state
+    assert np.isnan(found.latched)
 
 
 def test_every_latched_capture_is_built_in():
