@@ -63,7 +63,7 @@ def test_names_what_is_missing_in_order(folder):
     found = json.loads((folder / "diagnosis.json").read_text())
     assert found["verdict"] == "missing_physics"
     names = [(e["name"], e["at"]) for e in found["effects"]]
-    # No law beside another that holds it. The force is the controller's output; of one axis, a late encoder looks alike.
+    # No law beside another that holds it. The force is what the controller asks for; a late encoder looks alike.
     assert names == [("coulomb_friction", "slide"), ("asymmetric_friction", "slide"), ("command_delay", "tau.slide")]
     assert ("sensor_delay", "q.slide") in {
         (r["name"], r["at"]) for r in found["effects"][2]["rivals"] if not r["separable"]
