@@ -116,4 +116,4 @@ def test_following_a_motion_the_torque_is_the_delivered_one(tmp_path):
     found = simulate(model, tmp_path / "motion.csv")
     given = np.interp(found["time"].values + LATE, time, needed)
     inner = (found["time"].values > 0.3) & (found["time"].values < 2.7)
-    np.testing.assert_allclose(found["tau.joint1"].values[inner], given[inner], atol=0.01 * np.std(given))
+    np.testing.assert_allclose(found["tau.joint1"].values[inner], given[inner], atol=0.01 * float(np.std(given)))

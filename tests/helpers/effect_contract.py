@@ -35,7 +35,8 @@ def evaluate(effect, s, parameters) -> LawEvaluation:
     """Along the samples; of what leads, against time, as a fit has it."""
     way = slice(None, None, -1 if effect.leads else 1)
     found = evaluate_law(effect, {name: x[way] for name, x in s.items()}, np.asarray(parameters), dt=DT)
-    return LawEvaluation(*(x if x is None else x[way] for x in found))
+    values, by_parameter, *others = found
+    return LawEvaluation(values[way], by_parameter[way], *(x if x is None else x[way] for x in others))
 
 
 def baseline(effect, s):

@@ -50,7 +50,7 @@ def confirmed(monkeypatch, some, missed, told=None):
     """`confirm` with a fit that is the set of names it has, and what is missed of each given by a function."""
     densities = iter(range(100))
     nothing = np.zeros(0), np.zeros((0, 0))
-    monkeypatch.setattr(module, "forecast", lambda *_: PredictiveDensity(float(next(densities)), np.zeros(4), *nothing))
+    monkeypatch.setattr(module, "forecast", lambda *_: PredictiveDensity(float(next(densities)), (), *nothing))
     monkeypatch.setattr(module, "known_to", lambda fit, _: fit)
     monkeypatch.setattr(module, "_missed", missed)
     model: Any = SimpleNamespace(effects=tuple(n.placed for n in some))
@@ -138,7 +138,7 @@ def test_deviations_are_about_the_reported_value():
     """Those of a posterior that is 0.3 and -0.4 off the fit; what the fit cannot determine stays so, and what the
     evidence holds, the fourth, is known as well as the fit knows it."""
     mean, variance = np.array([0.3, -0.4, 0.0, 0.0]), np.diag([0.16, 0.09, 0.01, 0.0])
-    told = PredictiveDensity(0.0, np.zeros(4), mean, variance)
+    told = PredictiveDensity(0.0, (), mean, variance)
     own = np.diag([0.01, 81.0, 0.0, 4.0])
     at_bound, std = np.zeros(4, bool), np.array([0.1, 9.0, np.inf, 2.0])
     fit = Fit(cast(Any, None), np.ones(4), std, own, np.ones(1), 1.0, at_bound, 1, 1)
