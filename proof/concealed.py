@@ -157,7 +157,7 @@ def _drift(m: Planned, rms: float, rng: Rng) -> Concealed:
     return Concealed(f"tau.{m.name}", x, plant={"tau_drift": {m.name: Drift(x, slow)}})
 
 
-NOT_YET = ("gear_efficiency", "motor_saturation", "heating_friction", "end_stop", "joint_spring")
+NOT_YET = ("gear_efficiency", "motor_saturation", "heating_friction", "end_stop", "joint_spring", "command_delay")
 """Effects of an arm that the plant cannot conceal yet: nothing is proved of them."""
 
 MAKERS: dict[str, Maker] = {
