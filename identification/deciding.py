@@ -64,7 +64,7 @@ BURST_SHARE = 0.2
 """Share of the residual's energy in loud windows from which on they are bursts."""
 
 # The answer.
-GATE = 1.0
+GATE = 2.0
 """What a name must gain on the held-out recordings [standard errors over blocks of time]."""
 CLASS = 0.1
 """Posterior share from which on a rival in a name's place is not separable from the name."""

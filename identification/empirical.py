@@ -6,7 +6,7 @@ between modules: Liu, Bayarri and Berger 2009). The held-out recordings confirm 
 with it and without.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -51,18 +51,21 @@ def empirical_laws(
     found: list[EmpiricalLaw] = []
     named = {n.placed.key for n in decided.best.names}
     for c in sorted({r.channel for r in decided.left.curves if r.channel >= carriers}):
-        curves = [r for r in decided.left.curves if r.channel == c]
+        curves = [r for r in decided.left.curves if r.channel == c]  # what explains most comes first
         wanted = list(dict.fromkeys(x for x in (read_words(r.over) for r in curves) if x))
         at = joints[c].name
-        have = [p for p in final.assembly.placed if p.effect.name == NAME and p.at == at]
-        if not wanted or have:
+        if any(p.effect.name == NAME and p.at == at for p in final.assembly.placed):
             continue
-        tables, values = _tables(decided, final, train, c, wanted, named)
-        other = _refitted(final, placed_tables(at, tables), values, train, named)
-        gain, sure = _confirmed(decided, final, other, train, held, c)
-        if sure > GATE:
-            final = other
-            found.append(EmpiricalLaw(at, tables, values, gain, sure))
+        # Tables that are not confirmed together may be without the least of them.
+        while wanted:
+            tables, values = _tables(decided, final, train, c, wanted, named)
+            other = _refitted(final, placed_tables(at, tables), values, train, named)
+            gain, sure = _confirmed(decided, final, other, train, held, c)
+            if sure > GATE:
+                final = other
+                found.append(EmpiricalLaw(at, tables, values, gain, sure))
+                break
+            wanted.pop()
     return final, tuple(found)
 
 
@@ -140,12 +143,14 @@ def _effect_of(of: FreeParameter) -> str:
 def _confirmed(
     decided: ArmDecision, before: Fit, after: Fit, train: Sequence[Experiment], held: Sequence[Experiment], c: int
 ) -> tuple[float, float]:
-    """Log density that the held-out recordings gain on a channel, and that in its standard errors over blocks."""
+    """Log density that the held-out recordings gain on a channel, and that in its standard errors over blocks; of the
+    samples for which the tables have data. Elsewhere they hold their end values, which is no prediction."""
     rows = decided.best.found.weighed.evidence.channels[len(train) :]
+    inside = [e.to_band(_known(after, e, c), c)[:, None] > 0.5 for e in held]
     without, with_it = (
         [
-            Remaining.of([f.assembly.residual(e, f.theta)[0][:, c]], [row[c].covariance])
-            for e, row in zip(held, rows, strict=True)
+            Remaining.of([f.assembly.residual(e, f.theta)[0][:, c]], [row[c].covariance]).at(here)
+            for e, row, here in zip(held, rows, inside, strict=True)
         ]
         for f in (before, after)
     )
@@ -153,19 +158,29 @@ def _confirmed(
     return gain, gain / max(scatter(without, with_it, [partial(blocks, e) for e in held]), 1e-12)
 
 
-def beyond(assembly: TorqueModel, e: Experiment, theta: Array) -> list[str]:
-    """For each table that a motion leaves the data of: one line that says so, and that it is held there."""
-    said = []
+def _coordinates(assembly: TorqueModel, e: Experiment, theta: Array) -> Iterator[tuple[str, str, Array, Array]]:
+    """Of each table's coordinates: its joint, the coordinate's name, its values along a motion (n,), and its knots."""
     for p in assembly.placed:
         for t in tables_of(p.effect):
-            c = assembly.joint_of(p)
             load = assembly.evaluate(e, theta).load
-            read = _read(assembly, e, load, c, t.over, t.times)[:-1]
-            for name, x, knots in zip(t.over, read, t.knots, strict=True):
-                out = float(np.mean((x < knots[0]) | (x > knots[-1])))
-                if out > 0:
-                    said.append(
-                        f"the empirical law at {p.at} has data for {name} from {knots[0]:.4g} to {knots[-1]:.4g}; the "
-                        f"motion goes from {x.min():.4g} to {x.max():.4g}: outside, its end value is held"
-                    )
-    return said
+            read = _read(assembly, e, load, assembly.joint_of(p), t.over, t.times)[:-1]
+            yield from ((p.at, *x) for x in zip(t.over, read, t.knots, strict=True))
+
+
+def _known(final: Fit, e: Experiment, c: int) -> Array:
+    """1 along a motion where a joint's tables have data, 0 elsewhere (n,)."""
+    assembly, found = final.assembly, np.ones(len(e.motion.time))
+    for at, _, x, knots in _coordinates(assembly, e, final.theta):
+        if at == assembly.tree.joints[c].name:
+            found[(x < knots[0]) | (x > knots[-1])] = 0.0
+    return found
+
+
+def beyond(assembly: TorqueModel, e: Experiment, theta: Array) -> list[str]:
+    """For each table that a motion leaves the data of: one line that says so, and that it is held there."""
+    return [
+        f"the empirical law at {at} has data for {name} from {knots[0]:.4g} to {knots[-1]:.4g}; the motion goes from "
+        f"{x.min():.4g} to {x.max():.4g}: outside, its end value is held"
+        for at, name, x, knots in _coordinates(assembly, e, theta)
+        if np.any((x < knots[0]) | (x > knots[-1]))
+    ]

@@ -21,6 +21,7 @@ from ..fitting.fit import Fit, channel_rms
 from ..search.refit import without
 from .arm import weigh
 from .gain import Remaining, scatter
+from .nearly import without_its_curves
 from .projected import ProjectedEvidence
 from .selection import ArmNaming, ArmSelection
 
@@ -202,7 +203,9 @@ def _missed(
     """Take one effect out of a fit, and fit the rest again."""
     key = name.placed.key
     rest = without(final, [key], train, found.first)
-    other = forecast(_without(model, key), rest, found, train, held, scales)
+    beside = without_its_curves(found, name.channels, final, rest, train)
+    whole = whole if beside is found else forecast(model, final, beside, train, held, scales)
+    other = forecast(_without(model, key), rest, beside, train, held, scales)
     c = list(name.channels)
     with_it, measured = channel_rms(final.assembly, held, final.theta)
     rms, _ = channel_rms(rest.assembly, held, rest.theta)

@@ -32,6 +32,10 @@ class Remaining:
         solved = [k.solve(e) for e, k in zip(residuals, covariances, strict=True)]
         return cls(np.stack(residuals, 1), np.stack(solved, 1))
 
+    def at(self, samples: Array) -> "Remaining":
+        """Of some samples only: a mask (n, 1)."""
+        return Remaining(self.residual * samples, self.weighed * samples)
+
     @property
     def energy(self) -> Array:
         """Each sample's part of e' K⁻¹ e, all channels together (n,)."""

@@ -29,13 +29,13 @@ def confirmed(monkeypatch, sure: float) -> bool:
     return bool(confirming.confirm(found, [], [], {}, lambda _: None).names)
 
 
-def test_a_name_is_confirmed_from_one_standard_error_on(monkeypatch):
-    assert [confirmed(monkeypatch, x) for x in (0.6, 0.99, 1.01, 1.9)] == [False, False, True, True]
+def test_a_name_is_confirmed_from_two_standard_errors_on(monkeypatch):
+    assert [confirmed(monkeypatch, x) for x in (1.2, 1.99, 2.01, 3.8)] == [False, False, True, True]
     for factor in FACTORS:
         with monkeypatch.context() as patch:
             move(patch, "GATE", factor)
-            assert confirmed(patch, 0.6) is (factor < 1)
-            assert confirmed(patch, 1.9) is (factor < 1)
+            assert confirmed(patch, 1.2) is (factor < 1)
+            assert confirmed(patch, 3.8) is (factor < 1)
 
 
 def test_blocks_of_time(monkeypatch):

@@ -66,3 +66,10 @@ def test_blocks_of_two_recordings_and_channels_count_together():
     gained = (r**2 - (r - d) ** 2).sum(axis=2).reshape(12, 10).sum(axis=1) / 8
     expected = (d**2).sum(axis=2).reshape(12, 10).sum(axis=1) / 8
     assert found == pytest.approx(standard_error(gained, expected), rel=1e-9)
+
+
+def test_what_remains_of_some_samples():
+    """The others count as if nothing had been measured there."""
+    left = Remaining(np.array([[1.0, 2.0], [3.0, 4.0]]), np.array([[0.5, 1.0], [1.0, 2.0]]))
+    np.testing.assert_array_equal(left.energy, [2.5, 11.0])
+    np.testing.assert_array_equal(left.at(np.array([[1.0], [0.0]])).energy, [2.5, 0.0])

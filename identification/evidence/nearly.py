@@ -1,0 +1,51 @@
+"""Curves that a name nearly is: beside them nothing is asked of the name."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..deciding import NEARLY
+from ..fitting.experiment import Experiment
+from ..fitting.fit import Fit
+from .members import Members
+from .selection import ArmSelection
+
+
+def without_its_curves(
+    found: ArmSelection, channels: Sequence[int], final: Fit, rest: Fit, train: Sequence[Experiment]
+) -> ArmSelection:
+    """A search without the curves of which a name is the larger part.
+
+    Without the name, a curve v beside it would grow to d + v, d what the name adds: the curve has its coordinates, and
+    can be the name. If d by itself is nearly d + v, the name is named in the curve's place (`rounds.as_names`), and the
+    curve is what it leaves; so it does not stand in for the name where the name is tried.
+
+    Parameters
+    ----------
+    found : ArmSelection
+    channels : sequence of int
+        That the name reaches.
+    final, rest : Fit
+        With the name, and without it.
+    train : sequence of Experiment
+    """
+    evidence, pool = found.weighed.evidence, found.weighed.pool
+    members = Members(found.search.on, [(s.taken.item, s.taken.size) for s in found.slots])
+    kept = []
+    for s in found.slots:
+        if pool[s.taken.hypothesis].named or pool[s.taken.hypothesis].label[0] not in channels:
+            kept.append(s)
+            continue
+        c, amplitudes = pool[s.taken.hypothesis].label[0], members.of(s.taken.item)
+        own, both, cross = 0.0, 0.0, 0.0
+        for i, e in enumerate(train):
+            d = rest.assembly.residual(e, rest.theta)[0][:, c] - final.assembly.residual(e, final.theta)[0][:, c]
+            whole = d + evidence.contribution(i, c, evidence.items[s.taken.item], amplitudes)
+            weighed = evidence.channels[i][c].covariance.solve(whole)
+            own += float(d @ evidence.channels[i][c].covariance.solve(d))
+            both += float(whole @ weighed)
+            cross += float(d @ weighed)
+        if np.square(max(cross, 0.0)) <= NEARLY * own * both:
+            kept.append(s)
+    return found if len(kept) == len(found.slots) else replace(found, slots=tuple(kept))
