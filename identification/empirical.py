@@ -146,7 +146,7 @@ def _confirmed(
     """Log density that the held-out recordings gain on a channel, and that in its standard errors over blocks; of the
     samples for which the tables have data. Elsewhere they hold their end values, which is no prediction."""
     rows = decided.best.found.weighed.evidence.channels[len(train) :]
-    inside = [e.to_band(_known(after, e, c), c)[:, None] > 0.5 for e in held]
+    inside = [np.round(e.to_band(_known(after, e, c), c))[:, None] for e in held]
     without, with_it = (
         [
             Remaining.of([f.assembly.residual(e, f.theta)[0][:, c]], [row[c].covariance]).at(here)
@@ -158,7 +158,9 @@ def _confirmed(
     return gain, gain / max(scatter(without, with_it, [partial(blocks, e) for e in held]), 1e-12)
 
 
-def _coordinates(assembly: TorqueModel, e: Experiment, theta: Array) -> Iterator[tuple[str, str, Array, Array]]:
+def _coordinates(
+    assembly: TorqueModel, e: Experiment, theta: Array
+) -> Iterator[tuple[str, str, Array, Sequence[float]]]:
     """Of each table's coordinates: its joint, the coordinate's name, its values along a motion (n,), and its knots."""
     for p in assembly.placed:
         for t in tables_of(p.effect):
