@@ -17,10 +17,10 @@ def without_its_curves(
 ) -> ArmSelection:
     """A search without the curves of which a name is the larger part.
 
-    Without the name, a curve v on its channel could grow to d + v, d what the name adds. If d by itself is nearly d + v,
-    the name is named in the curve's place (`rounds.as_names`), and the curve is what it leaves; so it does not stand in
-    for the name where the name is tried. Whether the curve has coordinates by which it can grow so is not asked: a
-    curve that cannot is missed alike with the name and without it.
+    Without the name, a curve v on its channel could grow to d + v, d what the name adds. If d by itself is nearly
+    d + v, the name is named in the curve's place (`rounds.as_names`), and the curve is what it leaves; so it does not
+    stand in for the name where the name is tried. Whether the curve has coordinates by which it can grow so is not
+    asked: a curve that cannot is missed alike with the name and without it.
 
     Parameters
     ----------
