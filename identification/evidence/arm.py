@@ -18,10 +18,11 @@ from ..nuisance.noise import Noise, NoiseChannel, learn
 from ..nuisance.rest import SETTLES, STICKS, share
 from ..search.candidates import library
 from .evidence import Evidence, ResidualChannel
-from .hypotheses import ColumnSource, Curves, curves, names, pool
+from .hypotheses import ColumnSource, Curves, curves, names
 from .nuisance_columns import NuisanceColumns, beside, regressor_columns
 from .periods import Periods, rough_noise
 from .pool import CandidateColumns, Hypothesis, Item
+from .prior import pool
 
 Array = NDArray[np.float64]
 

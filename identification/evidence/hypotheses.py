@@ -1,10 +1,9 @@
-"""Named effects and nameless curves of an arm's joints as hypotheses: columns, priors, odds."""
+"""Named effects and nameless curves of an arm's joints as hypotheses: their columns."""
 
 import functools
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from math import factorial
 
 import casadi as ca
 import numpy as np
@@ -13,13 +12,13 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ...models.effect import Effect
 from ...models.model import Model, PlacedEffect
-from ..deciding import BENDS, ELSEWHERE, ODDS_OF_CURVES, ODDS_OF_NAMES, SLOPE
+from ..deciding import BENDS, SLOPE
 from ..fitting.assembly import TorqueEvaluation, TorqueModel
 from ..fitting.experiment import Experiment, Scales
 from ..fitting.periodogram import Peaks
 from ..nuisance.curve import SMALL, Coordinates, family
-from ..search.candidates import MOST_OF_WHOLE, EffectVariant, candidate_columns, library, reduced, shifts, variants
-from .pool import CandidateColumns, Hypothesis, Item
+from ..search.candidates import MOST_OF_WHOLE, EffectVariant, candidate_columns, library, reduced, variants
+from .pool import CandidateColumns, Item
 
 Array = NDArray[np.float64]
 Curves = Mapping[tuple[int, str], Item]
@@ -108,44 +107,6 @@ def parts_of(p: PlacedEffect) -> frozenset[str]:
     """Keys of the laws of which a whole law is another way to write the sum; none of any other law."""
     whole = p.effect.at == "joint" and len(p.effect.contains) > 1
     return frozenset(f"{x}.{p.at}" for x in p.effect.contains) if whole else frozenset()
-
-
-def pool(
-    named: Mapping[str, tuple[PlacedEffect, list[Item]]], by_words: Curves, there: Sequence[PlacedEffect]
-) -> list[Hypothesis]:
-    """Hypotheses with their prior odds: shared by the effects, and by the places of each (Scott and Berger 2010).
-
-    An effect that is ``there`` in the model counts as one of its places."""
-    names = [p.effect.name for p, _ in named.values()]
-    odds = ODDS_OF_NAMES / max(len(set(names)), 1)
-    found = []
-    for key, (p, items) in named.items():
-        name = p.effect.name
-        have = sum(x.effect.name == name for x in there)
-        n = have + names.count(name)
-        # Joints are made alike; a sensor's fault, or a wrong mass, is an accident of one place.
-        logs = [log_share_of_places(k, n) for k in range(1, n + 1)]
-        steps = (float(np.log(odds)) + logs[0], *(b - a for a, b in pairwise(logs)))[have:]
-        if p.effect.at != "joint":
-            steps = (float(np.log(odds / n)),)
-        apart = parts_of(p) | {k for k, (x, _) in named.items() if key in parts_of(x)}
-        if joint := shifts(p):  # late or early: one of the two
-            apart |= {k for k, (x, _) in named.items() if k != key and shifts(x) == joint}
-        found.append(Hypothesis(key, True, tuple(items), steps[0], p, name, steps[1:], apart))
-    each = float(np.log(ODDS_OF_CURVES / max(len(by_words), 1)))
-    return found + [
-        Hypothesis(f"curve.{c}.{words}", False, (item,), each, item.label) for (c, words), item in by_words.items()
-    ]
-
-
-def log_share_of_places(k: int, n: int) -> float:
-    """Log probability that an effect which is there acts at k given places of its n.
-
-    It acts at one place alone, each as likely; or at every place with a probability ρ of which nothing is known but
-    that it is not zero: ∫ρ^k (1 - ρ)^(n-k) dρ = k! (n - k)! / (n + 1)!.
-    """
-    every = factorial(k) * factorial(n - k) / factorial(n + 1) * (n + 1) / n
-    return float(np.log(ELSEWHERE * every + (1 - ELSEWHERE) * (k == 1) / n))
 
 
 def _items(along: ColumnSource, p: PlacedEffect, by_words: Curves, columns: CandidateColumns) -> list[Item]:

@@ -11,9 +11,9 @@ from ...models.model import PlacedEffect
 from ..deciding import DISCREPANCY, LAW_ERROR
 from ..evidence.arm import WeighedRecordings, principal
 from ..evidence.evidence import Evidence, ResidualChannel
-from ..evidence.hypotheses import pool
 from ..evidence.nuisance_columns import NuisanceColumns
 from ..evidence.pool import CandidateColumns, Item
+from ..evidence.prior import pool
 from ..evidence.projected import ProjectedEvidence
 from ..evidence.search import Search
 from ..nuisance.curve import SMALL

@@ -9,7 +9,7 @@ from explained import Explained, white
 
 from snarelab.identification import deciding
 from snarelab.identification.evidence.evidence import ResidualChannel
-from snarelab.identification.evidence.hypotheses import pool
+from snarelab.identification.evidence.prior import pool
 from snarelab.identification.evidence.projected import ProjectedEvidence
 from snarelab.identification.evidence.search import Search
 from snarelab.identification.nuisance.rest import Zone
