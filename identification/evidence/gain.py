@@ -2,9 +2,11 @@
 
 With the residual r without the explanation and r - d with it, and the noise covariance K, a block b gains
 g_b = (r' K⁻¹ r - (r - d)' K⁻¹ (r - d)) / 2. It is expected to gain e_b = d' K⁻¹ d / 2 if the explanation is true, and
-to lose as much if it is not. A law acts where the motion takes it: a block in which it does little says little, and
-that such a block gains little is no scatter. So the sum of the gains is G = R E, with E the sum of e_b, and the
-standard error of the ratio R = G / E is the jackknife's over the blocks (Miller 1974).
+to lose as much if it is not; either way its variance is d' K⁻¹ d = 2 e_b. A law acts where the motion takes it: a block
+in which it does little says little, and that such a block gains little is no scatter. So the blocks gain g_b = R e_b,
+with one ratio R for all of them, and the variance of their sum is 2 φ E, with E the sum of e_b. The dispersion φ is 1
+where the noise is what the model says; it is estimated from the blocks, by moments (McCullagh and Nelder 1989, section
+4.5).
 """
 
 from collections.abc import Callable, Sequence
@@ -61,12 +63,15 @@ def scatter(without: Sequence[Remaining], with_it: Sequence[Remaining], blocks: 
 
 
 def standard_error(gains: Array, expected: Array) -> float:
-    """Standard error of a sum of gains (n,) of which these were expected (n,), by the jackknife of their ratio.
+    """Standard error of a sum of gains (n,) of which these were expected (n,).
 
-    Infinite where one block holds all that was expected: nothing tells how another would have gained.
+    By moments: sum (g - R e)² is expected to be 2 φ sum e (1 - e / E). Infinite where one block holds all that was
+    expected: nothing tells how another would have gained.
     """
-    n, rest = len(gains), expected.sum() - expected
-    if n < 2 or np.any(rest <= 0):
+    whole = expected.sum()
+    free = expected @ (1 - expected / whole) if whole > 0 else 0.0
+    if free <= 0:
         return float("inf")
-    ratio = (gains.sum() - gains) / rest
-    return float(expected.sum() * np.sqrt((n - 1) / n * np.sum((ratio - ratio.mean()) ** 2)))
+    ratio = gains.sum() / whole
+    dispersion = np.sum((gains - ratio * expected) ** 2) / (2 * free)
+    return float(np.sqrt(2 * dispersion * whole))

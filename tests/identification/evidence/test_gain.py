@@ -9,33 +9,51 @@ from snarelab.identification.nuisance.covariance import Covariance
 N_BLOCKS, LENGTH = 16, 40
 
 
-def gains(d: np.ndarray, rng: np.random.Generator, share: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
-    """Gain and expected gain of each block: white noise of one, a law of which a share is true."""
-    r = share * d + rng.normal(size=d.shape)
+def gains(
+    d: np.ndarray, rng: np.random.Generator, share: float = 1.0, noise: float = 1.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Gain and expected gain of each block: white noise that is said to be of one, a law of which a share is true."""
+    r = share * d + noise * rng.normal(size=d.shape)
     return (r * d - d**2 / 2).sum(axis=1), (d**2 / 2).sum(axis=1)
 
 
-@pytest.mark.parametrize("share", [1.0, 0.5, 0.0])
-def test_is_the_deviation_of_the_sum_where_blocks_are_alike(share):
+def deviations(d: np.ndarray, share: float, noise: float) -> tuple[float, float]:
+    """What is told of the sum's deviation, on average over many draws, and what that is."""
     rng = np.random.default_rng(1)
-    d = np.full((N_BLOCKS, LENGTH), 0.3)
-    drawn = [gains(d, rng, share) for _ in range(4000)]
-    told = np.mean([standard_error(g, e) for g, e in drawn])
-    assert told == pytest.approx(np.std([g.sum() for g, _ in drawn]), rel=0.05)
-    # And then it is the usual one.
-    g, e = drawn[0]
+    drawn = [gains(d, rng, share, noise) for _ in range(4000)]
+    return float(np.mean([standard_error(g, e) for g, e in drawn])), float(np.std([g.sum() for g, _ in drawn]))
+
+
+@pytest.mark.parametrize("share", [1.0, 0.5, 0.0])
+@pytest.mark.parametrize("noise", [1.0, 4.0])
+def test_is_the_deviation_of_the_sum_whatever_the_noise_is_said_to_be(share, noise):
+    told, true = deviations(np.full((N_BLOCKS, LENGTH), 0.3), share, noise)
+    assert told == pytest.approx(true, rel=0.05)
+
+
+def test_is_the_usual_one_where_blocks_are_alike():
+    g, e = gains(np.full((N_BLOCKS, LENGTH), 0.3), np.random.default_rng(1))
     assert standard_error(g, e) == pytest.approx(np.std(g, ddof=1) * np.sqrt(N_BLOCKS), rel=1e-9)
 
 
-def test_a_law_that_acts_in_few_blocks_is_as_sure_as_its_noise_lets_it():
+def test_a_block_that_holds_most_does_not_double_the_error():
+    """Of six blocks one holds three quarters of what is expected; a jackknife leaves it out, and tells too much."""
+    d = np.full((6, LENGTH), 0.1)
+    d[0] = 0.45
+    told, true = deviations(d, 1.0, 1.0)
+    assert told == pytest.approx(true, rel=0.15)
+
+
+@pytest.mark.parametrize("noise", [1.0, 3.0])
+def test_a_law_that_acts_in_few_blocks_is_as_sure_as_its_noise_lets_it(noise):
     """Three blocks of sixteen hold nearly all of it: the plain standard error of a sum is six times the deviation."""
-    rng = np.random.default_rng(2)
     d = 0.05 * np.ones((N_BLOCKS, LENGTH))
     d[3:6] = np.array([1.5, 2.0, 2.5])[:, None]
-    drawn = [gains(d, rng) for _ in range(4000)]
-    deviation = np.std([g.sum() for g, _ in drawn])
-    assert np.mean([standard_error(g, e) for g, e in drawn]) == pytest.approx(deviation, rel=0.25)
-    assert np.mean([np.std(g, ddof=1) * np.sqrt(N_BLOCKS) for g, _ in drawn]) > 5 * deviation
+    told, true = deviations(d, 1.0, noise)
+    assert told == pytest.approx(true, rel=0.25)
+    rng = np.random.default_rng(2)
+    plain = np.mean([np.std(gains(d, rng, 1.0, noise)[0], ddof=1) for _ in range(400)]) * np.sqrt(N_BLOCKS)
+    assert plain > 1.5 * true
 
 
 def test_a_law_that_is_true_in_one_block_alone_is_not_sure():
