@@ -8,6 +8,7 @@ virtual work the joints feel ``along * f``. ``back`` is how the joints move wher
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
@@ -49,12 +50,12 @@ class Place:
     back: Array
     kind: Literal["revolute", "prismatic"]
 
-    @property
+    @cached_property
     def channels(self) -> NDArray[np.int_]:
         """Joints that feel a torque along it."""
         return np.flatnonzero(self.along)
 
-    @property
+    @cached_property
     def alone(self) -> int | None:
         """The joint, where it is one."""
         return int(self.channels[0]) if len(self.channels) == 1 and self.along.sum() == 1 else None

@@ -332,6 +332,8 @@ def _steady_state(effect: Effect, built: _Built, first: list[np.ndarray], p: np.
     x = np.zeros(len(effect.states))
     rate, by_state, by_parameter = at(x)
     for _ in range(_MOST_NEWTON):
+        if not np.isfinite(rate).all():  # such as a spring that carries nothing
+            break
         try:
             change = np.linalg.solve(by_state, -rate[:, 0])
         except np.linalg.LinAlgError:
