@@ -227,7 +227,8 @@ def _noise(
         return principal(parts, STRONGEST)
 
     own = [row[channel] for row in runs[:n]]
-    return learn([r[:, channel] for r in residuals[:n]], beside_all([*laws, *small]), own, freely=bool(named))
+    left = [r[:, channel] for r in residuals[:n]]
+    return learn(left, beside_all([*laws, *small]), own, freely=bool(named), channels=len(runs[0]))
 
 
 def principal(parts: Sequence[Array], most: int) -> list[Array]:

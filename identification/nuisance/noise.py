@@ -68,11 +68,13 @@ class Noise:
     """RMS of the residual that they were learnt from [T]."""
     width: int = 0
     """Which of the widths near rest."""
+    odds: float = ODDS_OF_CURVES
+    """Prior odds that it wanders."""
 
     @property
     def log_prior(self) -> float:
-        """Log prior of its wander, which has the prior odds of nameless physics."""
-        return float(np.log(ODDS_OF_CURVES)) - WANDER_PRIOR * self.wander / self.unit if self.wander else 0.0
+        """Log prior of its wander."""
+        return float(np.log(self.odds)) - WANDER_PRIOR * self.wander / self.unit if self.wander else 0.0
 
     def covariance(self, run: NoiseChannel) -> Covariance:
         """K of a recording."""
@@ -89,7 +91,12 @@ class Noise:
 
 
 def learn(
-    residuals: Sequence[Array], columns: Sequence[Array], runs: Sequence[NoiseChannel], *, freely: bool = False
+    residuals: Sequence[Array],
+    columns: Sequence[Array],
+    runs: Sequence[NoiseChannel],
+    *,
+    freely: bool = False,
+    channels: int = 1,
 ) -> Noise:
     """The noise of one channel: its fast scales on a stretch of the recordings, its wander on averages over blocks.
 
@@ -103,7 +110,10 @@ def learn(
     freely : bool
         Whether the columns may explain as much as they can. Otherwise their amplitudes have a common prior deviation,
         estimated beside the noise: where nothing is missing it is small, and nothing of the noise is lost to them.
+    channels : int
+        How many share the prior odds that something wanders, which are those of nameless physics.
     """
+    odds = ODDS_OF_CURVES / channels
     whole = np.concatenate(list(residuals))
     size, most = float(np.std(whole)) + 1e-12, float(np.sqrt(np.mean(whole**2))) + 1e-12
     stretch = [slice(0, min(len(r), max(STRETCH // len(runs), 100))) for r in residuals]
@@ -133,7 +143,7 @@ def learn(
         return _cost((noise, most if freely else float(np.exp(x[1]))), averaged)
 
     x = _best(still, start, wide, start - 6, start + 3)
-    best = (still(x) + float(np.log(ODDS_OF_CURVES)), 0.0, WANDER_TIMES[0])
+    best = (still(x) + float(np.log(odds)), 0.0, WANDER_TIMES[0])
     for time in WANDER_TIMES:
 
         def slow(x: Array, time: float = time) -> tuple[Noise, float]:
@@ -148,7 +158,7 @@ def learn(
             start = np.log(np.array([0.3, level, 0.1]) * size)[own]
             x = _best(cost, start, np.array([1.5, 10.0, 2.0])[own], start - 6, start + 3)
             best = min(best, (cost(x), float(np.exp(x[1])), time))
-    return replace(found, wander=best[1], wander_time=best[2], unit=size)
+    return replace(found, wander=best[1], wander_time=best[2], unit=size, odds=odds)
 
 
 def _best(cost: Callable[[Array], float], start: Array, wide: Array, low: Array, high: Array) -> Array:

@@ -86,7 +86,8 @@ def weigh(
 
     def noise(c: int, beside: Sequence[Array]) -> Noise:
         n = len(source.train)
-        return learn([r[:, c] for r in linear.residuals[:n]], beside[:n], [row[c] for row in runs[:n]])
+        own = [row[c] for row in runs[:n]]
+        return learn([r[:, c] for r in linear.residuals[:n]], beside[:n], own, channels=len(runs[0]))
 
     noises = [noise(c, x) for c, x in enumerate(beside_laws)] if known is None else known.noises
     by_words = {}
