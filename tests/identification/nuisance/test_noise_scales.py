@@ -75,6 +75,19 @@ def test_a_level_that_wanders_is_found_beside_what_it_could_be_taken_for(seed):
     assert found.white == pytest.approx(0.3, rel=0.3)
 
 
+def test_channels_share_the_odds_that_something_wanders():
+    """A weak wander is believed of one channel that there is, and not of one in many."""
+    rng = np.random.default_rng(31)
+    n = 2 * N
+    drawn: np.ndarray = process(rng, 0.06, 8.0, n)
+    residual = drawn + 0.4 * rng.normal(size=n)
+    told = [learn([residual], [columns(n)], [run(n=n)], channels=x) for x in (1, 4, 10**12)]
+    assert told[0].wander > 0
+    assert told[2].wander == 0
+    one, four = (replace(told[0], odds=x.odds).log_prior for x in told[:2])
+    assert one - four == pytest.approx(np.log(4), rel=1e-12)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_a_level_that_may_wander_only_late_is_found_there_and_nothing_is_excused_before(seed):
     """A pull that keeps an unknown share of its load once its seat slid: known to a millinewton before."""
