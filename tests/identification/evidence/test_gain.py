@@ -44,8 +44,8 @@ def test_a_block_that_holds_most_does_not_double_the_error():
     assert told == pytest.approx(true, rel=0.15)
 
 
-@pytest.mark.parametrize("noise", [1.0, 3.0])
-def test_a_law_that_acts_in_few_blocks_is_as_sure_as_its_noise_lets_it(noise):
+@pytest.mark.parametrize(("noise", "times"), [(1.0, 5.0), (3.0, 1.5)])
+def test_a_law_that_acts_in_few_blocks_is_as_sure_as_its_noise_lets_it(noise, times):
     """Three blocks of sixteen hold nearly all of it: the plain standard error of a sum is six times the deviation."""
     d = 0.05 * np.ones((N_BLOCKS, LENGTH))
     d[3:6] = np.array([1.5, 2.0, 2.5])[:, None]
@@ -53,7 +53,7 @@ def test_a_law_that_acts_in_few_blocks_is_as_sure_as_its_noise_lets_it(noise):
     assert told == pytest.approx(true, rel=0.25)
     rng = np.random.default_rng(2)
     plain = np.mean([np.std(gains(d, rng, 1.0, noise)[0], ddof=1) for _ in range(400)]) * np.sqrt(N_BLOCKS)
-    assert plain > 1.5 * true
+    assert plain > times * true
 
 
 def test_a_law_that_is_true_in_one_block_alone_is_not_sure():
