@@ -114,10 +114,12 @@ def run(
     folder: Path = FOLDER,
     answers: Path = ANSWERS,
     clock: Callable[[], float] = time.monotonic,
+    only: str | None = None,
 ) -> dict[str, Path]:
     """Draw and diagnose what was registered, generators in turns, until the time is over; the answers' files.
 
-    Cases are drawn in ``folder``, with a file of all answers a generator; those of each seed are in ``answers``.
+    Cases are drawn in ``folder``, with a file of all answers a generator; those of each seed are in ``answers``. With
+    ``only``, one generator's alone.
 
     Raises
     ------
@@ -128,9 +130,10 @@ def run(
     if wrong:
         raise ValueError("; ".join(wrong))
     end = clock() + 3600.0 * hours
-    work = [(name, seed) for name, own in registered["seeds"].items() for seed in own]
+    seeds = {name: own for name, own in registered["seeds"].items() if name == (only or name)}
+    work = [(name, seed) for name, own in seeds.items() for seed in own]
     done = {(name, seed): answered(answers / f"{name}-{seed}.jsonl", registered["tool"]) for name, seed in work}
-    files = {name: folder / f"{name}.jsonl" for name in registered["seeds"]}
+    files = {name: folder / f"{name}.jsonl" for name in seeds}
     order = [(name, seed, k) for k in range(registered["cases"]) for name, seed in work]
     for name, seed, k in order:
         if f"{k:04}" in done[name, seed]:
@@ -140,7 +143,7 @@ def run(
             break
         case = GENERATORS[name](folder / name / str(seed), seed, k + 1, tell=tell, first=k)
         score(case, answers / f"{name}-{seed}.jsonl", LONGEST, tell)
-    for name, own in registered["seeds"].items():
+    for name, own in seeds.items():
         parts = [answers / f"{name}-{seed}.jsonl" for seed in own]
         files[name].write_text("".join(p.read_text(encoding="utf-8") for p in parts if p.exists()), encoding="utf-8")
     return files

@@ -21,6 +21,7 @@ def main(words: Sequence[str]) -> int:
     commands.add_parser("verify", help="tell whether the tree is the registered one")
     running = commands.add_parser("registered", help="run what was registered; resumed")
     running.add_argument("--hours", type=float, default=1.0)
+    running.add_argument("--only", choices=GENERATORS, help="this generator alone: several can run side by side")
     running.add_argument("--folder", type=Path, default=Path("build/proof/registered"), help="of cases and result.json")
     running.add_argument("--answers", type=Path, default=Path("proof/answers"), help="to be committed")
     given = parser.parse_args(words)
@@ -46,7 +47,7 @@ def _do(given: argparse.Namespace) -> int:
             "\n".join(found) or f"the tree is the one registered on {registered['date']} at {registered['commit'][:12]}"
         )
         return 1 if found else 0
-    files = register.run(registered, given.hours, tell, given.folder, given.answers)
+    files = register.run(registered, given.hours, tell, given.folder, given.answers, only=given.only)
     tell(register.printed(files))
     write_json(given.folder / "result.json", register.result(registered, files))
     tell(f"numbers: {given.folder / 'result.json'}")

@@ -96,7 +96,8 @@ def confirm(
     scatter.
 
     Names are removed one at a time: of two that replace each other, one stays, and its loss is larger from then on. So
-    the others are tried again in the order of their last loss, and only until one is to be removed.
+    the others are tried again in the order of their last loss, and only until one is to be removed. Of a law and its
+    special case, neither of which is missed, the law goes first (the principle of marginality: Nelder 1977).
     """
     progress("confirming on the held-out recordings")
     model, final = found.model, found.fit
@@ -113,18 +114,20 @@ def confirm(
         missed[key] = _missed(left[key], model, final, whole, found, train, held, scales)
         if any(k not in missed for k in left):
             continue
-        weakest = min(left, key=lambda k: (missed[k].told, missed[k].sure))
+        out = {k for k in left if not missed[k].told}
+        special = {f"{part}.{left[k].placed.at}" for k in out for part in left[k].placed.effect.contains}
+        weakest = min(left, key=lambda k: (k not in out, k in special, missed[k].sure))
         if not missed[weakest].told and weakest not in stale:
-            out, gone = left.pop(weakest), missed.pop(weakest)
+            removed, gone = left.pop(weakest), missed.pop(weakest)
             final = gone.fit
             if gone.sure <= GATE:
-                rejected.append(out)
+                rejected.append(removed)
                 weak[weakest] = gone
             model = _without(model, weakest)
             whole = forecast(model, final, found, train, held, scales)
             stale = set(left)
             progress(
-                f"confirming on the held-out recordings: {out.placed.key} is not confirmed, {len(left)} names left"
+                f"confirming on the held-out recordings: {removed.placed.key} is not confirmed, {len(left)} names left"
             )
     names = tuple(sorted(left.values(), key=lambda n: -missed[n.placed.key].size))
     # A nameless curve is what the names leave: their values do not wait for it.
@@ -140,7 +143,9 @@ def forecast(
     held: Sequence[Experiment],
     scales: Mapping[str, Scales],
 ) -> PredictiveDensity:
-    """How well a fitted model predicts the held-out recordings."""
+    """How well a fitted model predicts the held-out recordings.
+
+    What the fit holds at a bound stays there: a law of the wrong sign is not that law."""
     n = len(train)
     noise = found.weighed
     weighed = weigh(
@@ -156,6 +161,7 @@ def forecast(
         nameless=found.nameless,
     )
     weight = weighed.beside.weight(found.tolerance)
+    weight[: len(own.theta)][own.at_bound] = 0.0
     fitted_by = ProjectedEvidence(weighed.evidence, range(n), weight)
     mean, covariance = known = fitted_by.posterior(len(own.theta))
     unit = weighed.beside.spread

@@ -97,6 +97,12 @@ def test_run_goes_through_generators_in_turns_and_ends_with_its_time(drawn, tmp_
     assert not (tmp_path / "elsewhere/drives/500/0000").exists()
 
 
+def test_one_generator_can_run_alone(drawn, tmp_path):
+    files = run(written(), 1.0, lambda _: None, tmp_path, tmp_path / "answers", clock=lambda: 0.0, only="played")
+    assert {name for name, _ in drawn} == {"played-600.jsonl"}
+    assert list(files) == ["played"]
+
+
 @pytest.mark.parametrize(
     ("seeds", "cases", "message"),
     [

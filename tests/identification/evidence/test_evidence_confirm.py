@@ -95,6 +95,18 @@ def test_of_two_twins_one_stays(monkeypatch):
     assert done.missed[done.names[0].placed.key].gain == 5.0
 
 
+def test_of_a_law_and_its_special_case_the_law_goes_first(monkeypatch):
+    """Though the special case is missed least: level and dip together, either of which can stand in for the other."""
+    some = tuple(cast(Any, SimpleNamespace(placed=PlacedEffect(get_effect(x), "joint1"), number=k))
+                 for k, x in enumerate(("coulomb_friction", "stribeck_friction", "backlash")))  # fmt: skip
+
+    def missed(name: Any, _model: Any, final: Any, *_: Any) -> ArmLoss:
+        return missed_by(5.0 if len(final) == 2 else (0.2, 0.4, 0.6)[name.number], final - {name.number})
+
+    done = confirmed(monkeypatch, some, missed)
+    assert [n.placed.effect.name for n in done.rejected] == ["stribeck_friction"]
+
+
 @pytest.mark.parametrize(("gain", "scattered", "stays"), [(4.0, 2.0, False), (4.01, 2.0, True), (-3.0, 0.1, False)])
 def test_a_name_stays_if_it_is_missed_by_more_than_its_scatter(monkeypatch, gain, scattered, stays):
     told = []
@@ -146,3 +158,15 @@ def test_deviations_are_about_the_reported_value():
     assert known.std == pytest.approx([0.5, 0.5, np.inf, 2.0])
     assert known.covariance[0, 1] == pytest.approx(-0.12)
     assert known.theta is fit.theta
+
+
+def test_a_law_at_its_bound_predicts_nothing_of_the_wrong_sign(tmp_path):
+    """Friction that falls by 1.5 N·m at a crawl is no Stribeck friction of -1.5 N·m."""
+    model = recorded(tmp_path, 3, stribeck=-1.5, speed=0.3)
+    there = model.with_effects([PlacedEffect(get_effect("stribeck_friction"), "joint1")], {})
+    found = decided(there, tmp_path).best
+    fit = found.fit
+    level = [(s.effect, s.name) for s in fit.assembly.slots].index(("stribeck_friction", "level"))
+    assert fit.theta[level] == 0.0
+    assert fit.at_bound[level]
+    assert found.forecast.mean[level] == found.forecast.covariance[level, level] == 0.0
