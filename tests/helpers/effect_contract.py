@@ -12,7 +12,8 @@ from scipy.optimize import least_squares
 
 from snarelab.models.effect import Effect
 from snarelab.models.effects import FAMILIES, effects
-from snarelab.models.hidden_state import THROUGH, LawEvaluation, evaluate_law
+from snarelab.models.hidden_state import LawEvaluation, evaluate_law
+from snarelab.models.law_symbols import THROUGH
 
 
 def scale_of(parameter, s):
