@@ -63,7 +63,7 @@ class ProjectedEvidence:
             self._mean[:m] = mean
             energy += float(mean @ matrix[:m, :m] @ mean - 2 * mean @ seen[:m])
             seen = seen - matrix[:, :m] @ mean
-            turned[:m, :m] = cholesky(covariance + 1e-12 * np.trace(covariance) * np.eye(m) / max(m, 1), lower=True)
+            turned[:m, :m] = _root(covariance)
             matrix, seen = turned.T @ matrix @ turned, turned.T @ seen
         else:
             matrix, seen = matrix * np.outer(self._weight, self._weight), seen * self._weight
@@ -195,6 +195,15 @@ class ProjectedEvidence:
         found = np.zeros(len(seen))
         found[self._order] = solve_triangular(self._low.T, seen, lower=False)
         return self._mean + self._turned @ found
+
+
+def _root(covariance: Array) -> Array:
+    """Lower L with L L' a covariance (m, m), but for its rounding; what does not vary has no part in it."""
+    varies, found = np.ix_(*[np.flatnonzero(np.diag(covariance) > 0)] * 2), np.zeros_like(covariance)
+    own = covariance[varies]
+    if len(own):
+        found[varies] = cholesky(own + 1e-12 * np.trace(own) * np.eye(len(own)) / len(own), lower=True)
+    return found
 
 
 def _arrow(indices: Sequence[Index], count: int, common: int) -> tuple[Index, list[slice]]:

@@ -36,6 +36,20 @@ def test_the_evidence_of_nothing_is_the_density_of_what_stands_beside(case, reco
     assert found == pytest.approx(made.log_density(recordings, (), weight), rel=1e-9)
 
 
+@pytest.mark.parametrize("held", [(), (1,), (0, 1, 2)])
+def test_what_other_recordings_say_stands_in_for_the_prior(case, held):
+    """By Bayes' rule: the density of one recording given the other is that of both over that of the other. Parameters
+    that are ``held`` do not vary in either."""
+    _, evidence = case
+    weight = WEIGHT.copy()
+    weight[list(held)] = 0.0
+    first, both = (ProjectedEvidence(evidence, numbers, weight) for numbers in ((0,), (0, 1)))
+    known = first.posterior(len(weight))
+    assert not np.any(known[1][list(held)])
+    on = ProjectedEvidence(evidence, (1,), weight, known)
+    assert on.null == pytest.approx(both.null - first.null, rel=1e-6)
+
+
 @pytest.mark.parametrize("weight", [None, WEIGHT])
 @pytest.mark.parametrize("recordings", [(0,), (0, 1)])
 def test_a_log_bayes_factor_is_the_ratio_of_densities(case, recordings, weight):
