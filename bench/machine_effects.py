@@ -117,8 +117,9 @@ def _stated(first: str, second: str) -> dict[str, dict[str, float]]:
     return {name: {first: 1.0, second: sign} for name, sign in zip(AXES, (1.0, -1.0), strict=True)}
 
 
-def _wrist(name: str, part: str, shape: Callable[[NDArray], NDArray], most: float) -> Maker:
-    """One of both motors has what a tie's ``part`` is; ``shape`` of w' or w'' is its torque."""
+def _wrist(name: str, part: str, shape: Callable[[NDArray], NDArray], most: float, stated: bool = True) -> Maker:
+    """One of both motors has what a tie's ``part`` is; ``shape`` of w' or w'' is its torque. The model states both
+    motors, or knows of none."""
 
     def make(m: Planned, rms: float, rng: Rng) -> Hidden:
         motor = int(rng.integers(2))
@@ -127,7 +128,9 @@ def _wrist(name: str, part: str, shape: Callable[[NDArray], NDArray], most: floa
         rate = (m.qdd if part == "armature" else m.qd) @ along
         x = m.amount(shape(rate)[:, None] * along, rms, most)
         tie = Tie(first, second, sign, **{part: x})
-        return Hidden(((name, AXES[motor]),), x, {"ties": (tie,)}, _stated(first, second))
+        if stated:
+            return Hidden(((name, AXES[motor]),), x, {"ties": (tie,)}, _stated(first, second))
+        return Hidden(((name, f"{first}{'+-'[motor]}{second}"),), x, {"ties": (tie,)})
 
     return make
 
@@ -223,6 +226,15 @@ ENTRIES: dict[str, Entry] = {
     "wrist.coulomb": Entry(("coulomb_friction",), _wrist("coulomb_friction", "level", np.sign, 10.0)),
     "wrist.viscous": Entry(("viscous_friction",), _wrist("viscous_friction", "viscous", np.asarray, 20.0)),
     "wrist.inertia": Entry(("rotor_inertia",), _wrist("rotor_inertia", "armature", np.asarray, 20.0)),
+    "wrist.coulomb.unasked": Entry(
+        ("coulomb_friction",), _wrist("coulomb_friction", "level", np.sign, 10.0, stated=False)
+    ),
+    "wrist.viscous.unasked": Entry(
+        ("viscous_friction",), _wrist("viscous_friction", "viscous", np.asarray, 20.0, stated=False)
+    ),
+    "wrist.inertia.unasked": Entry(
+        ("rotor_inertia",), _wrist("rotor_inertia", "armature", np.asarray, 20.0, stated=False)
+    ),
     "wrist": Entry(("coulomb_friction",), _whole_wrist),
     "torque_ripple": Entry(("torque_ripple",), _ripple),
     "command_delay": Entry(("command_delay",), _command_delay),

@@ -7,7 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ...models.axes import neighbours, place
 from ...models.model import Model, PlacedEffect
+from ...recordings.condition import Motion
 from ..deciding import LEAST_LEVEL, TOLERANCES
 from ..fitting.assembly import TorqueModel
 from ..fitting.experiment import Experiment, Scales
@@ -131,7 +133,9 @@ def weigh(
     ]
     if not search:
         columns = CandidateColumns([len(e.measured) for e in experiments])
-    found_pool = tuple(pool(named, by_words, model.effects)) if search else ()
+    stated = {axis.name for axis in model.tree.axes}
+    coupled = {axis.name for axis in neighbours(model.tree)} - stated
+    found_pool = tuple(pool(named, by_words, model.effects, coupled)) if search else ()
     items = [item for h in found_pool for item in h.items]
 
     @functools.cache
@@ -152,17 +156,18 @@ def _runs(
 ) -> list[list[NoiseChannel]]:
     """What the noise of every channel of every recording depends on."""
     train, made = experiments[:n_train], []
-    peaks = np.max([np.abs(e.motion.qd).max(axis=0) for e in train], axis=0)
-    travels = np.max([np.ptp(e.motion.q, axis=0) for e in train], axis=0)
+    several = _axes_of_several(found.assembly)
     for e in experiments:
         row = []
-        for c, (peak, travel) in enumerate(zip(peaks, travels, strict=True)):
+        for c, own in enumerate(np.eye(len(model.joints))):
             m = e.motion
             settles = np.zeros(len(e.measured))
             sticks, level = (settles,) * len(STICKS), 0.0
             if model.tree.sticks(c):
-                *sticks, settles = (share(m, c, z, max(peak, 1e-12), travel) for z in (*STICKS, SETTLES))
-                level = _level(found.assembly, found.theta, train, residuals, c, peak, scale[c])
+                # A joint rests, and so does it where an axis rests that it is a part of.
+                rests = [_rests(m, x, train) for x in (own, *(x for x in several if x[c]))]
+                *sticks, settles = (np.max(shares, axis=0) for shares in zip(*rests, strict=True))
+                level = _level(found.assembly, found.theta, train, residuals, c, scale[c])
             row.append(
                 NoiseChannel(
                     m.period * m.thinning, m.band_segments(), encoder_noise(e, c), tuple(sticks), settles, level
@@ -172,17 +177,31 @@ def _runs(
     return made
 
 
+def _axes_of_several(assembly: TorqueModel) -> list[Array]:
+    """Axes of several joints that the model states, or at which it has friction: their joints' factors (J,)."""
+    rubs = [p.at for p in assembly.placed if p.effect.at == "joint" and p.effect.dissipates]
+    names = dict.fromkeys([*(x.name for x in assembly.tree.axes), *rubs])
+    places = [place(assembly.tree, name) for name in names]
+    return [x.along for x in places if x.alone is None]
+
+
+def _rests(motion: Motion, along: Array, train: Sequence[Experiment]) -> list[Array]:
+    """How much of each sample is near the rest of a joint or an axis: in the zones of sticking, and of settling."""
+    peak = max(float(np.abs(e.motion.qd @ along).max()) for e in train)
+    travel = max(float(np.ptp(e.motion.q @ along)) for e in train)
+    return [share(motion, along, z, max(peak, 1e-12), travel) for z in (*STICKS, SETTLES)]
+
+
 def _level(
     assembly: TorqueModel,
     theta: Array,
     train: Sequence[Experiment],
     residuals: Sequence[Array],
     channel: int,
-    peak: float,
     scale: float,
 ) -> float:
     """How much a joint may hold at rest [T]: its level of dry friction, or the residual there."""
-    joint = assembly.tree.joints[channel].name
+    joint, peak = assembly.tree.joints[channel].name, max(float(np.abs(e.motion.qd[:, channel]).max()) for e in train)
     torque = {
         assembly.unit(p, x) for p in assembly.placed if p.at == joint for x in p.effect.parameters if x.unit == "T"
     }

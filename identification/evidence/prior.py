@@ -1,6 +1,6 @@
 """Prior odds of named effects and nameless curves: shared by effects, by places, and by curves."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from itertools import pairwise
 from math import factorial
 
@@ -14,17 +14,26 @@ from .pool import Hypothesis, Item
 
 
 def pool(
-    named: Mapping[str, tuple[PlacedEffect, list[Item]]], by_words: Curves, there: Sequence[PlacedEffect]
+    named: Mapping[str, tuple[PlacedEffect, list[Item]]],
+    by_words: Curves,
+    there: Sequence[PlacedEffect],
+    coupled: Collection[str] = (),
 ) -> list[Hypothesis]:
     """Hypotheses with their prior odds: shared by the effects, and by the places of each (Scott and Berger 2010).
 
-    An effect that is ``there`` in the model counts as one of its places."""
-    names = [p.effect.name for p, _ in named.values()]
+    An effect that is ``there`` in the model counts as one of its places. Joints that are ``coupled``, though no model
+    says so, are as likely as an effect of its own."""
+
+    def kind(p: PlacedEffect) -> str:
+        return f"{p.effect.name} of coupled joints" if p.at in coupled else p.effect.name
+
+    kinds = {key: kind(p) for key, (p, _) in named.items()}
+    names = list(kinds.values())
     odds = ODDS_OF_NAMES / max(len(set(names)), 1)
     found = []
     for key, (p, items) in named.items():
-        name = p.effect.name
-        have = sum(x.effect.name == name for x in there)
+        name = kinds[key]
+        have = sum(kind(x) == name for x in there)
         n = have + names.count(name)
         # Joints are made alike; a sensor's fault, or a wrong mass, is an accident of one place.
         logs = [log_share_of_places(k, n) for k in range(1, n + 1)]

@@ -217,7 +217,8 @@ class Links:
         for c in range(len(self.joints)):
             peak, travel = self._moves(c)
             motions, j = [self.rows[i][c].motion for i in numbers], self.rows[0][c].joint
-            shares = [[share(m, j, zone, peak, travel) for zone in (*STICKS, SETTLES)] for m in motions]
+            along = np.eye(motions[0].qd.shape[1])[j]
+            shares = [[share(m, along, zone, peak, travel) for zone in (*STICKS, SETTLES)] for m in motions]
             rest = [x[0] > 0.5 for x in shares]
             left = np.concatenate([r[k, c] for r, k in zip(linear.residuals, rest, strict=True)])
             beside = np.concatenate([x[k] for x, k in zip(could[c], rest, strict=True)])

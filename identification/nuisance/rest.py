@@ -29,19 +29,20 @@ STICKS = tuple(Zone(*x) for x in deciding.STICKS)
 SETTLES = Zone(*deciding.SETTLES)
 
 
-def share(motion: Motion, joint: int, zone: Zone, peak: float, travel: float) -> Array:
+def share(motion: Motion, along: Array, zone: Zone, peak: float, travel: float) -> Array:
     """Share of each sample in the analysis band that is near rest (n_band,), 0 to 1.
 
     Parameters
     ----------
     motion : Motion
-    joint : int
+    along : array (J,)
+        The joint, or an axis of several: its coordinate is the sum of along[j] q[j].
     zone : Zone
     peak, travel : float
-        The joint's peak speed and travel over the training recordings.
+        Its peak speed and travel over the training recordings.
     """
-    speed = motion.qd[:, joint]
-    slow = np.abs(speed) < zone.speed * peak + 2 * motion.encoder_noise[1, joint]
+    speed = motion.qd @ along
+    slow = np.abs(speed) < zone.speed * peak + 2 * np.linalg.norm(motion.encoder_noise[1] * along)
     slow[:-1] |= speed[:-1] * speed[1:] < 0
     reach = zone.travel * travel
     for s in motion.segments:

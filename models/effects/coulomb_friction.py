@@ -20,5 +20,6 @@ EFFECT = Effect(
     parameters=(Parameter("level", "T", "friction while moving", low=0.0),),
     law=_law,
     dissipates=True,
+    neighbours="too",
     experiment="run {at} to and fro at one low steady speed and halve the difference of the two torques",
 )

@@ -18,5 +18,6 @@ EFFECT = Effect(
     source="Armstrong, Khatib and Burdick (1986)",
     parameters=(Parameter("inertia", "T*s^2/S", "rotor inertia times the gear ratio squared", low=0.0),),
     law=_law,
+    neighbours="too",
     experiment="repeat one motion of {at} in two postures whose inertia at the joint differs",
 )

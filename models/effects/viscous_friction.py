@@ -19,5 +19,6 @@ EFFECT = Effect(
     parameters=(Parameter("coefficient", "T*s/S", "friction per speed", low=0.0),),
     law=_law,
     dissipates=True,
+    neighbours="too",
     experiment="run {at} at three or more steady speeds, all at one temperature, and compare the torques",
 )

@@ -20,4 +20,4 @@ def motion(speed, segments=None, noise=0.0) -> Any:
 
 
 def near_rest(speed, zone, travel=1.0, **given):
-    return np.flatnonzero(share(motion(speed, **given), 0, zone, PEAK, travel)).tolist()
+    return np.flatnonzero(share(motion(speed, **given), np.ones(1), zone, PEAK, travel)).tolist()

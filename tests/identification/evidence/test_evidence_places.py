@@ -42,6 +42,18 @@ def test_what_the_model_has_counts():
     assert np.exp(other.prior) == pytest.approx(0.5)
 
 
+def test_joints_that_no_model_couples_are_as_likely_as_an_effect_of_its_own():
+    """At joints ½ of the names' odds, however many pairs of joints could be coupled; the other half is the pairs'."""
+    places = ("joint1", "joint2", "joint1+joint2", "joint1-joint2", "joint2+joint3", "joint2-joint3")
+    made = white(np.random.default_rng(0), len(places), {})
+    placed = [PlacedEffect(get_effect("coulomb_friction"), p) for p in places]
+    named = {p.key: (p, [x]) for p, x in zip(placed, made.items, strict=True)}
+    several, alone = pool(named, {}, (), set(places[2:])), pool({k: named[k] for k in list(named)[:2]}, {}, ())
+    np.testing.assert_allclose(np.exp([h.prior for h in several[:2]]), np.exp([h.prior for h in alone]) / 2)
+    np.testing.assert_allclose(np.exp([h.prior for h in several[2:]]), 0.25 * np.exp(log_share_of_places(1, 4)))
+    assert several[0].kind != several[2].kind
+
+
 def test_a_sensors_fault_is_an_accident_of_one_place():
     several = hypotheses("sensor_bias", ("tau.joint1", "tau.joint2"), there=("tau.joint3",))
     assert [np.exp(h.prior_beside(k)) for h in several for k in (0, 1)] == pytest.approx([0.5 / 3] * 4)

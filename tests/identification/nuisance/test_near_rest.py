@@ -140,8 +140,37 @@ def test_samples_of_the_band_that_are_near_rest(thinning, changed, segments, fou
 
 def test_samples_near_rest_count_where_the_model_has_a_law_for_them(monkeypatch):
     """Joint 1 has a law at rest and one that only exceeds its level there, joint 3 the latter alone, joint 2 none."""
-    effects = [("a", 0, True, False), ("b", 0, False, True), ("c", 1, False, False), ("d", 2, False, True)]
-    placed = [Made(effect=Made(at_rest=a, exceeds_at_rest=x), joint=k) for _, k, a, x in effects]
-    assembly: Any = Made(placed=placed, joint_of=lambda p: p.joint, tree=Made(joints=3 * [None]))
-    monkeypatch.setattr(rest, "moving", lambda e, shares: (e, shares))
-    assert fitted(assembly, ["a recording"]) == [("a recording", [0.0, REST, CREEP])]  # pyright: ignore[reportArgumentType]
+    laws = [(0, True, False), (0, False, True), (1, False, False), (2, False, True)]
+    assembly = model([(np.eye(3)[k], a, x, True) for k, a, x in laws])
+    monkeypatch.setattr(rest, "moving", lambda e, shares, axes: (e, shares, axes))
+    assert fitted(assembly, ["a recording"]) == [("a recording", [0.0, REST, CREEP], ())]  # pyright: ignore[reportArgumentType]
+
+
+def model(laws) -> Any:
+    """Laws at places of three joints: factors, whether they hold at rest, exceed their level there, and dissipate."""
+    placed = []
+    for along, at_rest, exceeds, dissipates in laws:
+        law = Made(at="joint", acts_on="torque", at_rest=at_rest, exceeds_at_rest=exceeds, dissipates=dissipates)
+        along = np.array(along)
+        alone = int(along.argmax()) if np.count_nonzero(along) == 1 else None
+        placed.append(Made(effect=law, at=str(along), place=Made(along=along, alone=alone)))
+    return Made(placed=placed, place_of=lambda p: p.place, tree=Made(joints=3 * [None]))
+
+
+def test_where_an_axis_that_rubs_rests_none_of_its_joints_counts():
+    """Two joints turn against each other at sample 5, so that their sum rests; the third has no part in it."""
+    e = run(np.ones(12), at(12, (5, -1.0)), np.ones(12))
+    e.body.tree.sticks = lambda _: True
+    plus = (1.0, 1.0, 0.0)
+
+    def counted(*laws):
+        (found,) = fitted(model(laws), [e])
+        return found.counted.tolist()
+
+    turns = [12, 9, 12]  # the second joint's own: 4 and 5, and what is mixed with them
+    assert counted((plus, False, False, False))[0] == 12
+    both = counted((plus, False, False, True))
+    assert both[0] == 9
+    assert both[1] <= turns[1]
+    assert both[2] == 12
+    assert counted((plus, True, False, True))[0] == 12  # a law of friction at rest

@@ -44,13 +44,26 @@ def test_a_joint_in_motion_never_stands():
     assert near_rest(1 + 0.5 * np.sin(np.arange(100) / 10), Zone(0.04, 0.01)) == []
 
 
+def test_an_axis_stands_where_its_joints_turn_against_each_other():
+    """The sum of two speeds is 0.06 at one sample, below 4 % of 2; the second joint counts twice in it."""
+    speeds = np.array([[1.0, 0.5], [1.0, -0.47], [1.0, 0.5]])
+    t = PERIOD * np.arange(3)
+    made = exact(
+        ("joint1", "joint2"), PERIOD, 1, (t, np.cumsum(speeds, axis=0) * PERIOD, speeds, 0 * speeds, 0 * speeds)
+    )
+    found = [np.flatnonzero(share(made, np.array(x), Zone(0.04, 0.0), PEAK, 1.0)).tolist() for x in ((1, 2), (1, 0))]
+    assert found == [[1], []]
+    made.encoder_noise[1] = 0.0, 0.3  # counts twice, and twice its deviation: 1.2 of the sums of 2
+    assert np.flatnonzero(share(made, np.array([1.0, 1.0]), Zone(0.04, 0.0), PEAK, 1.0)).tolist() == [1]
+
+
 def test_thinned_samples_hold_a_share():
     """Through the conditioning's own low-pass: between 0 and 1, one deep inside a rest and none far from it."""
     n = 1200
     qd = np.where((np.arange(n) > 400) & (np.arange(n) < 800), 0.0, 1.0)[:, None]
     t = PERIOD * np.arange(n)
     made = exact(("joint1",), PERIOD, 3, (t, np.cumsum(qd, axis=0) * PERIOD, qd, 0 * qd, 0 * qd))
-    found = share(made, 0, Zone(0.04, 0.0), PEAK, 1.0)
+    found = share(made, np.ones(1), Zone(0.04, 0.0), PEAK, 1.0)
     time = made.to_band(made.time)
     assert found.min() >= 0
     assert found.max() <= 1
