@@ -37,8 +37,8 @@ def test_where_a_joint_sticks_and_where_its_friction_settles(monkeypatch, consta
 def level(rest_torque: float) -> float:
     """What a joint of RMS torque 10 is said to hold, with this much left over at rest."""
     assembly: Any = SimpleNamespace(tree=SimpleNamespace(joints=[SimpleNamespace(name="joint1")]), placed=(), slots=())
-    train: Any = [SimpleNamespace(motion=SimpleNamespace(to_band=lambda x: x, qd=np.zeros((20, 1))))]
-    return arm._level(assembly, np.zeros(0), train, [np.full((20, 1), rest_torque)], 0, 1.0, 10.0)
+    train: Any = [SimpleNamespace(motion=SimpleNamespace(to_band=lambda x: x, qd=np.eye(20)[:, :1]))]
+    return arm._level(assembly, np.zeros(0), train, [np.full((20, 1), rest_torque)], 0, 10.0)
 
 
 def test_a_joint_holds_something_at_least(monkeypatch):
