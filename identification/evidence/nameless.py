@@ -72,7 +72,7 @@ def remainders(found: ArmSelection, train: Sequence[Experiment], held: Sequence[
     told = []
     for k, remainder in made.items():
         item, c = slots[k].taken.item, remainder.channel
-        own = [evidence.contribution(i, c, evidence.items[item], members.of(item)) for i in range(n)]
+        own = [search.on.added(i, c, item, members.of(item)) for i in range(n)]
         if np.sqrt(np.mean(np.concatenate(own) ** 2)) >= DISCREPANCY * found.weighed.scale[c]:
             told.append(remainder)
     return tuple(sorted(told, key=lambda r: -r.explained))

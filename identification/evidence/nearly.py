@@ -17,10 +17,11 @@ def without_its_curves(
 ) -> ArmSelection:
     """A search without the curves of which a name is the larger part.
 
-    Without the name, a curve v on its channel could grow to d + v, d what the name adds. If d by itself is nearly
-    d + v, the name is named in the curve's place (`rounds.as_names`), and the curve is what it leaves; so it does not
-    stand in for the name where the name is tried. Whether the curve has coordinates by which it can grow so is not
-    asked: a curve that cannot is missed alike with the name and without it.
+    Without the name, a curve that adds v to its channel could grow to d + v, d what the name adds. If d by itself is
+    nearly d + v, the name is named in the curve's place (`rounds.as_names`), and the curve is what it leaves; so it
+    does not stand in for the name where the name is tried. Whether the curve has coordinates by which it can grow so
+    is not asked: a curve that cannot is missed alike with the name and without it. What the curve takes over from the
+    name itself is no part of v.
 
     Parameters
     ----------
@@ -42,7 +43,7 @@ def without_its_curves(
         own, both, cross = 0.0, 0.0, 0.0
         for i, e in enumerate(train):
             d = rest.assembly.residual(e, rest.theta)[0][:, c] - final.assembly.residual(e, final.theta)[0][:, c]
-            whole = d + evidence.contribution(i, c, evidence.items[s.taken.item], amplitudes)
+            whole = d + found.search.on.added(i, c, s.taken.item, amplitudes)
             weighed = evidence.channels[i][c].covariance.solve(whole)
             own += float(d @ evidence.channels[i][c].covariance.solve(d))
             both += float(whole @ weighed)

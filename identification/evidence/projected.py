@@ -196,6 +196,13 @@ class ProjectedEvidence:
         found[self._order] = solve_triangular(self._low.T, seen, lower=False)
         return self._mean + self._turned @ found
 
+    def added(self, i: int, c: int, number: int, amplitudes: Array) -> Array:
+        """What a channel of a recording has more of by an item (n,): what the item adds, less what it takes over from
+        the columns that stand beside. A curve over a law's own coordinate may take over most of the law."""
+        given, own = [(number, amplitudes)], self.evidence.channels[i][c]
+        back = (self.beside(given) - self.beside([]))[own.index]
+        return self.evidence.contribution(i, c, self.evidence.items[number], amplitudes) + own.columns @ back
+
 
 def _root(covariance: Array) -> Array:
     """Lower L with L L' a covariance (m, m), but for its rounding; what does not vary has no part in it."""

@@ -166,7 +166,7 @@ def remainders(source: Source, given: ModelPoint, best: Confirmation, barred: Co
     found = []
     for k, remainder in told.items():
         item, c = kept[k].taken.item, remainder.channel
-        own = [made.on.evidence.contribution(i, c, made.on.evidence.items[item], members.of(item)) for i in train]
+        own = [made.on.added(i, c, item, members.of(item)) for i in train]
         # What is less than any model has wrong is not told.
         if np.sqrt(np.mean(np.concatenate(own) ** 2)) >= DISCREPANCY * scale[c]:
             found.append(remainder)

@@ -83,7 +83,7 @@ def test_nothing_missing_is_adequate(tmp_path, seed):
     assert {x["name"] for x in found["limits"]} >= {"sensor_bias", "harness_stiffness", "rotor_inertia", "com_offset"}
     for name in ("rotor_inertia", "quadratic_friction", "load_dependent_friction", "stribeck_friction"):
         # Also where the best fit would be a negative one.
-        assert {x["at"] for x in found["limits"] if x["name"] == name} == set(JOINTS), name
+        assert {x["at"] for x in found["limits"] if x["name"] == name} >= set(JOINTS), name
 
 
 @pytest.mark.slow

@@ -233,3 +233,21 @@ def test_items_by_themselves_keep_their_evidence(case):
     wanted, found = Members(on, [(2, 0.3), (1, 0.1)]), Members(alone, [(0, 0.3), (1, 0.1)])
     assert found.value == pytest.approx(wanted.value, rel=1e-9)
     np.testing.assert_allclose(found.amplitudes, wanted.amplitudes, rtol=1e-9)
+
+
+def test_what_an_item_adds_is_less_what_it_takes_over(case):
+    """The residual changed by the item's column: what stands beside follows by generalised least squares."""
+    made, evidence = case
+    on = ProjectedEvidence(evidence, (0, 1), WEIGHT)
+    item, amplitude = evidence.items[0], np.array([0.7])
+    (c,) = evidence.reached(item)
+    _, k, always, pool = made.stacked((0, 1))
+    column = pool[:, item.index] @ (item.spread * amplitude)
+    always = always * WEIGHT
+    solved = np.linalg.solve(k, np.column_stack([always, column]))
+    normal = always.T @ solved[:, :-1] + np.eye(len(WEIGHT))
+    wanted = column - always @ np.linalg.solve(normal, always.T @ solved[:, -1])
+    lengths = [len(own.residual) for i in (0, 1) for own in made.pieces[i]]
+    parts = np.split(wanted, np.cumsum(lengths)[:-1])
+    for i in (0, 1):
+        np.testing.assert_allclose(on.added(i, c, 0, amplitude), parts[2 * i + c], atol=1e-9)

@@ -24,14 +24,12 @@ class Found:
 def found(beside, own=1.0, channel=0) -> tuple[Found, Any, Any]:
     """A curve that adds ``beside``, a law, and fits with a name that adds ``own`` times its shape, and without it."""
     identity = SimpleNamespace(solve=lambda x: x)
-    evidence = SimpleNamespace(
-        channels=[[SimpleNamespace(covariance=identity)] * 2], items=["curve", "law"], contribution=lambda *_: beside
-    )
+    evidence = SimpleNamespace(channels=[[SimpleNamespace(covariance=identity)] * 2], items=["curve", "law"])
     pool = [SimpleNamespace(named=False, label=(channel, None)), SimpleNamespace(named=True, label=None)]
     slots = tuple(SimpleNamespace(taken=SimpleNamespace(hypothesis=k, item=k, size=1.0)) for k in (0, 1))
     leaves = [np.stack([x * SHAPE[0], np.zeros(3)], 1) for x in (0.0, own)]
     fits = [SimpleNamespace(theta=None, assembly=SimpleNamespace(residual=lambda *_, x=x: (x, []))) for x in leaves]
-    search = SimpleNamespace(on=None)
+    search = SimpleNamespace(on=SimpleNamespace(added=lambda *_: beside))
     return Found(SimpleNamespace(evidence=evidence, pool=pool), search, slots), fits[0], fits[1]
 
 
