@@ -77,6 +77,7 @@ def weigh(
     search: bool = True,
     nameless: Mapping[tuple[int, str], float] | None = None,
     tuned: Mapping[str, Array] | None = None,
+    residuals: Sequence[Array] | None = None,
 ) -> WeighedRecordings:
     """Recordings under a fit.
 
@@ -99,6 +100,8 @@ def weigh(
         Sizes of nameless curves that stand beside every explanation.
     tuned : mapping of str to array, optional
         Parameters of laws that were fitted by themselves.
+    residuals : sequence of array (n, J), optional
+        Of each recording, where they are not those of the fit along the measured motion.
     """
     assembly = found.assembly
     states = [assembly.evaluate(e, found.theta) for e in instruments]
@@ -109,7 +112,7 @@ def weigh(
     nameless = nameless or {}
     by_words = curves(along, columns, small=not search, more={words for _, words in nameless})
     others = beside(along, found, by_words, columns, nameless)
-    residuals = [assembly.residual(e, found.theta)[0] for e in experiments]
+    residuals = residuals or [assembly.residual(e, found.theta)[0] for e in experiments]
     if runs is None:
         runs = _runs(model, found, experiments, residuals, n_train, along.scale)
     J = len(along.scale)

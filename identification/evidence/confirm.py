@@ -142,8 +142,9 @@ def forecast(
     train: Sequence[Experiment],
     held: Sequence[Experiment],
     scales: Mapping[str, Scales],
+    residuals: Sequence[Array] | None = None,
 ) -> PredictiveDensity:
-    """How well a fitted model predicts the held-out recordings.
+    """How well a fitted model predicts the held-out recordings; ``residuals`` in place of the fit's own, of all.
 
     What the fit holds at a bound stays there: a law of the wrong sign is not that law."""
     n = len(train)
@@ -159,6 +160,7 @@ def forecast(
         runs=noise.runs,
         search=False,
         nameless=found.nameless,
+        residuals=residuals,
     )
     weight = weighed.beside.weight(found.tolerance)
     weight[: len(own.theta)][own.at_bound] = 0.0
@@ -211,7 +213,8 @@ def _missed(
     rest = without(final, [key], train, found.first)
     beside = without_its_curves(found, name.channels, final, rest, train)
     whole = whole if beside is found else forecast(model, final, beside, train, held, scales)
-    other = forecast(_without(model, key), rest, beside, train, held, scales)
+    residuals = along_instruments(final, rest, [*train, *held], found.instruments)
+    other = forecast(_without(model, key), rest, beside, train, held, scales, residuals)
     c = list(name.channels)
     with_it, measured = channel_rms(final.assembly, held, final.theta)
     rms, _ = channel_rms(rest.assembly, held, rest.theta)
@@ -223,6 +226,21 @@ def _missed(
     explained = _explained(found, final, rest, held, worst)
     error = scatter(other.left, whole.left, [partial(blocks, e) for e in held])
     return ArmLoss(gain, error, size, trial, explained, rest)
+
+
+def along_instruments(
+    final: Fit, rest: Fit, experiments: Sequence[Experiment], instruments: Sequence[Experiment]
+) -> list[Array]:
+    """Residuals of the second fit, as far as the instrument motion tells the two apart: those of the first along the
+    measured motion, and the difference of the two along the instrument motion.
+
+    A disturbance moves a joint as well as its torque. Along the measured motion, a late sensor or a rotor that is not
+    there predicts part of it, in every recording of the same servo (`closed_loop`)."""
+    made = []
+    for e, i in zip(experiments, instruments, strict=True):
+        left, by_rest, by_final = (f.assembly.residual(x, f.theta)[0] for f, x in ((final, e), (rest, i), (final, i)))
+        made.append(left + by_rest - by_final)
+    return made
 
 
 def _explained(found: ArmSelection, final: Fit, rest: Fit, held: Sequence[Experiment], c: int) -> float:

@@ -14,6 +14,7 @@ from snarelab.identification.evidence.confirm import (
     FEWEST_BLOCKS,
     ArmLoss,
     PredictiveDensity,
+    along_instruments,
     blocks,
     confirm,
     known_to,
@@ -170,3 +171,24 @@ def test_a_law_at_its_bound_predicts_nothing_of_the_wrong_sign(tmp_path):
     assert fit.theta[level] == 0.0
     assert fit.at_bound[level]
     assert found.forecast.mean[level] == found.forecast.covariance[level, level] == 0.0
+
+
+def test_what_a_disturbance_moves_says_nothing_for_a_law():
+    """A disturbance d moves an inertia of 1 as its servo lets it: a = m + d / 5, so that the torque is m - 4/5 d.
+
+    Along the measured motion an inertia of 0.7 leaves less than the true one does; along the slow motion m alone, more.
+    """
+    rng = np.random.default_rng(1)
+    slow, disturbance = np.sin(np.arange(400) / 40.0)[:, None], rng.normal(size=(400, 1))
+    measured, torque = slow + 0.2 * disturbance, slow - 0.8 * disturbance
+
+    def fitted(inertia) -> Any:
+        return SimpleNamespace(theta=None, assembly=SimpleNamespace(residual=lambda a, _: (torque - inertia * a, [])))
+
+    def left(motion) -> float:
+        (found,) = along_instruments(fitted(0.7), fitted(1.0), [cast(Any, measured)], [motion])
+        return float(np.mean(found**2))
+
+    with_it = float(np.mean((torque - 0.7 * measured) ** 2))
+    assert left(measured) == pytest.approx(float(np.mean((torque - measured) ** 2)))
+    assert left(slow) < with_it < left(measured)
