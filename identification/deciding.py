@@ -44,7 +44,7 @@ WANDER_TIMES = (2.0, 8.0, 40.0)
 WANDER_PRIOR = 5.0
 """Rate of the exponential prior of a wander's level [1 / RMS of the residual] (Simpson et al. 2017)."""
 DRIVEN = 0.01
-"""Largest share of a joint's snap that unexplained torque may have driven inside the instrument motion's band."""
+"""Largest share of a joint's jerk that unexplained torque may have driven inside the instrument motion's band."""
 
 # Sticking.
 STICKS = ((0.04, 0.005), (0.01, 0.001))

@@ -51,8 +51,8 @@ def planned(
     others : sequence of Experiment
         Recordings that are low-passed alike and say nothing of the bands; they follow the training recordings.
     driven : float
-        Largest share of a joint's snap (second derivative of acceleration: what a late sensor's column is made of)
-        inside the band kept that the unexplained torque may account for.
+        Largest share of a joint's jerk (derivative of acceleration: what a late sensor's column is made of) inside the
+        band kept that the unexplained torque may account for.
 
     Returns
     -------
@@ -93,11 +93,11 @@ def _bands(found: Fit, experiments: Sequence[Experiment], share: float) -> Array
             inertia = float(np.mean(e.mass_matrix[:, c, c]))
             f, torque = welch(left[longest], rate, nperseg=length)
             _, total = welch(acceleration[:, c], rate, nperseg=length)
-            driven = np.cumsum(torque * f**4)
+            driven = np.cumsum(torque * f**2)
             _, energy = welch(speed[:, c], rate, nperseg=length)
             most = np.searchsorted(np.cumsum(energy), 0.9 * energy.sum())
             least = max(LEAST * f[most], LEAST * f[1])
-            bad = np.flatnonzero((driven > share * np.cumsum(total * f**4) * inertia**2) & (f > least))
+            bad = np.flatnonzero((driven > share * np.cumsum(total * f**2) * inertia**2) & (f > least))
             kept = max(least, f[bad[0]]) if len(bad) else np.inf
             bands[c] = min(bands[c], kept if kept < 0.9 * edge else np.inf)
     return bands

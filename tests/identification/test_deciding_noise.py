@@ -49,6 +49,18 @@ def test_a_joint_holds_something_at_least(monkeypatch):
             assert level(0.1) == pytest.approx(0.3 * factor)
 
 
+@pytest.mark.parametrize("count", [1, 6])
+def test_odds_of_a_wander_are_those_of_all_channels_together(monkeypatch, count):
+    """So the noise of each is told how many there are."""
+    monkeypatch.setattr(arm, "learn", lambda *_, channels, **__: channels)
+    motion: Any = SimpleNamespace(assembly=SimpleNamespace(base="free"), instruments=["a recording"], n_train=1)
+    column = np.ones((4, 1))
+    others: Any = SimpleNamespace(baseline=[[(None, column)] * count])
+    columns: Any = SimpleNamespace(some=lambda *_: column)
+    runs: Any = [["a channel"] * count]
+    assert arm._noise(0, motion, [np.zeros((4, count))], runs, others, {}, {}, columns) == count
+
+
 def test_a_level_that_wanders_must_show(monkeypatch):
     """The stronger its prior, the less of a weak wander is believed; its times are those that are tried."""
     rng, n, step = np.random.default_rng(7), 1200, 1 / 40

@@ -189,6 +189,16 @@ def test_bristles_shorter_than_a_sample_stay_between_their_ends():
         assert states[-1, 0] == pytest.approx(1.0)
 
 
+def test_a_spring_that_carries_nothing_is_refused_at_once(monkeypatch):
+    """A rate of 0/0 has no direction to go: it is worked out once, not in thousands of halved steps."""
+    built, asked = hidden_state._build(SPRING, False), []
+    counted = built._replace(rate=lambda *given: asked.append(given) or built.rate(*given))
+    monkeypatch.setattr(hidden_state, "_build", lambda *_: counted)
+    with pytest.raises(InputError, match="joint_elasticity has no steady state"):
+        simulate_states(SPRING, {"load": np.zeros(9), "inertia": np.zeros(9)}, np.array([0.0, 0.0]), 0.01)
+    assert len(asked) == 1
+
+
 def test_no_steady_state_is_said():
     with pytest.raises(InputError, match=r"joint_elasticity has no steady state .*stiffness = 0 T/S"):
         simulate_states(SPRING, {"load": np.ones(9), "inertia": np.ones(9)}, np.array([0.0, 1.0]), 0.01)

@@ -66,7 +66,7 @@ def test_direction_and_speed_without_it():
 
 
 def disturbed(
-    level=0.1 / 32, edge=8.0, inertia=1.0, slow=1.0, seed=0, segments=None, rest=False, column=None, extra=0.0
+    level=0.1 / 8, edge=8.0, inertia=1.0, slow=1.0, seed=0, segments=None, rest=False, column=None, extra=0.0
 ):
     """One joint: speed a sine of ``slow`` Hz, acceleration white up to ``edge`` Hz, residual white throughout.
 
@@ -105,29 +105,29 @@ def test_a_clock_of_ten_seconds_has_a_band_too(monkeypatch):
     """As where milliseconds are read as seconds: eight seconds, the usual window, hold no sample."""
     monkeypatch.setitem(globals(), "PERIOD", 10.0)
     monkeypatch.setitem(globals(), "TIME", 10.0 * np.arange(N))
-    (band,) = bands(disturbed(0.1 / 32, edge=8e-3, slow=1e-3))
+    (band,) = bands(disturbed(0.1 / 8, edge=8e-3, slow=1e-3))
     assert 8e-3 <= band < 0.05
 
 
 @pytest.mark.parametrize(
     ("level", "inertia", "wanted"),
     [
-        # The share up to f is level / inertia² · f⁵ of the edge's 8⁵: a tenth at 8 · (0.1 inertia² / level)^(1/5).
-        (0.1 / 32, 1.0, 16.0),
-        (0.1 / 32, 2.0, 8.0 * (32 * 4) ** 0.2),
-        (0.1 / 3, 1.0, 8.0 * 3**0.2),
+        # The share up to f is level / inertia² · f³ of the edge's 8³: a tenth at 8 · (0.1 inertia² / level)^(1/3).
+        (0.1 / 8, 1.0, 16.0),
+        (0.1 / 8, 2.0, 8.0 * (8 * 4) ** (1 / 3)),
+        (0.1 / 3, 1.0, 8.0 * 3 ** (1 / 3)),
         (0.1 / 6000, 1.0, np.inf),  # beyond nine tenths of the analysis band's 50 Hz
     ],
 )
-def test_the_band_ends_where_what_is_unexplained_drives_a_tenth_of_the_snap(level, inertia, wanted):
+def test_the_band_ends_where_what_is_unexplained_drives_a_tenth_of_the_jerk(level, inertia, wanted):
     (found,) = bands(disturbed(level, inertia=inertia))
     assert found == pytest.approx(wanted, rel=0.06)
 
 
 @pytest.mark.parametrize("share", [0.05, 0.2])
-def test_half_the_share_that_may_be_driven_is_a_fifth_roots_less_of_the_band(share):
+def test_half_the_share_that_may_be_driven_is_a_cube_roots_less_of_the_band(share):
     (found,) = bands(disturbed(), share=share)
-    assert found == pytest.approx(16.0 * (share / 0.1) ** 0.2, rel=0.06)
+    assert found == pytest.approx(16.0 * (share / 0.1) ** (1 / 3), rel=0.06)
     assert abs(found - 16.0) > 1.0
 
 
