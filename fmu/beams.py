@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..models.axes import place
 from ..models.beam import TURNS, carried_joint, cut, length_axes
 from ..models.floating.arm import FloatingArm
-from ..models.law_symbols import rows
+from ..models.hidden_state import rows
 from ..models.model import Model, PlacedEffect
 from ..models.tree import Tree
 from .placed_laws import PlacedLaws

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..models.axes import Place, place
 from ..models.effect import Parameter, written_unit
-from ..models.law_symbols import reads
+from ..models.hidden_state import reads
 from ..models.model import Model, PlacedEffect
 from ..models.rig.points import far_end
 from .equations import Ledger

@@ -29,11 +29,41 @@ import numpy as np
 from ..errors import InputError
 from .compiled import SampleFunction
 from .effect import Effect
-from .law_symbols import THROUGH, named, reads, symbols
 
 _MOST_NEWTON, _MOST_HALVINGS = 200, 40
 _SMALL = 1e-8  # of a state: a step of Newton's that is the last, since the next one would be its square
 _GAMMA = 1 - np.sqrt(0.5)
+_JOINT = dict.fromkeys(("q", "qd", "qdd", "load", "inertia", "time", "temperature", "speed_scale"), 1)
+
+#: Signals that a law may read, by place, and how many numbers each has.
+SIGNALS = {
+    "joint": _JOINT,
+    "link": {"phi": 10, "tip": 3},
+    "sensor": {"value": 1, **_JOINT},
+    "sling": {"velocity": 3, "weight": 1, "tension": 1, "time": 1},
+    "slide": _JOINT,
+    "boom": {"spread": 2, "time": 1},
+    "suspension": {"time": 1},
+    "beam": {"moment": 3, "inertia_beyond": 9, "time": 1},
+    "base": {"spin": 3, "spin_rate": 3, "acceleration": 3, "spin_gained": 3, "impulse": 3, "time": 1},
+    "pin": {"overlap": 1, "approach": 1, "elastic_force": 1, "normal_force": 1, "slip": 3, "slip_velocity": 1},
+    "cables": {"bending_stiffness": 1, "curvature_rate": 1},
+    "target": {"displacement": 3},
+    "carriage": {"qd": 1, "load": 1, "slip_velocity": 1, "time": 1},
+    "grooves": {"normal_force": 1, "presliding": 2},
+    "groove": {"across": 1},
+    "latches": {"drawn": 3, "stiffness": 1, "preload": 1, "since": 1},
+}
+
+
+def signals_of(effect: Effect) -> dict[str, int]:
+    """Signals that an effect's law may read, and how many numbers each has."""
+    numbers = range(1, len(effect.others) + 1)
+    return SIGNALS[effect.at] | {f"{name}_of_{k}": 1 for k in numbers for name in ("q", "qd")}
+
+
+#: The signal, by place, that itself depends on the model's parameters; none on a suspension rig.
+THROUGH = {"joint": "load", "link": "phi", "sensor": "value"}
 
 
 class _Built(NamedTuple):
@@ -143,6 +173,21 @@ def evaluate_law(
     return LawEvaluation(values[:, :, 0], by_parameter, slopes[0] if slopes else None)
 
 
+@cache
+def rows(effect: Effect) -> tuple[int, ...]:
+    """Which of the numbers that a law gives can be other than zero."""
+    law = _symbols(effect).law
+    return tuple(i for i in range(law.numel()) if not law[i].is_zero())
+
+
+@cache
+def reads(effect: Effect) -> tuple[str, ...]:
+    """Signals that a law, or the rate of its states, depends on."""
+    _, _, signals, law, rate = _symbols(effect)
+    read = ca.vertcat(law, rate)
+    return tuple(name for name, u in signals.items() if any(ca.which_depends(read, u, 1, False)))
+
+
 def prepare(effects: Iterable[Effect]) -> None:
     """Compile effects ahead of their first use, several at a time; what is in the cache already costs milliseconds.
 
@@ -177,9 +222,33 @@ def _carried(
     return built.step.scan(start, *here, *later, np.append(p, dt))
 
 
+class _Symbols(NamedTuple):
+    p: ca.SX
+    x: ca.SX
+    signals: dict[str, ca.SX]
+    law: ca.SX
+    rate: ca.SX
+
+
+def _symbols(effect: Effect) -> _Symbols:
+    p = ca.SX.sym("p", len(effect.parameters))
+    x = ca.SX.sym("x", len(effect.states))
+    signals = {name: ca.SX.sym(name, size) for name, size in signals_of(effect).items()}
+    states, named = _named(effect, x, p)
+    s = signals | states
+    law = ca.vertcat(effect.law(s, named))
+    return _Symbols(p, x, signals, law, ca.vertcat(*effect.rate(s, named)) if effect.rate else ca.SX(0, 1))
+
+
+def _named(effect: Effect, x: ca.SX, p: ca.SX) -> tuple[dict[str, ca.SX], dict[str, ca.SX]]:
+    """States and parameters by name."""
+    states = dict(zip(effect.states, ca.vertsplit(x) if effect.states else [], strict=True))
+    return states, dict(zip((parameter.name for parameter in effect.parameters), ca.vertsplit(p), strict=True))
+
+
 @cache
 def _build(effect: Effect, bare: bool) -> _Built:
-    p, x, all_signals, law, rate = symbols(effect)
+    p, x, all_signals, law, rate = _symbols(effect)
     sensitivity = ca.SX.sym("S", x.numel(), 0 if bare else p.numel())
     signals = {name: all_signals[name] for name in reads(effect)}
     names, u = tuple(signals), list(signals.values())
@@ -206,9 +275,9 @@ def _step(
     later = {f"next_{name}": ca.SX.sym(f"next_{name}", symbol.shape) for name, symbol in signals.items()}
     next_u, h = ca.vertcat(*later.values()), ca.SX.sym("h")
     if effect.advance:
-        states, parameters = named(effect, x, p)
+        states, named = _named(effect, x, p)
         next_signals = dict(zip(signals, later.values(), strict=True))
-        next_x = ca.vertcat(*effect.advance({**signals, **states}, next_signals, parameters, h))
+        next_x = ca.vertcat(*effect.advance({**signals, **states}, next_signals, named, h))
     else:
         f = ca.Function("f", [x, u, p], [rate, ca.jacobian(rate, x), ca.jacobian(rate, u)])
         next_x = ros2(lambda state, read: f(state, read, p), x, u, next_u, h)

@@ -12,8 +12,8 @@ from .axes import neighbours
 from .beam import beams
 from .docking.bench_setup import DockingTree, docking_places
 from .effect import Effect
+from .hidden_state import rows
 from .holding import Holding
-from .law_symbols import rows
 from .rig.kinematics import places_of, reached_joints
 from .rig.rig import Rig
 from .servo import Servo

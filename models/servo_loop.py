@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from .compiled import SampleFunction
 from .effect import Effect, Parameter, Symbols
 from .effects import effects, get_effect
-from .law_symbols import reads
+from .hidden_state import reads
 
 Array = NDArray[np.float64]
 

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...models.beam import BeamTerms, beam_terms
-from ...models.law_symbols import rows
+from ...models.hidden_state import rows
 from .effect_places import ChannelTerm, EffectPlace, TorqueState
 from .experiment import Experiment
 

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...models.axes import Place, place
-from ...models.hidden_state import LawEvaluation, evaluate_law
-from ...models.law_symbols import rows
+from ...models.hidden_state import LawEvaluation, evaluate_law, rows
 from ...models.model import PlacedEffect
 from ...models.rig.points import far_end
 from ...models.tree import Tree

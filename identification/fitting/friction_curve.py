@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...models.axes import Place, place
-from ...models.hidden_state import evaluate_law
-from ...models.law_symbols import reads
+from ...models.hidden_state import evaluate_law, reads
 from ...models.model import PlacedEffect
 from ..diagnosis import FrictionCurve
 from .experiment import Experiment

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...models.effect import Parameter
-from ...models.law_symbols import rows
+from ...models.hidden_state import rows
 from ...models.model import PlacedEffect
 from ...models.rig.kinematics import reached_joints
 from ...models.rig.rig import Rig

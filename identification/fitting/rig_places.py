@@ -8,8 +8,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.hidden_state import LawEvaluation
-from ...models.law_symbols import rows
+from ...models.hidden_state import LawEvaluation, rows
 from ...models.rig.kinematics import boom_map, place_map, reached_joints, sling_of
 from ...models.rig.points import point_motion
 from ...models.rig.rig import Rig

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ...models.effect import Parameter, written_unit
 from ...models.effects import effects, get_effect
-from ...models.law_symbols import reads
+from ...models.hidden_state import reads
 from ...models.model import Model, PlacedEffect
 from ...recordings import JointKind
 from ..deciding import BLOCK, LEAST_LEVEL, SIZES

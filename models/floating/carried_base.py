@@ -15,8 +15,8 @@ import numpy as np
 from ..compiled import SampleFunction
 from ..dormand_prince import DormandPrince
 from ..effect import Effect
+from ..hidden_state import SIGNALS
 from ..inertia import Array
-from ..law_symbols import SIGNALS
 from ..rotation import quaternion_rate, rotation_of
 from . import symbols
 from .arm import FloatingArm

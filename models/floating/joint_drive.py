@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...errors import InputError, nearest
-from ..law_symbols import SIGNALS
+from ..hidden_state import SIGNALS
 from ..model import PlacedEffect
 from ..tree import Joint
 from .arm import FloatingArm

@@ -12,8 +12,7 @@ from scipy.optimize import least_squares
 
 from snarelab.models.effect import Effect
 from snarelab.models.effects import FAMILIES, effects
-from snarelab.models.hidden_state import LawEvaluation, evaluate_law
-from snarelab.models.law_symbols import THROUGH
+from snarelab.models.hidden_state import THROUGH, LawEvaluation, evaluate_law
 
 
 def scale_of(parameter, s):

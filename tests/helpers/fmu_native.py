@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import root
 
 from snarelab.models.floating.tree import CARRIERS
-from snarelab.models.law_symbols import SIGNALS, reads
+from snarelab.models.hidden_state import SIGNALS, reads
 from snarelab.models.rig.kinematics import boom_map, place_map, sling_of
 from snarelab.models.rig.points import far_end, point_motion
 from snarelab.models.rig.rig import Rig

@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from snarelab.errors import InputError
-from snarelab.models import compiled, hidden_state, law_symbols
+from snarelab.models import compiled, hidden_state
 from snarelab.models.effect import Effect, Parameter
 from snarelab.models.effects import effects, get_effect
 from snarelab.models.hidden_state import evaluate_law, prepare, simulate_states
@@ -233,7 +233,7 @@ def rebuilt():
 def everything(effect, n=1500):
     """Every signal of an effect's place, the one that no law reads missing from the recording."""
     time = np.arange(n) * 0.005
-    sizes = law_symbols.SIGNALS[effect.at]
+    sizes = hidden_state.SIGNALS[effect.at]
     turns = {name: [[3 + i + j] for j in range(size)] for i, (name, size) in enumerate(sizes.items())}
     inputs = {name: 2 + np.sin(turn * time).T for name, turn in turns.items()}
     inputs |= {"qd": np.cos(3 * time), "load": load(time), "temperature": np.full(n, np.nan)}
