@@ -192,7 +192,9 @@ def test_bristles_shorter_than_a_sample_stay_between_their_ends():
 def test_a_spring_that_carries_nothing_is_refused_at_once(monkeypatch):
     """A rate of 0/0 has no direction to go: it is worked out once, not in thousands of halved steps."""
     built, asked = hidden_state._build(SPRING, False), []
-    counted = built._replace(rate=lambda *given: asked.append(given) or built.rate(*given))
+    rate = built.rate
+    assert rate is not None
+    counted = built._replace(rate=lambda *given: asked.append(given) or rate(*given))
     monkeypatch.setattr(hidden_state, "_build", lambda *_: counted)
     with pytest.raises(InputError, match="joint_elasticity has no steady state"):
         simulate_states(SPRING, {"load": np.zeros(9), "inertia": np.zeros(9)}, np.array([0.0, 0.0]), 0.01)
