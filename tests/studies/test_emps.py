@@ -64,7 +64,9 @@ def test_names_what_is_missing_in_order(folder):
     assert found["verdict"] == "missing_physics"
     names = [(e["name"], e["at"]) for e in found["effects"]]
     # No law beside another that holds it. The force is what the controller asks for; a late encoder looks alike.
-    assert names == [("coulomb_friction", "slide"), ("asymmetric_friction", "slide"), ("command_delay", "tau.slide")]
+    # Friction changes along the screw by some 1 N, which was a curve without a name before.
+    friction = [(f"{x}_friction", "slide") for x in ("coulomb", "asymmetric", "position_dependent")]
+    assert names == [*friction[:2], ("command_delay", "tau.slide"), friction[2]]
     assert ("sensor_delay", "q.slide") in {
         (r["name"], r["at"]) for r in found["effects"][2]["rivals"] if not r["separable"]
     }
