@@ -1,6 +1,7 @@
 """Whole diagnoses of arms that MuJoCo moved, with LuGre friction and a servo: none of it is snarelab's own dynamics."""
 
 import json
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from bench.parts import Disturbance, Elasticity, Harness, Payload
 from snarelab.cli import main
 
 JOINTS = ("joint1", "joint2", "joint3")
+NEIGHBOURS = {f"{a}{sign}{b}" for a, b in pairwise(JOINTS) for sign in "+-"}
 LEVELS = {"joint1": 8.0, "joint2": 5.0, "joint3": 2.0}
 BUNDLED = Path(__file__).resolve().parents[2] / "studies" / "bundled"
 FRICTION = ("viscous_friction", "coulomb_friction", "presliding_hysteresis")
@@ -83,7 +85,8 @@ def test_nothing_missing_is_adequate(tmp_path, seed):
     assert {x["name"] for x in found["limits"]} >= {"sensor_bias", "harness_stiffness", "rotor_inertia", "com_offset"}
     for name in ("rotor_inertia", "quadratic_friction", "load_dependent_friction", "stribeck_friction"):
         # Also where the best fit would be a negative one.
-        assert {x["at"] for x in found["limits"] if x["name"] == name} >= set(JOINTS), name
+        coupled = NEIGHBOURS if name == "rotor_inertia" else set()
+        assert {x["at"] for x in found["limits"] if x["name"] == name} == {*JOINTS, *coupled}, name
 
 
 @pytest.mark.slow

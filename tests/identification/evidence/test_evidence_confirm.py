@@ -192,3 +192,35 @@ def test_what_a_disturbance_moves_says_nothing_for_a_law():
     with_it = float(np.mean((torque - 0.7 * measured) ** 2))
     assert left(measured) == pytest.approx(float(np.mean((torque - measured) ** 2)))
     assert left(slow) < with_it < left(measured)
+
+
+def test_a_name_is_tried_along_the_instrument_motion(monkeypatch):
+    """Fits that leave -theta times a motion: 1 with the name, 2 without. Instruments are ten times the motions."""
+    asked, nothing = [], (np.zeros(0), np.zeros((0, 0)))
+
+    def fitted(theta) -> Any:
+        return SimpleNamespace(theta=theta, assembly=SimpleNamespace(residual=lambda x, own: (-own * x, [])))
+
+    def forecast(*given: Any) -> PredictiveDensity:
+        asked.append(given[6:])
+        return PredictiveDensity(0.0, (), *nothing)
+
+    for name, stand_in in {
+        "without": fitted(2.0),
+        "channel_rms": (np.ones(1), np.ones(1)),
+        "_apart": np.ones(1),
+        "_explained": 0.0,
+        "scatter": 1.0,
+        "_without": None,
+    }.items():
+        monkeypatch.setattr(module, name, lambda *_, x=stand_in: x)
+    monkeypatch.setattr(module, "without_its_curves", lambda found, *_: found)
+    monkeypatch.setattr(module, "forecast", forecast)
+    found: Any = SimpleNamespace(first=None, instruments=[10.0, 20.0])
+    (name,) = names(1)
+    name.channels = (0,)
+    whole = PredictiveDensity(1.0, (), *nothing)
+    train, held = [cast(Any, 1.0)], [cast(Any, 2.0)]
+    missed = module._missed(name, cast(Any, None), fitted(1.0), whole, found, train, held, {})
+    assert missed.gain == 1.0
+    assert asked == [([-1.0 - 10.0, -2.0 - 20.0],)]
