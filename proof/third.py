@@ -15,6 +15,25 @@ from snarelab.models.rigid_body import RigidBody
 NAME = "third.csv"
 
 
+def closing(folder: Path, model: Path, band: float) -> dict[str, list[float]]:
+    """RMS [N·m] on a case's third recording by channel: of a fit without a name, of the model that was found, and of
+    the oracle, a fit to the case's twin, in which nothing is concealed.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the case: ``arm.toml``, its recordings, and the twin's in ``twin``.
+    model : Path
+        What was found; where it is not there, nothing was.
+    band : float
+        [Hz], of what was found.
+    """
+    before = left(folder, folder / "arm.toml", band, refit=True)
+    after = left(folder, model, band, refit=False) if model.exists() else before
+    oracle = left(folder / "twin", folder / "twin" / "arm.toml", band, refit=True)
+    return {channel: [before[channel], after[channel], oracle[channel]] for channel in before}
+
+
 def left(folder: Path, model: Path, band: float, *, refit: bool) -> dict[str, float]:
     """RMS of a model's residual [N·m] along a case's third recording below a band, by channel.
 

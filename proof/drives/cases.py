@@ -1,5 +1,6 @@
 """The cases: which there are, how each is drawn, and what is written of it. All follows from seed and number."""
 
+import copy
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -34,6 +35,9 @@ MOST_ASTRAY = 0.3
 """An arm that strays further from its motion [rad] has lost its servo: another case is drawn."""
 
 ATTEMPTS = 1000
+TWIN = "twin"
+"""Folder, in a case's, of the same arm with nothing concealed in it: recordings to fit and to score."""
+
 BACKGROUND = ("inertia_error", "com_offset", "payload_mass")
 """Names that are true of a case besides: links whose numbers are 1 to 3 % off. Bristles, where the model has none."""
 
@@ -63,9 +67,10 @@ def planned(seed: int, count: int) -> list[Plan]:
             elif group == LAWLESS:
                 concealed = (next(lawless),)
             elif group == PAIR:
-                names = pairs.choice(NAMES, 2, replace=False).tolist()
-                while set(names) <= set(SPRINGS):  # each would be sized by both
-                    names = pairs.choice(NAMES, 2, replace=False).tolist()
+                several = int(pairs.integers(2, 4))
+                names = pairs.choice(NAMES, several, replace=False).tolist()
+                while len(set(names) & set(SPRINGS)) > 1:  # each would be sized by both
+                    names = pairs.choice(NAMES, several, replace=False).tolist()
                 concealed = tuple((name, float(pairs.choice((1.0, 2.0, 4.0)))) for name in names)
             plans.append(Plan(group, next(kinds[group]), concealed))
     return plans[:count]
@@ -81,24 +86,36 @@ def endless(seed: int, stream: int, items: Sequence):
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A case that was drawn: recordings by name, each column by name; model and URDF as text; and the answer."""
+    """A case that was drawn: recordings by name, each column by name; model and URDF as text; and the answer.
+
+    ``twin``: the recordings to fit and to score, and the model, with nothing concealed; empty where nothing is.
+    """
 
     recordings: Mapping[str, Mapping[str, NDArray]]
     model: str
     urdf: str
     truth: Mapping[str, Any]
+    twin: Mapping[str, Mapping[str, NDArray]]
+    twin_model: str
 
     def write(self, folder: Path) -> None:
         """All files; ``truth.json`` last, so that a folder with one is whole."""
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / "arm.urdf").write_text(self.urdf, encoding="utf-8")
-        (folder / "arm.toml").write_text(self.model, encoding="utf-8")
-        for name, columns in self.recordings.items():
-            table = np.column_stack(list(columns.values()))
-            np.savetxt(folder / f"{name}.csv", table, "%.9g", ",", header=",".join(columns), comments="")
+        write_arm(folder, self.urdf, self.model, self.recordings)
+        if self.twin:
+            write_arm(folder / TWIN, self.urdf, self.twin_model, self.twin)
         part = folder / "truth.json.part"
         part.write_text(json.dumps(self.truth, indent=1) + "\n", encoding="utf-8")
         part.replace(folder / "truth.json")
+
+
+def write_arm(folder: Path, urdf: str, model: str, recordings: Mapping[str, Mapping[str, NDArray]]) -> None:
+    """URDF, model and recordings."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "arm.urdf").write_text(urdf, encoding="utf-8")
+    (folder / "arm.toml").write_text(model, encoding="utf-8")
+    for name, columns in recordings.items():
+        table = np.column_stack(list(columns.values()))
+        np.savetxt(folder / f"{name}.csv", table, "%.9g", ",", header=",".join(columns), comments="")
 
 
 def draw(plan: Plan, seed: int, number: int) -> Case:
@@ -118,6 +135,8 @@ def _drawn(plan: Plan, seed: int, number: int, rng: Rng) -> Case:
     # What no model explains: as large, against its joint's torque, as on machines (issue 32's second table).
     level = total * np.exp(rng.uniform(np.log(0.015), np.log(0.05), len(total)))
     joints = rng.permutation(len(total))
+    if len(plan.concealed) > len(joints):
+        raise TooMuch("more effects than joints")
     plant, concealed = bare, []
     for k, (name, size) in enumerate(plan.concealed):
         # The bodies as they are with what is concealed already.
@@ -131,7 +150,7 @@ def _drawn(plan: Plan, seed: int, number: int, rng: Rng) -> Case:
             raise TooMuch("two effects at one joint")
         plant = made.plant
         concealed.append((name, size, made))
-    return _recorded(plan, seed, number, plant, motions, level, concealed, rng)
+    return _recorded(plan, seed, number, plant, bare, motions, level, concealed, rng)
 
 
 def background(rng: Rng) -> tuple[Plant, dict[str, tuple[NDArray, NDArray, NDArray]]]:
@@ -176,6 +195,7 @@ def _recorded(
     seed: int,
     number: int,
     plant: Plant,
+    bare: Plant,
     motions: Mapping[str, tuple[NDArray, NDArray, NDArray]],
     level: NDArray,
     concealed: Sequence[tuple[str, float, Made]],
@@ -185,24 +205,34 @@ def _recorded(
     memory = scale(rng, plan.disturbance)
     noise = level * rng.uniform(0.05, 0.3)
     speeds, step = bool(rng.random() < 0.25), 2.0 * np.pi / 2.0**bits
-    recordings, limited = {}, 0.0
-    for name, asked in motions.items():
-        pushes = level * disturbance(rng, plan.disturbance, memory, len(asked[0]), n)
-        true = plant.simulate(asked, pushes)
+    recordings, twin, limited = {}, {}, 0.0
+
+    def reading(arm: Plant, asked: tuple[NDArray, NDArray, NDArray], pushes: NDArray, rng: Rng) -> dict[str, NDArray]:
+        nonlocal limited
+        true = arm.simulate(asked, pushes)
         if not np.all(np.isfinite(true)) or np.abs(true[:, 0] - asked[0]).max() > MOST_ASTRAY:
             raise TooMuch("the servo loses the arm")
-        limited = max(limited, float(np.mean(np.abs(true[:, 3]) > 0.98 * plant.limit)))
-        recordings[name] = recorded(true, plant.sensors, rate, step, noise, rng)
+        if arm is plant:
+            limited = max(limited, float(np.mean(np.abs(true[:, 3]) > 0.98 * arm.limit)))
+        found = recorded(true, arm.sensors, rate, step, noise, rng)
         if speeds:
             first, stride = round(STILL / TICK), round(1.0 / (rate * TICK))
             qd = true[first::stride, 1]
             qd = qd + 2e-3 * rms(qd) * rng.standard_normal(qd.shape)
-            recordings[name] |= {f"qd.joint{k + 1}": qd[:, k] for k in range(n)}
+            found |= {f"qd.joint{k + 1}": qd[:, k] for k in range(n)}
+        return found
+
+    for name, asked in motions.items():
+        pushes = level * disturbance(rng, plan.disturbance, memory, len(asked[0]), n)
+        same = copy.deepcopy(rng)
+        recordings[name] = reading(plant, asked, pushes, rng)
+        if concealed and name != "hold":
+            twin[name] = reading(bare, asked, pushes, same)
     bristles = bool(rng.integers(2))
     known = ["viscous_friction", "coulomb_friction", "rotor_inertia", *(["presliding_hysteresis"] if bristles else [])]
     hidden = {(name, made.at) for _, _, made in concealed for name in made.hides}
     joints = [f"joint{k + 1}" for k in range(n)]
-    listed = ", ".join(f'{{name = "{e}", at = "{j}"}}' for e in known for j in joints if (e, j) not in hidden)
+    places = [(e, j) for e in known for j in joints]
     values = {
         name: dict(zip(joints, array.tolist(), strict=True))
         for name, array in (
@@ -239,5 +269,11 @@ def _recorded(
         "bits": bits,
         "limited": limited,
     }
-    model = f'name = "arm"\nsystem = "arm"\nurdf = "arm.urdf"\neffects = [{listed}]\n'
-    return Case(recordings, model, plant.nominal.urdf(), truth)
+    model, whole = model_text([x for x in places if x not in hidden]), model_text(places)
+    return Case(recordings, model, plant.nominal.urdf(), truth, twin, whole)
+
+
+def model_text(effects: Sequence[tuple[str, str]], more: str = "") -> str:
+    """A model file of effects, each (name, place)."""
+    listed = ", ".join(f'{{name = "{e}", at = "{at}"}}' for e, at in effects)
+    return f'name = "arm"\nsystem = "arm"\nurdf = "arm.urdf"\n{more}effects = [{listed}]\n'

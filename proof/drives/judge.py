@@ -10,6 +10,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from ..judge import AUDIBLE, is_physics
 from .nameless import NAMED_SINCE
 from .places import joint
 
@@ -54,7 +57,11 @@ class Found:
 
 @dataclass(frozen=True)
 class Judged:
-    """A case: its classes, its concealed effects, and whether all was right and nothing else said."""
+    """A case: its classes, its concealed effects, and whether all was right and nothing else said.
+
+    ``fault``: nothing but a parameter or a sensor is wrong. ``closure``: (before - after) / (before - oracle) of the
+    RMS on the third recording, where what is concealed shows most; None where that was not recorded.
+    """
 
     group: str
     disturbance: str
@@ -66,6 +73,9 @@ class Judged:
     located: bool
     known: tuple[float, ...]
     seconds: float
+    fault: bool
+    closure: float | None
+    classes: tuple[tuple[Place, ...], ...]
 
     @property
     def wrong(self) -> list[Told]:
@@ -76,6 +86,14 @@ class Judged:
     def whole(self) -> bool:
         """Every concealed effect in a class at its place, and nothing wrong."""
         return bool(self.found) and all(f.member for f in self.found) and not self.wrong
+
+    @property
+    def blamed(self) -> bool:
+        """Physics is named that is not true of the background, or something without a name is told of."""
+        physics = [
+            t for t, own in zip(self.told, self.classes, strict=True) if all(is_physics(name) for name, _ in own)
+        ]
+        return any(not t.background for t in physics) or self.verdict not in ("adequate", "missing_physics")
 
 
 def judge(line: Line) -> Judged:
@@ -116,7 +134,22 @@ def judge(line: Line) -> Judged:
         bool(lawless) and loudest == lawless[0]["channel"],
         tuple(_known(line)),
         float(line["seconds"]),
+        truth["group"] == "wrong" or (bool(named) and not any(is_physics(e["name"]) for e in named) and not lawless),
+        closure(line.get("third", {}), sorted({e["channel"] for e in truth["effects"]})),
+        tuple(map(tuple, classes)),
     )
+
+
+def closure(third: Mapping[str, Sequence[float]], channels: Sequence[str]) -> float | None:
+    """Share of the way to the oracle, over channels each by its oracle; 1 or 0 where the oracle leaves nothing to
+    close, and that stayed so or did not. ``third``: RMS before, after and of the oracle [N·m], by channel."""
+    rows = np.array([third[c] for c in channels if c in third])
+    if rows.size == 0:
+        return None
+    before, after = np.sqrt(np.mean(np.square(rows[:, :2] / rows[:, 2:]), axis=0))
+    if before <= AUDIBLE:
+        return float(after <= AUDIBLE)
+    return float((before - after) / (before - 1.0))
 
 
 def _found(truth: Mapping[str, Any], effects: Sequence[Mapping[str, Any]], classes: Sequence[list[Place]]) -> Found:

@@ -14,9 +14,15 @@ import snarelab
 from snarelab.errors import InputError
 from snarelab.files import written_whole
 
+from ..third import closing
+from .cases import TWIN
+
 Said = dict[str, Any]
 Diagnose = Callable[[Path], Said]
 
+
+BAND = 10.0
+"""Edge [Hz] below which errors are compared where there is no answer, which has one of its own."""
 
 IDLE = 4.0
 """Times its processor time that an answer may take by the clock."""
@@ -26,9 +32,15 @@ class OutOfTime(BaseException):
     """No answer within the limit; not an Exception, so that nothing on the way takes it for a failure of its own."""
 
 
+FOUND = "found.toml"
+"""The model that was found, in a case's folder."""
+
+
 def diagnose(folder: Path) -> Said:
-    """The tool on a case's model, fitted and held-out recording; the third is left alone."""
-    return snarelab.diagnose(folder / "arm.toml", folder / "train.csv", holdout=folder / "hold.csv").to_json()
+    """The tool on a case's model, fitted and held-out recording; the third is left alone. The model is `FOUND`."""
+    found = snarelab.diagnose(folder / "arm.toml", folder / "train.csv", holdout=folder / "hold.csv")
+    found.save_model(folder / FOUND)
+    return found.to_json()
 
 
 def score(
@@ -78,7 +90,12 @@ def alike(one: Any, other: Any) -> bool:
 
 
 def asked(folder: Path, limit: float, run: Diagnose) -> dict[str, Any]:
-    """Verdict, names with their rivals and values, and seconds; ``failed`` or ``out of time`` where there is none."""
+    """Verdict, names with their rivals and values, and seconds; ``failed`` or ``out of time`` where there is none.
+
+    ``third``: what is left of the third recording before, after and at best, by channel (`proof.third.closing`); where
+    something is concealed, and the case has a twin.
+    """
+    (folder / FOUND).unlink(missing_ok=True)
     start = time.perf_counter()
     try:
         with within(limit):
@@ -100,6 +117,8 @@ def asked(folder: Path, limit: float, run: Diagnose) -> dict[str, Any]:
         for channel, f in found.get("fit", {}).items()
     }
     said = {key: found[key] for key in ("description", "notes", "moved") if key in found}
+    if (folder / TWIN).exists():
+        said["third"] = closing(folder, folder / FOUND, found.get("band", {}).get("value", BAND))
     return {"verdict": found["verdict"], "effects": effects, "location": channels, "fit": fit, **said} | {
         "seconds": round(seconds, 2)
     }

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from proof.statistics import clopper_pearson
+from proof.statistics import calibration_error, clopper_pearson
 
 from .cases import CLEAN, FAULTY, LAWLESS, PAIR, SINGLE, SIZES
 from .judge import Judged, judge
@@ -69,11 +69,15 @@ def figures(cases: Sequence[Judged]) -> list[Figure]:
         )
     large = [f for c in single if c.size >= 2.0 for f in c.found]
     rows.append(_count("single 2x and above: its name at its place", [f.placed for f in large]))
-    pairs = [c for c in cases if c.group == PAIR]
+    several = [c for c in cases if c.group == PAIR]
+    pairs, more = [c for c in several if len(c.found) == 2], [c for c in several if len(c.found) > 2]
+    faults = [c for c in cases if c.fault]
     every = [f for c in cases for f in c.found]
     rows += [
         _count("pairs: both told, and nothing wrong besides", [c.whole for c in pairs]),
-        _count("pairs: effects named at their place", [f.placed for c in pairs for f in c.found]),
+        _count("three and four at once: all told, and nothing wrong besides", [c.whole for c in more]),
+        _count("pairs and more: effects named at their place", [f.placed for c in several for f in c.found]),
+        _count("a parameter or a sensor is wrong: physics not blamed", [not c.blamed for c in faults]),
         _count("place right, of names that are told", [f.placed for f in every if f.named]),
         _count("place right, of names and members that are told", [f.member for f in every if f.anywhere]),
         _mean("wrong names a case", [float(len(c.wrong)) for c in cases], share=False),
@@ -87,6 +91,7 @@ def figures(cases: Sequence[Judged]) -> list[Figure]:
     lawless = [c for c in cases if c.group == LAWLESS]
     rows += [
         _count("laws without a name: told as unknown", [c.unknown for c in lawless]),
+        _count("laws without a name 2x and above: told as unknown", [c.unknown for c in lawless if c.size >= 2.0]),
         _count(
             "laws without a name: told as unknown, loudest at its channel", [c.unknown and c.located for c in lawless]
         ),
@@ -97,6 +102,9 @@ def figures(cases: Sequence[Judged]) -> list[Figure]:
         _count("faulty recordings: told as a fault of the data", [c.verdict == "data_fault" for c in faulty]),
         _count("faulty recordings: physics named", [bool(c.told) for c in faulty]),
     ]
+    rows += _closures("single, told rightly", [c for c in single if c.whole])
+    rows += _closures("single", single)
+    rows += _closures("laws without a name, told", [c for c in lawless if c.unknown])
     claims = [(t.probability, t.member) for c in cases for t in c.told if not t.background]
     strict = [(t.probability, t.first) for c in cases for t in c.told]
     rows += [*_brier("names told", claims), *_brier("names told, strict: the background's are wrong", strict)]
@@ -126,16 +134,29 @@ def _mean(name: str, values: Sequence[float], share: bool = True) -> Figure:
     return Figure(name, float(np.mean(values)) if values else None, len(values), share=share)
 
 
+def _closures(name: str, cases: Sequence[Judged]) -> list[Figure]:
+    """How far the errors of cases close on the recording that nothing was given: median and worst."""
+    closed = [c.closure for c in cases if c.closure is not None]
+    return [
+        Figure(
+            f"{name}: closure on the third recording, median", float(np.median(closed)) if closed else None, len(closed)
+        ),
+        Figure(f"{name}: closure on the third recording, worst", min(closed, default=None), len(closed)),
+    ]
+
+
 def _brier(name: str, claims: Sequence[tuple[float, bool]]) -> list[Figure]:
     """Brier score, and its skill against a constant of the same mean as the outcomes."""
     if not claims:
-        return [Figure(f"Brier score of {name}", None, 0), Figure(f"Brier skill of {name}", None, 0)]
+        none = ("Brier score of", "Brier skill of", "calibration error of")
+        return [Figure(f"{what} {name}", None, 0) for what in none]
     p, right = np.array(claims, dtype=float).T
     score, constant = float(np.mean((p - right) ** 2)), float(np.mean((right - right.mean()) ** 2))
     skill = 1.0 - score / constant if constant > 0.0 else None
     return [
         Figure(f"Brier score of {name}", score, len(claims), share=False),
         Figure(f"Brier skill of {name}", skill, len(claims), share=False),
+        Figure(f"calibration error of {name}", calibration_error(p, right), len(claims), share=False),
         Figure(f"mean probability of {name}", float(p.mean()), len(claims), share=False),
         Figure(f"share right of {name}", float(right.mean()), len(claims), share=False),
     ]

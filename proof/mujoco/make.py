@@ -1,17 +1,18 @@
 """Write cases of the first generator with what is true of each beside them, as `proof.drives.score` reads it."""
 
+import copy
 import json
 import shutil
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from snarelab.models.effects import get_effect
 
-from ..cases import Answer, draw, planned_cases
+from ..cases import Answer, Case, draw, planned_cases
 from ..concealed import VALUES
-from ..drives.cases import LAWLESS
+from ..drives.cases import LAWLESS, TWIN
 from ..drives.make import made
 
 ATTEMPTS = 100
@@ -47,7 +48,7 @@ def make(
 
 
 def write(plan: Plan, seed: int, number: int, folder: Path) -> None:
-    """Record a case, with another arm where one cannot be recorded, and write it; ``truth.json`` last.
+    """Record a case, with another arm where it or its twin cannot be recorded, and write it; ``truth.json`` last.
 
     Raises
     ------
@@ -57,15 +58,23 @@ def write(plan: Plan, seed: int, number: int, folder: Path) -> None:
     for attempt in range(ATTEMPTS):
         case = draw(plan.drawn, seed, number, attempt)
         try:
+            told, twin = truth(case.answer, seed), twin_of(case)
             case.write(folder)
+            if told["effects"]:
+                twin.write(folder / TWIN)
         except ValueError:
             shutil.rmtree(folder)
             continue
         part = folder / "truth.json.part"
-        part.write_text(json.dumps(truth(case.answer, seed), indent=1) + "\n", encoding="utf-8")
+        part.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
         part.replace(folder / "truth.json")
         return
     raise RuntimeError(f"case {number} ({plan.drawn}): no arm could be recorded in {ATTEMPTS} attempts")
+
+
+def twin_of(case: Case) -> Case:
+    """A case with nothing concealed: its arm, motions and noise; of one that was not written yet."""
+    return replace(case, plant=case.twin, model=case.twin_model, noise=copy.deepcopy(case.noise))
 
 
 def truth(answer: Answer, seed: int) -> dict[str, Any]:

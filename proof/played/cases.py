@@ -1,5 +1,6 @@
 """The cases: which there are, how each is drawn, and what is written of it. All follows from seed and number."""
 
+import copy
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..drives.cases import endless
+from ..drives.cases import TWIN, endless, model_text, write_arm
 from .concealed import NAMES, Concealed, TooMuch
 from .laws import Slip
 from .machine import Machine, TooSoft
@@ -95,7 +96,7 @@ def _write(plan: Plan, seed: int, number: int, rng: Rng, folder: Path, outside: 
     motions = {part: motion(rng, arm, length) for part, length in RECORDINGS.items()}
     train = motions["train"]
     # What moves the arm, and what its URDF says of it.
-    machine = _bare(true_arm(arm, rng), train, rng)
+    bare = machine = _bare(true_arm(arm, rng), train, rng)
     total = np.sqrt(np.mean(machine.torque(train) ** 2, axis=0))
     level = total * np.exp(rng.uniform(np.log(LEVEL[0]), np.log(LEVEL[1]), J))
     joints, made = rng.permutation(J), []
@@ -112,12 +113,12 @@ def _write(plan: Plan, seed: int, number: int, rng: Rng, folder: Path, outside: 
     rate, bits = int(rng.choice(RATES)), int(rng.integers(*BITS))
     count, stride = 2.0 * np.pi / 2.0**bits, round(1.0 / (rate * STEP))
     rough, jitter, speeds = float(rng.uniform(0.0, 0.7)), float(rng.uniform(0.0, 0.02)), bool(rng.random() < 0.25)
-    recordings = {}
-    for r, (part, (q, qd, qdd)) in enumerate(motions.items()):
-        tau = machine.torque((q, qd, qdd))
-        played = [play(s, r, 1.0 / STEP, len(q), rng) for s in sources]
-        tau = machine.read(tau + level * np.stack(played, axis=1))[::stride]
-        seen = machine.positions(q)[::stride]
+    recordings, twin = {}, {}
+
+    def reading(of: Machine, motion: tuple[NDArray, NDArray, NDArray], pushes: NDArray, rng: Rng) -> dict[str, NDArray]:
+        q, qd, _ = motion
+        tau = of.read(of.torque(motion) + pushes)[::stride]
+        seen = of.positions(q)[::stride]
         seen = count * np.round(seen / count + rough * rng.standard_normal(seen.shape))
         time = np.arange(len(tau)) / rate + jitter / rate * rng.standard_normal(len(tau))
         columns = {"time": time - time[0]}
@@ -125,23 +126,25 @@ def _write(plan: Plan, seed: int, number: int, rng: Rng, folder: Path, outside: 
         if speeds:
             noise = 2e-3 * np.sqrt(np.mean(qd**2, axis=0)) * rng.standard_normal(seen.shape)
             columns |= {f"qd.{j}": (qd[::stride] + noise)[:, k] for k, j in enumerate(arm.joints)}
-        columns |= {f"tau.{j}": tau[:, k] for k, j in enumerate(arm.joints)}
-        recordings[part] = columns
+        return columns | {f"tau.{j}": tau[:, k] for k, j in enumerate(arm.joints)}
+
+    for r, (part, along) in enumerate(motions.items()):
+        pushes = level * np.stack([play(s, r, 1.0 / STEP, len(along[0]), rng) for s in sources], axis=1)
+        same = copy.deepcopy(rng)
+        recordings[part] = reading(machine, along, pushes, rng)
+        if made and part != "hold":
+            twin[part] = reading(bare, along, pushes, same)
     if plan.group == FAULTY:
         fault = FAULTS[plan.concealed[0][0]]
         recordings = {part: fault(c, int(joints[0])) for part, c in recordings.items()}
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "arm.urdf").write_text(arm.urdf, encoding="utf-8")
     known = ["viscous_friction", "coulomb_friction", "rotor_inertia"] + ["presliding_hysteresis"] * int(rng.integers(2))
     hidden = {(law, one.at) for _, _, one in made for law in one.hides}
-    effects = ", ".join(f'{{name = "{e}", at = "{j}"}}' for e in known for j in arm.joints if (e, j) not in hidden)
-    rows = ", ".join(f'"{j}"' for j in arm.joints)
-    (folder / "arm.toml").write_text(
-        f'name = "arm"\nsystem = "arm"\nurdf = "arm.urdf"\njoints = [{rows}]\neffects = [{effects}]\n', encoding="utf-8"
-    )
-    for part, columns in recordings.items():
-        table = np.column_stack(list(columns.values()))
-        np.savetxt(folder / f"{part}.csv", table, "%.9g", ",", header=",".join(columns), comments="")
+    places = [(e, j) for e in known for j in arm.joints]
+    joined = ", ".join(f'"{j}"' for j in arm.joints)
+    rows = f"joints = [{joined}]\n"
+    write_arm(folder, arm.urdf, model_text([x for x in places if x not in hidden], rows), recordings)
+    if twin:
+        write_arm(folder / TWIN, arm.urdf, model_text(places, rows), twin)
     told = {
         "seed": seed,
         "case": number,

@@ -145,6 +145,44 @@ def test_figures_count_what_they_say():
     assert found["single 4x: its name at its place"].value is None
 
 
+def test_closure_is_the_share_of_the_way_to_the_twin():
+    third = {"tau.joint1": [9.0, 9.0, 1.0], "tau.joint2": [3.0, 1.5, 1.0]}
+    assert judge(line("single", [RIPPLE], third=third)).closure == pytest.approx(0.75)
+    assert judge(line("single", [RIPPLE], third={"tau.joint2": [1.01, 1.0, 1.0]})).closure == 1.0
+    assert judge(line("single", [RIPPLE], third={"tau.joint2": [1.01, 1.1, 1.0]})).closure == 0.0
+    assert judge(line("single", [RIPPLE])).closure is None
+    two = [RIPPLE, ("viscous_friction", "joint1", 2.0, {})]
+    scaled = {"tau.joint1": [30.0, 10.0, 10.0], "tau.joint2": [3.0, 1.0, 1.0]}
+    assert judge(line("pair", two, third=scaled)).closure == pytest.approx(1.0)
+
+
+def test_parameters_and_sensors_are_not_physics():
+    bias, mass = effect("sensor_bias", "tau.joint2"), effect("payload_mass", "link2")
+    ripple = effect("torque_ripple", "joint2")
+    unsure = effect("torque_ripple", "joint2", 0.5, [("sensor_bias", "tau.joint2", 0.4, False)])
+    fault = line("single", [("sensor_bias", "tau.joint2", 1.0, {})])
+    assert judge(fault).fault
+    assert judge(line("wrong")).fault
+    assert not judge(line("single", [RIPPLE])).fault
+    assert not judge(line("nameless", [("", "joint2", 1.0, {})])).fault
+    bristles = effect("presliding_hysteresis", "joint1")  # which the background has
+    for said, blamed in ((bristles, False), (bias, False), (mass, False), (ripple, True), (unsure, False)):
+        assert judge(fault | {"effects": [said], "verdict": "missing_physics"}).blamed == blamed
+    assert judge(fault | {"verdict": "unknown_effect"}).blamed
+    found = by_name([fault, line("wrong", (), [ripple])])
+    assert found["a parameter or a sensor is wrong: physics not blamed"].value == 0.5
+
+
+def test_more_than_two_at_once_are_counted_apart():
+    two = [RIPPLE, ("viscous_friction", "joint1", 2.0, {})]
+    three = [*two, ("sensor_bias", "tau.joint3", 1.0, {})]
+    said = [effect(name, at) for name, at, *_ in three]
+    found = by_name([line("pair", two, said[:2]), line("pair", three, said[:2]), line("pair", three, said)])
+    assert found["pairs: both told, and nothing wrong besides"].value == 1.0
+    assert found["three and four at once: all told, and nothing wrong besides"].value == 0.5
+    assert found["pairs and more: effects named at their place"].value == pytest.approx(7 / 8)
+
+
 @pytest.fixture
 def folders(tmp_path):
     made = [tmp_path / f"{k:04}" for k in range(3)]
@@ -226,6 +264,26 @@ def test_an_effect_is_kept_as_the_tool_says_it(tmp_path, folders):
     assert kept["effects"] == [told]
     assert kept["location"] == {"tau.joint2": 0.7}
     assert kept["fit"] == {"tau.joint2": [2.0, 1.0, 2.0, 1.0]}
+
+
+def test_third_recording_is_scored_with_the_model_that_was_found(tmp_path, folders, monkeypatch):
+    asked = []
+
+    def closing(folder, model, band):
+        asked.append((folder, model.exists(), band))
+        return {"tau.joint2": [3.0, 1.0, 1.0]}
+
+    def run(folder):
+        (folder / scoring.FOUND).touch()
+        return answer(band={"value": 12.0})
+
+    monkeypatch.setattr(scoring, "closing", closing)
+    (folders[1] / "twin").mkdir()
+    (folders[1] / scoring.FOUND).touch()  # of an earlier tool
+    kept = score(folders[:2], tmp_path / "a.jsonl", tell=lambda _: None, run=run)
+    assert ["third" in x for x in kept] == [False, True]
+    score(folders[1:2], tmp_path / "b.jsonl", tell=lambda _: None, run=lambda _: answer())
+    assert asked == [(folders[1], True, 12.0), (folders[1], False, scoring.BAND)]
 
 
 def test_sources_are_a_digest_of_the_tool():

@@ -19,6 +19,15 @@ def answer_of(group, kind="coulomb_friction"):
     return draw((group, kinds, 2.0), SEED, 0, 0).answer
 
 
+def told_of(path):
+    return json.loads((path / "truth.json").read_text())
+
+
+def load(path):
+    names = path.read_text().splitlines()[0].split(",")
+    return dict(zip(names, np.loadtxt(path, delimiter=",", skiprows=1).T, strict=True))
+
+
 def said(truth, *named, verdict="missing_physics"):
     effects = [{"name": n, "at": at, "probability": 0.9, "rivals": [], "parameters": {}} for n, at in named]
     return {"verdict": verdict, "effects": effects, "seconds": 1.0, "location": {}, "truth": truth}
@@ -54,7 +63,13 @@ def test_cases_are_those_of_the_plan_and_are_made_once(tmp_path):
     count = 1 + next(k for k, (g, _, _) in enumerate(planned_cases(40, SEED)) if g == "single")
     (path,) = make(tmp_path, SEED, count, "single", tell=lambda _: None)[-1:]
     files = {x.name for x in path.iterdir()}
-    assert files == {"arm.toml", "arm.urdf", "train.csv", "hold.csv", "third.csv", "truth.json"}
+    assert files == {"arm.toml", "arm.urdf", "train.csv", "hold.csv", "third.csv", "truth.json", "twin"}
+    # What is concealed is all that the twin lacks; motion, noise and disturbance are the same.
+    own, twin = (load(path / name / "third.csv") for name in ("", "twin"))
+    assert np.array_equal(own["time"], twin["time"])
+    apart = {c: float(np.std(own[c] - twin[c])) for c in own if c.startswith("tau.")}
+    assert max(apart, key=lambda c: apart[c]) == told_of(path)["effects"][0]["channel"]
+    assert min(apart.values()) < 0.1 * max(apart.values())
     told = json.loads((path / "truth.json").read_text())
     assert [(e["law"], e["size"]) for e in told["effects"]] == list(planned(SEED, count)[-1].concealed)
     before = np.loadtxt(path / "hold.csv", delimiter=",", skiprows=1)

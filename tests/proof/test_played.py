@@ -227,9 +227,15 @@ def test_case_is_written_whole_and_alike_from_its_seed(tmp_path):
     k = next(i for i, p in enumerate(plans) if p.group == "single" and p.concealed[0][0] == "torque_ripple")
     for folder in ("one", "two"):
         write(plans[k], 3, k, tmp_path / folder)
-    for path in sorted((tmp_path / "one").iterdir()):
-        assert path.read_bytes() == (tmp_path / "two" / path.name).read_bytes()
+    files = sorted(x.relative_to(tmp_path / "one") for x in (tmp_path / "one").rglob("*.*"))
+    assert len(files) == 6 + 4
+    for path in files:
+        assert (tmp_path / "one" / path).read_bytes() == (tmp_path / "two" / path).read_bytes()
     truth = json.loads((tmp_path / "one" / "truth.json").read_text())
+    # The twin has the same motion, and its torque lacks what is concealed and nothing else.
+    own, twin = (np.genfromtxt(tmp_path / "one" / x / "third.csv", delimiter=",", names=True) for x in ("", "twin"))
+    apart = {c: np.abs(own[c] - twin[c]).max() for c in own.dtype.names}
+    assert [c for c, x in apart.items() if x > 1e-8] == [truth["effects"][0]["channel"].replace(".", "")]
     assert [e["name"] for e in truth["effects"]] == ["torque_ripple"]
     found = snarelab.identify(tmp_path / "one" / "arm.toml", tmp_path / "one" / "train.csv")
     assert len(found.parameters) > 0
