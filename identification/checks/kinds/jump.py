@@ -33,8 +33,8 @@ def find(case: CheckCase) -> list[CheckFinding]:
 def jumps(dataset: xr.Dataset, name: str) -> list[tuple[float, float]]:
     """(time [s], how far) of every step of a position that its neighbours do not predict, largest first.
 
-    What is held against the steps about it is the step less what they move meanwhile. A spike that comes back at once
-    is no jump.
+    What is held against the steps about it is the step less what they move meanwhile; where the stamp may be off and
+    not the position, less what they move. A spike that comes back at once is no jump.
     """
     x, t = np.asarray(dataset[name].values, float), np.asarray(dataset["time"].values, float)
     good = np.isfinite(x)
@@ -46,6 +46,8 @@ def jumps(dataset: xr.Dataset, name: str) -> list[tuple[float, float]]:
     speed = step / wait
     usual = median_filter(speed, 2 * ABOUT + 1, mode="nearest")
     unexpected = np.abs(speed - usual) * np.minimum(wait, 1.5 * period)
+    # Samples may be even, and their stamps not: then the steps themselves are smooth.
+    unexpected = np.minimum(unexpected, np.abs(step - median_filter(step, 2 * ABOUT + 1, mode="nearest")))
     about = _largest_about(np.abs(speed - usual) * period)
     quantum = np.unique(np.round(np.abs(step[step != 0]), 12))
     count = float(quantum[0]) if len(quantum) else 0.0
