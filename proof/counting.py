@@ -144,5 +144,5 @@ def of_lines(lines: Sequence[Mapping[str, Any]]) -> list[Row]:
 
 
 def generator_of(line: Mapping[str, Any]) -> str:
-    """Of a line that ``python -m proof.drives score`` kept: the third generator plays its disturbance."""
-    return "played" if line["truth"]["disturbance"]["kind"] == "played" else "drives"
+    """Of a line that ``python -m proof.drives score`` kept."""
+    return line["truth"]["generator"]

@@ -242,6 +242,7 @@ def _recorded(
         )
     }
     truth = {
+        "generator": "drives",
         "seed": seed,
         "case": number,
         "group": plan.group,

@@ -135,7 +135,7 @@ def judge(line: Line) -> Judged:
         tuple(_known(line)),
         float(line["seconds"]),
         truth["group"] == "wrong" or (bool(named) and not any(is_physics(e["name"]) for e in named) and not lawless),
-        closure(line.get("third", {}), sorted({e["channel"] for e in truth["effects"]})),
+        closure(line["third"], sorted({e["channel"] for e in truth["effects"]})) if "third" in line else None,
         tuple(map(tuple, classes)),
     )
 

@@ -94,6 +94,7 @@ def truth(answer: Answer, seed: int) -> dict[str, Any]:
         if not wrong
     ]
     return {
+        "generator": "mujoco",
         "seed": seed,
         "case": answer.case,
         "group": LAWLESS if lawless else answer.group,

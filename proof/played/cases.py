@@ -146,6 +146,7 @@ def _write(plan: Plan, seed: int, number: int, rng: Rng, folder: Path, outside: 
     if twin:
         write_arm(folder / TWIN, arm.urdf, model_text(places, rows), twin)
     told = {
+        "generator": "played",
         "seed": seed,
         "case": number,
         "group": plan.group,

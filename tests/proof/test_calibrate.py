@@ -125,9 +125,9 @@ def test_names_of_encoders_are_left_out_and_old_ones_without_evidence_refused():
         of_effects([old], [True], "x")
 
 
-def line(effects, concealed, background=()):
-    truth = {"group": "single", "disturbance": {"kind": "white"}, "background": list(background), "effects": concealed,
-             "known": {}}  # fmt: skip
+def line(effects, concealed, background=(), generator="drives"):
+    truth = {"generator": generator, "group": "single", "disturbance": {"kind": "white"}, "effects": concealed}
+    truth |= {"background": list(background), "known": {}}
     return {"case": "0007", "verdict": "missing_physics", "effects": effects, "truth": truth, "seconds": 1.0}
 
 
@@ -176,15 +176,15 @@ def test_a_map_that_predicts_a_generator_left_out_no_better_is_not_stored(tmp_pa
     def left_after(right_where_played) -> str:
         stored.write_text(text)
         files = [tmp_path / "drives.jsonl", tmp_path / "played.jsonl"]
-        for file, kind, right in zip(files, ("white", "played"), (lambda k: k > 20, right_where_played), strict=True):
+        for file, name, right in zip(files, ("drives", "played"), (lambda k: k > 20, right_where_played), strict=True):
             some = []
             for k in range(40):
                 at = "joint1" if right(k) else "joint2"
                 own = line(
                     [effect("backlash", at, 5.0 + 10 * k)],
                     [{"name": "backlash", "at": "joint1", "size": 1.0, "values": {}}],
+                    generator=name,
                 )
-                own["truth"]["disturbance"] = {"kind": kind}
                 some.append(own)
             file.write_text("".join(json.dumps(x) + "\n" for x in some))
         monkeypatch.setattr("sys.argv", ["calibrate", "--cases", "0", "--drives", *map(str, files)])
