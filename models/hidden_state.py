@@ -136,6 +136,7 @@ def evaluate_law(
     dt: float | None = None,
     *,
     bare: bool = False,
+    start: np.ndarray | None = None,
 ) -> LawEvaluation:
     """Values of an effect's law along samples, with derivatives.
 
@@ -152,6 +153,8 @@ def evaluate_law(
     bare : bool
         Of an effect with states, leave out the derivatives by its parameters, which take most of the time:
         ``by_parameter`` has no columns then.
+    start : numpy.ndarray, shape (n_x,), optional
+        How far from its steady state each state is at the first sample; their derivatives are not changed.
 
     Raises
     ------
@@ -165,7 +168,7 @@ def evaluate_law(
     if effect.states:
         if dt is None:
             raise ValueError(f"{effect.name} has states: dt is needed")
-        carried = _carried(effect, built, signals, p, dt, bare)
+        carried = _carried(effect, built, signals, p, dt, bare, start)
     if not built.signals:  # a constant reads nothing that says how many samples there are
         p = np.tile(p, (len(next(iter(inputs.values()))), 1))
     values, *slopes = built.law(*signals, carried, p)
@@ -208,7 +211,13 @@ def _signals(effect: Effect, built: _Built, inputs: Mapping[str, np.ndarray]) ->
 
 
 def _carried(
-    effect: Effect, built: _Built, signals: list[np.ndarray], p: np.ndarray, dt: float, bare: bool = False
+    effect: Effect,
+    built: _Built,
+    signals: list[np.ndarray],
+    p: np.ndarray,
+    dt: float,
+    bare: bool = False,
+    away: np.ndarray | None = None,
 ) -> np.ndarray:
     """States and, unless bare, sensitivities, stacked as the step hands them on (n_samples, n_x + n_x * n_p)."""
     if built.step is None:
@@ -218,6 +227,8 @@ def _carried(
         start = np.zeros(count)
     else:
         start = _steady_state(effect, built, [signal[:1] for signal in signals], p)[:count]
+    if away is not None:
+        start[: len(effect.states)] += away
     here, later = [signal[:-1] for signal in signals], [signal[1:] for signal in signals]
     return built.step.scan(start, *here, *later, np.append(p, dt))
 

@@ -17,8 +17,10 @@ from ..fitting.assembly import TorqueEvaluation, TorqueModel
 from ..fitting.experiment import Experiment, Scales
 from ..fitting.periodogram import Peaks
 from ..nuisance.curve import SMALL, Coordinates, family
+from ..nuisance.start import free_responses, springs_back
 from ..search.candidates import MOST_OF_WHOLE, EffectVariant, candidate_columns, library, reduced, variants
 from .pool import CandidateColumns, Item
+from .whole_mass import by_mass
 
 Array = NDArray[np.float64]
 Curves = Mapping[tuple[int, str], Item]
@@ -247,20 +249,44 @@ def _fitted(along: ColumnSource, p: PlacedEffect, columns: CandidateColumns) -> 
             for c, own in every.items():
                 for some, x, y in zip(own, parts[c], other[c], strict=True):
                     some.append((y - x) / SMALL_STEP)
+    for c, own in starts(along, p, v.parameters).items():
+        for some, x in zip(every[c], own, strict=True):
+            some.append(x)
     index = columns.add({c: [np.hstack(some) for some in own] for c, own in every.items()})
     return Item(index, np.full(len(index), 1 / size[0]), np.arange(len(index)) == 0, label=v)
+
+
+def starts(along: ColumnSource, p: PlacedEffect, parameters: Array) -> dict[int, list[Array]]:
+    """What a law adds where it starts off rest, by channel: columns (n_band, k) of each recording, those of the others
+    zero there; none of a law that always starts at rest."""
+    if not springs_back(p):
+        return {}
+    own = [
+        dict(free_responses(along.assembly, e, s, p, parameters))
+        for e, s in zip(along.instruments, along.states, strict=True)
+    ]
+    counts = [next(iter(x.values())).shape[1] if x else 0 for x in own]
+    found: dict[int, list[Array]] = {}
+    for i, some in enumerate(own):
+        for c, x in some.items():
+            rows = found.setdefault(c, [np.zeros((len(e.measured), sum(counts))) for e in along.instruments])
+            rows[i][:, sum(counts[:i]) : sum(counts[: i + 1])] = x
+    return found
 
 
 def _made(along: ColumnSource, v: EffectVariant) -> dict[int, list[Array]] | None:
     """Columns of a point by channel, one array a recording; None where the law cannot be simulated there."""
     parts: dict[int, list[Array]] = {}
+    added = along.assembly.at(v.placed).masses(v.parameters)
+    added = None if added is None else added[v.amplitudes]
     for e, s in zip(along.instruments, along.states, strict=True):
         try:
             found = candidate_columns(along.assembly, e, s, v)
         except InputError:
             return None  # a spring whose link has no inertia: no candidate ends a run
         for c, x in found:
-            parts.setdefault(c, []).append(x)
+            scale = None if added is None else by_mass(along.assembly, e, c)
+            parts.setdefault(c, []).append(x if scale is None else x + np.outer(scale, added))
     complete = all(len(x) == len(along.instruments) for x in parts.values())
     finite = all(np.isfinite(x).all() for own in parts.values() for x in own)
     return parts if parts and complete and finite else None

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...models.model import PlacedEffect
+from ...models.regressor import OWN
 from ..deciding import BASELINE, BASELINE_OWN, BASELINE_SHAPE, BENDS, DISCREPANCY, LAW_ERROR
 from ..fitting.assembly import TorqueModel
 from ..fitting.experiment import Experiment
@@ -14,8 +15,9 @@ from ..fitting.fit import Fit
 from ..fitting.problem import gather
 from ..nuisance.curve import SMALL, over_decades
 from ..search.refit import carry
-from .hypotheses import ColumnSource, Curves, coordinate, lagging, remembers
+from .hypotheses import ColumnSource, Curves, coordinate, lagging, remembers, starts
 from .pool import CandidateColumns
+from .whole_mass import by_mass
 
 Array = NDArray[np.float64]
 Part = tuple[NDArray[np.int_], Array]
@@ -69,6 +71,9 @@ def beside(
         for row, e in zip(parts, along.instruments, strict=True):
             for c, own in enumerate(row):
                 at, felt = regressor_columns(e, c)
+                scale = by_mass(assembly, e, c)
+                if scale is not None:
+                    felt = felt + scale[:, None] * (at % OWN == 0)
                 own.append((tolerant.start + at, felt * one[at]))
         count = tolerant.stop
     sizes = _small(found, baseline[:n], along.scale)
@@ -92,6 +97,13 @@ def beside(
             for c in range(n_channels):
                 row[c].append((count + np.arange(2), columns.some(i, c, item.index) * size))
         count += 2
+    for k, p in enumerate(assembly.placed):
+        made = starts(along, p, assembly.parameters(k, found.theta))
+        most = max((x.shape[1] for own in made.values() for x in own), default=0)
+        for c, own in made.items():
+            for row, x in zip(parts, own, strict=True):
+                row[c].append((count + np.arange(most), x))
+        count += most
     for p in assembly.placed:
         if p.effect.at == "joint" or coordinate(p.effect) is None:
             continue

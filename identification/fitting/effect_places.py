@@ -86,6 +86,10 @@ class EffectPlace(ABC):
         """Derivative of the torque at the place by its load (n,); None where the law does not depend on the load."""
         return None
 
+    def masses(self, parameters: Array) -> Array | None:
+        """Mass that a unit of each parameter adds to the arm (p,) [kg]; None where the law changes no link."""
+        return None
+
 
 class JointPlace(EffectPlace):
     """A joint, or an axis: a torque along it, or a change of its position, rate and acceleration (m = 3)."""
@@ -211,6 +215,10 @@ class LinkPlace(EffectPlace):
         link = self._link()
         law = evaluate_law(self.placed.effect, link, parameters)
         return law.values[0] - link["phi"][0], law.by_parameter[0]
+
+    def masses(self, parameters: Array) -> Array | None:
+        """A link's mass is the first of its inertial parameters."""
+        return self.change(parameters)[1][0]
 
     def terms(self, along: TorqueState, parameters: Array, bare: bool = False) -> EffectTerms:
         """Linear in the change, whatever ``bare`` says."""

@@ -13,7 +13,7 @@ from bench.parts import Beam, Disturbance, SolverFriction
 from snarelab.identification.diagnose import diagnose
 from snarelab.models.model_file import load_model
 
-RATE, TRAIN, HOLDOUT, ROTOR = 200.0, 18.0, 20.0, 0.05
+RATE, TRAIN, HOLDOUT, ROTOR = 200.0, 18.0, 10.0, 0.05
 # MuJoCo's link starts unloaded and rings at first, which no start at rest predicts: of 10 s that is a block of six.
 STIFFNESS = 500.0
 
