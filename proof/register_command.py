@@ -1,4 +1,4 @@
-"""``python -m proof register``, ``verify`` and ``registered``: a proof that was announced before it was run."""
+"""``python -m proof register``, ``verify`` and ``registered``, ``rivals``: a proof announced before it was run."""
 
 import argparse
 from collections.abc import Sequence
@@ -6,7 +6,7 @@ from pathlib import Path
 
 from .ending import status_of, tell
 
-COMMANDS = ("register", "verify", "registered")
+COMMANDS = ("register", "verify", "registered", "rivals")
 GENERATORS = ("drives", "played", "mujoco")
 
 
@@ -20,10 +20,12 @@ def main(words: Sequence[str]) -> int:
     registering.add_argument("--cases", type=int, default=75, help="of each seed (default: 75)")
     commands.add_parser("verify", help="tell whether the tree is the registered one")
     running = commands.add_parser("registered", help="run what was registered; resumed")
-    running.add_argument("--hours", type=float, default=1.0)
-    running.add_argument("--only", choices=GENERATORS, help="this generator alone: several can run side by side")
-    running.add_argument("--folder", type=Path, default=Path("build/proof/registered"), help="of cases and result.json")
-    running.add_argument("--answers", type=Path, default=Path("proof/answers"), help="to be committed")
+    asking = commands.add_parser("rivals", help="ask the rivals about what the tool has answered; resumed")
+    for one in running, asking:
+        one.add_argument("--hours", type=float, default=1.0)
+        one.add_argument("--only", choices=GENERATORS, help="this generator alone: several can run side by side")
+        one.add_argument("--folder", type=Path, default=Path("build/proof/registered"), help="of cases and result.json")
+        one.add_argument("--answers", type=Path, default=Path("proof/answers"), help="to be committed")
     given = parser.parse_args(words)
     return status_of(lambda: _do(given))
 
@@ -47,6 +49,12 @@ def _do(given: argparse.Namespace) -> int:
             "\n".join(found) or f"the tree is the one registered on {registered['date']} at {registered['commit'][:12]}"
         )
         return 1 if found else 0
+    if given.command == "rivals":
+        from . import registered_rivals
+
+        registered_rivals.ask(registered, given.hours, tell, given.folder, given.answers, only=given.only)
+        tell(registered_rivals.printed(registered, registered_rivals.compared(registered, given.answers)))
+        return 0
     files = register.run(registered, given.hours, tell, given.folder, given.answers, only=given.only)
     tell(register.printed(files))
     write_json(given.folder / "result.json", register.result(registered, files))

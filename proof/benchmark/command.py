@@ -20,7 +20,7 @@ def main(words: Sequence[str]) -> int:
     exporting.add_argument("--generator", choices=("drives", "played", "mujoco"), default="drives")
     answering = commands.add_parser("answer", help="worked examples: answer them with a method that is here")
     answering.add_argument("folder", type=Path, metavar="DIR")
-    answering.add_argument("--method", choices=("snarelab", "joint_bic"), required=True)
+    answering.add_argument("--method", choices=("snarelab", "joint_bic", "mujoco_sysid"), required=True)
     answering.add_argument("--out", type=Path, required=True, metavar="ANSWERS.json")
     scoring = commands.add_parser("score", help="the figures of any tool's answers")
     scoring.add_argument("folder", type=Path, metavar="DIR")
