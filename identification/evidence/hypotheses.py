@@ -285,8 +285,9 @@ def _made(along: ColumnSource, v: EffectVariant) -> dict[int, list[Array]] | Non
         except InputError:
             return None  # a spring whose link has no inertia: no candidate ends a run
         for c, x in found:
-            scale = None if added is None else by_mass(along.assembly, e, c)
-            parts.setdefault(c, []).append(x if scale is None else x + np.outer(scale, added))
+            scale = by_mass(along.assembly, e, c)
+            kept = x if scale is None or added is None else x + np.outer(scale, added)
+            parts.setdefault(c, []).append(kept)
     complete = all(len(x) == len(along.instruments) for x in parts.values())
     finite = all(np.isfinite(x).all() for own in parts.values() for x in own)
     return parts if parts and complete and finite else None

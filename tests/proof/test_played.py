@@ -234,7 +234,7 @@ def test_case_is_written_whole_and_alike_from_its_seed(tmp_path):
     truth = json.loads((tmp_path / "one" / "truth.json").read_text())
     # The twin has the same motion, and its torque lacks what is concealed and nothing else.
     own, twin = (np.genfromtxt(tmp_path / "one" / x / "third.csv", delimiter=",", names=True) for x in ("", "twin"))
-    apart = {c: np.abs(own[c] - twin[c]).max() for c in own.dtype.names}
+    apart = {c: np.abs(own[c] - twin[c]).max() for c in own.dtype.names or ()}
     assert [c for c, x in apart.items() if x > 1e-8] == [truth["effects"][0]["channel"].replace(".", "")]
     assert [e["name"] for e in truth["effects"]] == ["torque_ripple"]
     found = snarelab.identify(tmp_path / "one" / "arm.toml", tmp_path / "one" / "train.csv")
