@@ -74,6 +74,19 @@ def test_a_case_follows_from_its_seed(tmp_path):
     assert json.loads((tmp_path / "case" / "truth.json").read_text()) == first.truth
 
 
+def test_twin_has_the_cases_disturbance_noise_and_motion():
+    """A sensor's bias moves nothing, so that all but its own channel are the same to the last digit."""
+    case = draw(Plan(SINGLE, WHITE, (("sensor_bias", 2.0),)), SEED, 5)
+    (effect,) = case.truth["effects"]
+    for name, columns in case.twin.items():
+        for key, twin in columns.items():
+            apart = case.recordings[name][key] - twin
+            if key == effect["channel"]:
+                np.testing.assert_allclose(np.abs(apart), abs(effect["values"]["offset"]), rtol=1e-9)
+            else:
+                assert not apart.any(), key
+
+
 def test_make_resumes_and_keeps_to_its_seed(tmp_path, monkeypatch):
     drawn = []
 

@@ -1,8 +1,7 @@
 """The start of a hidden state: the free response of a law, alone in its run, against closed forms."""
 
 import numpy as np
-import pytest
-from moving_arm import PERIOD, build, motion, placed, three_joints
+from moving_arm import PERIOD, build, motion, placed
 
 from snarelab.identification.fitting.effect_places import TorqueState
 from snarelab.identification.fitting.experiment import Experiment
@@ -13,17 +12,6 @@ from snarelab.models.model import PlacedEffect
 
 RUNS = (slice(0, 500), slice(500, 1200))
 STIFFNESS, DAMPING = 900.0, 30.0
-
-
-@pytest.fixture(scope="module")
-def arm(tmp_path_factory):
-    return three_joints(tmp_path_factory.mktemp("arm"))
-
-
-@pytest.fixture(scope="module")
-def experiment(arm):
-    tree, body = arm
-    return Experiment(motion([j.kind for j in tree.joints], segments=RUNS), body)
 
 
 def test_a_panel_that_starts_bent_rings_as_an_oscillator():
@@ -43,8 +31,9 @@ def test_a_panel_that_starts_bent_rings_as_an_oscillator():
     assert not evaluate_law(panel, still, parameters, dt, bare=True).values.any()
 
 
-def test_columns_are_free_responses_in_their_run_alone(arm, experiment):
+def test_columns_are_free_responses_in_their_run_alone(arm):
     """A drive's spring far stiffer than the motion: each run begins with a ring of its own frequency, which decays."""
+    experiment = Experiment(motion([j.kind for j in arm[0].joints], segments=RUNS), arm[1])
     elasticity = placed(("joint_elasticity", "joint2"))[0]
     assembly = build(arm, experiment, [])
     state = assembly.evaluate(experiment, np.zeros(0))

@@ -1,4 +1,4 @@
-"""The arm that the assembly's tests share."""
+"""The arm that tests of the assembly and of what stands beside it share."""
 
 import pytest
 from moving_arm import motion, three_joints
