@@ -6,7 +6,7 @@ one: where a position sensor is late, ``sensor.q.<joint>`` is what it reads of i
 a drive is late ``tau`` is the torque that it delivers: its command was given the delay before. On a floating base its
 motion is given too, and the force and moment that it needs from outside come out: none, where the model is complete.
 
-Hidden states are stepped with the motion linear between communication points, as `snarelab.models.hidden_state` steps
+Hidden states are stepped with the motion linear between communication points, as `snarelab.models.ros2` steps
 them between samples.
 """
 
@@ -19,10 +19,10 @@ import numpy as np
 from ..models.axes import Place
 from ..models.beam import symbolic_beam
 from ..models.empirical import TableLaw
-from ..models.hidden_state import ros2
 from ..models.model import Model, PlacedEffect
 from ..models.rig.rig import Rig
 from ..models.rigid_body import symbolic_torque
+from ..models.ros2 import ros2
 from .base_motion import BaseMotion
 from .equations import Equations, Ledger
 from .placed_laws import PlacedLaws, identifier, summed
@@ -237,7 +237,7 @@ class _Follower:
         return {"load": summed(back, load[self.first :]), "inertia": summed(back, across)}
 
     def _stepped(self, p: PlacedEffect, x: ca.SX, here: _Signals, there: _Signals, h: ca.SX) -> ca.SX:
-        """One step, as `snarelab.models.hidden_state` takes it between samples."""
+        """One step, as `snarelab.models.ros2` takes it between samples."""
         if p.effect.advance:
             return self.laws.advanced(p, here | _named(p, x), there, h)
         state = ca.SX.sym("state", x.numel())

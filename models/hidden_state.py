@@ -3,25 +3,16 @@
 Alphabet: n samples, n_x states, n_p parameters, n_out numbers that the law gives; u(t) the recorded signals, linear
 between samples. Law and step are written once for each effect, in CasADi, and run over all samples in C.
 
-States follow x' = rate(x, u(t), p). One step of length h is ROS2 (Verwer, Spee, Blom and Hundsdorfer, 1999; Hairer and
-Wanner, *Solving Ordinary Differential Equations II*, IV.7), second-order and linearly implicit, with the time
-dependence of u taken into the linearisation::
-
-    (1 - gamma h J) k1 = h rate(x_n, u_n) + gamma h J_u (u_n+1 - u_n)
-    (1 - gamma h J) k2 = h rate(x_n + k1, u_n+1) - 2 k1 - gamma h J_u (u_n+1 - u_n)
-    x_n+1 = x_n + 3/2 k1 + 1/2 k2
-
-gamma = 1 - 1/sqrt(2) is the more accurate of the two values for which the method is L-stable: a spring or a delay much
-faster than the sampling costs nothing and decays at once. A solution that is linear in time is followed exactly. Where
-an effect gives the exact solution over a sample (``Effect.advance``), that takes the place of the step. The
-sensitivities dx/dp are the exact derivatives of these steps, carried along in the same pass.
+States follow x' = rate(x, u(t), p), by a step of `ros2` a sample. Where an effect gives the exact solution over a
+sample (``Effect.advance``), that takes the place of the step. The sensitivities dx/dp are the exact derivatives of
+these steps, carried along in the same pass.
 """
 
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -29,10 +20,9 @@ import numpy as np
 from ..errors import InputError
 from .compiled import SampleFunction
 from .effect import Effect
+from .ros2 import ros2
+from .steady_state import steady_state
 
-_MOST_NEWTON, _MOST_HALVINGS = 200, 40
-_SMALL = 1e-8  # of a state: a step of Newton's that is the last, since the next one would be its square
-_GAMMA = 1 - np.sqrt(0.5)
 _JOINT = dict.fromkeys(("q", "qd", "qdd", "load", "inertia", "time", "temperature", "speed_scale"), 1)
 
 #: Signals that a law may read, by place, and how many numbers each has.
@@ -226,11 +216,22 @@ def _carried(
     if effect.from_zero:
         start = np.zeros(count)
     else:
-        start = _steady_state(effect, built, [signal[:1] for signal in signals], p)[:count]
+        start = _at_rest(effect, built, [signal[:1] for signal in signals], p)[:count]
     if away is not None:
         start[: len(effect.states)] += away
     here, later = [signal[:-1] for signal in signals], [signal[1:] for signal in signals]
     return built.step.scan(start, *here, *later, np.append(p, dt))
+
+
+def _at_rest(effect: Effect, built: _Built, first: list[np.ndarray], p: np.ndarray) -> np.ndarray:
+    """States with zero rate at the first sample, and their sensitivities, stacked as the step wants them."""
+    evaluate = built.rate
+    assert evaluate is not None
+    found = steady_state(lambda x: [output[0] for output in evaluate(*first, x, p)], len(effect.states))
+    if found is None:
+        values = ", ".join(f"{a.name} = {b:g} {a.unit}" for a, b in zip(effect.parameters, p, strict=True))
+        raise InputError(f"{effect.name} has no steady state to start from at the first sample ({values})")
+    return np.concatenate([found[0], found[1].ravel()])
 
 
 class _Symbols(NamedTuple):
@@ -300,24 +301,6 @@ def _step(
     return _compiled(effect, "step", inputs, [_stacked(next_x, next_sensitivity)], names)
 
 
-def ros2(f: Callable[[ca.SX, ca.SX], Any], x: ca.SX, u: ca.SX, later: ca.SX, h: ca.SX) -> ca.SX:
-    """One step of ROS2.
-
-    Parameters
-    ----------
-    f : callable
-        Of states and signals: the rate, and its derivatives by states and by signals.
-    x, u, later, h : casadi.SX
-        States, signals, signals a sample later, and the time between [s].
-    """
-    here, by_state, by_input = f(x, u)
-    matrix = ca.SX.eye(x.numel()) - _GAMMA * h * by_state
-    drift = _GAMMA * h * by_input @ (later - u)
-    k1 = ca.solve(matrix, h * here + drift)
-    k2 = ca.solve(matrix, h * f(x + k1, later)[0] - 2 * k1 - drift)
-    return x + 1.5 * k1 + 0.5 * k2
-
-
 def _stacked(x: ca.SX, sensitivity: ca.SX) -> ca.SX:
     return ca.vertcat(x, ca.vec(sensitivity.T))
 
@@ -327,37 +310,3 @@ def _compiled(effect: Effect, what: str, inputs: list[ca.SX], outputs: list[ca.S
     # A link's law runs on one sample, a step from one to the next; the others on thousands side by side.
     lanes = what == "law" and effect.at != "link"
     return SampleFunction(ca.Function(f"{effect.name}_{what}", inputs, ca.cse(outputs), names, results), lanes=lanes)
-
-
-def _steady_state(effect: Effect, built: _Built, first: list[np.ndarray], p: np.ndarray) -> np.ndarray:
-    """States with zero rate and their sensitivities, stacked as the step wants them.
-
-    Newton's method from zero, each step halved until the rate falls: a dead band's corners throw full steps to and fro.
-    """
-    evaluate = built.rate
-    assert evaluate is not None
-
-    def at(x: np.ndarray) -> list[np.ndarray]:
-        return [output[0] for output in evaluate(*first, x, p)]
-
-    x = np.zeros(len(effect.states))
-    rate, by_state, by_parameter = at(x)
-    for _ in range(_MOST_NEWTON):
-        if not np.isfinite(rate).all():  # such as a spring that carries nothing
-            break
-        try:
-            change = np.linalg.solve(by_state, -rate[:, 0])
-        except np.linalg.LinAlgError:
-            break
-        if np.abs(change).max() <= _SMALL * np.abs(x).max():
-            _, by_state, by_parameter = at(x + change)
-            return np.concatenate([x + change, np.linalg.solve(by_state, -by_parameter).ravel()])
-        before = np.linalg.norm(rate)
-        for _ in range(_MOST_HALVINGS):
-            rate, by_state, by_parameter = at(x + change)
-            if np.linalg.norm(rate) < before:
-                break
-            change = 0.5 * change
-        x = x + change
-    values = ", ".join(f"{a.name} = {b:g} {a.unit}" for a, b in zip(effect.parameters, p, strict=True))
-    raise InputError(f"{effect.name} has no steady state to start from at the first sample ({values})")
