@@ -102,9 +102,9 @@ def _write(plan: Plan, seed: int, number: int, rng: Rng, folder: Path, outside: 
     joints, made = rng.permutation(J), []
     for k, (what, size) in enumerate(plan.concealed if plan.group != FAULTY else ()):
         spot = int(joints[k])
-        wanted = float(size * level[spot])
+        wanted = size * level
         if plan.group == LAWLESS:
-            one = lawless(outside[what], machine, train, spot, wanted, rng)
+            one = lawless(outside[what], machine, train, spot, float(wanted[spot]), rng)
         else:
             one = NAMES[what](machine, train, spot, wanted, rng)
         machine = one.machine

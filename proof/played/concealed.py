@@ -37,18 +37,19 @@ class Concealed:
     hides: tuple[str, ...] = ()
 
 
-Maker = Callable[[Machine, Motion, int, float, Rng], Concealed]
+Maker = Callable[[Machine, Motion, int, NDArray, Rng], Concealed]
+"""From a machine, its motion, a joint, and the RMS that the effect shall have on each channel (J,) [N·m]."""
 
 
 def law(make: Callable[[Drive, int, Rng], Extra], *hides: str) -> Maker:
     """A law that is linear in its size: scaled so that what known friction leaves of it has the wanted RMS."""
 
-    def made(machine: Machine, motion: Motion, k: int, wanted: float, rng: Rng) -> Concealed:
+    def made(machine: Machine, motion: Motion, k: int, wanted: NDArray, rng: Rng) -> Concealed:
         d = machine.drive(motion)
         unit = make(d, k, rng)
         column = unit(d)
         left = rms(column) if hides else beside_known(machine, d, k, column)
-        size = wanted / max(left, 1e-12)
+        size = float(wanted[k]) / max(left, 1e-12)
         raw = size * rms(column)
         if not raw <= MOST * rms(machine.torque(motion)[:, k]):
             raise TooMuch(f"{raw:.3g} N·m")
@@ -99,35 +100,35 @@ def _warming(d: Drive, k: int, rng: Rng) -> Extra:
     return lambda e: -warmth(np.abs(e.qd[:, k]), time) * e.direction[:, k]
 
 
-def _hidden_rotor(machine: Machine, motion: Motion, k: int, wanted: float, rng: Rng) -> Concealed:
+def _hidden_rotor(machine: Machine, motion: Motion, k: int, wanted: NDArray, rng: Rng) -> Concealed:
     d = machine.drive(motion)
-    inertia = wanted / rms(d.qdd[:, k])
+    inertia = wanted[k] / rms(d.qdd[:, k])
     if inertia * rms(d.qdd[:, k]) > MOST * rms(machine.torque(motion)[:, k]):
         raise TooMuch("rotor")
     rotor = machine.rotor.copy()
     rotor[k] = inertia
     changed = replace(machine, rotor=rotor)
-    return Concealed(changed, f"joint{k + 1}", k, wanted, {"inertia": inertia}, ("rotor_inertia",))
+    return Concealed(changed, f"joint{k + 1}", k, wanted[k], {"inertia": inertia}, ("rotor_inertia",))
 
 
-def _hidden_level(machine: Machine, motion: Motion, k: int, wanted: float, rng: Rng) -> Concealed:
+def _hidden_level(machine: Machine, motion: Motion, k: int, wanted: NDArray, rng: Rng) -> Concealed:
     d = machine.drive(motion)
     column, v = d.direction[:, k], d.qd[:, k]
     left = rms(column - v * float(v @ column / (v @ v)))
-    if wanted > MOST * rms(machine.torque(motion)[:, k]):
+    if wanted[k] > MOST * rms(machine.torque(motion)[:, k]):
         raise TooMuch("level")
     level = machine.level.copy()
-    level[k] = wanted / left
+    level[k] = wanted[k] / left
     values = {"level": float(level[k])}
     changed = replace(machine, level=level)
-    return Concealed(changed, f"joint{k + 1}", k, wanted, values, ("coulomb_friction", "presliding_hysteresis"))
+    return Concealed(changed, f"joint{k + 1}", k, wanted[k], values, ("coulomb_friction", "presliding_hysteresis"))
 
 
 def by_search(make: Callable[[Machine, Motion, int, float, Rng], Machine], at: str, least: float, most: float) -> Maker:
-    """An effect whose torque is not linear in its number: halved between bounds until the wanted RMS is met, on the
-    channel where it is largest beside known friction."""
+    """An effect whose torque is not linear in its number: halved between bounds until the wanted RMS is met beside
+    known friction, of a link on the channel where the effect is the largest share of it."""
 
-    def made(machine: Machine, motion: Motion, k: int, wanted: float, rng: Rng) -> Concealed:
+    def made(machine: Machine, motion: Motion, k: int, wanted: NDArray, rng: Rng) -> Concealed:
         before, seed = machine.torque(motion), int(rng.integers(2**31))
         d = machine.drive(motion)
         low, high = least, most
@@ -139,15 +140,15 @@ def by_search(make: Callable[[Machine, Motion, int, float, Rng], Machine], at: s
             except TooSoft:
                 high = number
                 continue
-            sizes = [beside_known(machine, d, c, apart[:, c]) for c in range(apart.shape[1])]
-            c = int(np.argmax(sizes)) if at == "link" else k
-            if abs(sizes[c] / wanted - 1.0) < CLOSE:
+            shares = np.array([beside_known(machine, d, c, own) for c, own in enumerate(apart.T)]) / wanted
+            c = int(np.argmax(shares)) if at == "link" else k
+            if abs(shares[c] - 1.0) < CLOSE:
                 raw = rms(apart[:, c])
                 if raw > MOST * rms(before[:, c]):
                     break
                 place = {"link": f"link{k + 1}", "joint": f"joint{k + 1}", "sensor": f"tau.joint{k + 1}"}[at]
                 return Concealed(changed, place, c, raw)
-            low, high = (number, high) if sizes[c] < wanted else (low, number)
+            low, high = (number, high) if shares[c] < 1.0 else (low, number)
         raise TooMuch(f"{at} {k}")
 
     return made
@@ -188,27 +189,27 @@ def _saturating(machine: Machine, motion: Motion, k: int, share: float, rng: Rng
     return replace(machine, asked=(*machine.asked, (k, more)))
 
 
-def _bias(machine: Machine, motion: Motion, k: int, wanted: float, rng: Rng) -> Concealed:
+def _bias(machine: Machine, motion: Motion, k: int, wanted: NDArray, rng: Rng) -> Concealed:
     offset = machine.offset.copy()
-    offset[k] += wanted * rng.choice([-1.0, 1.0])
-    return Concealed(replace(machine, offset=offset), f"tau.joint{k + 1}", k, wanted, {"bias": float(offset[k])})
+    offset[k] += wanted[k] * rng.choice([-1.0, 1.0])
+    return Concealed(replace(machine, offset=offset), f"tau.joint{k + 1}", k, wanted[k], {"bias": float(offset[k])})
 
 
-def _drift(machine: Machine, motion: Motion, k: int, wanted: float, rng: Rng) -> Concealed:
+def _drift(machine: Machine, motion: Motion, k: int, wanted: NDArray, rng: Rng) -> Concealed:
     drift = machine.drift.copy()
     length = len(motion[0]) * 1e-3
-    drift[k] += wanted * np.sqrt(3.0) / length * rng.choice([-1.0, 1.0])
-    return Concealed(replace(machine, drift=drift), f"tau.joint{k + 1}", k, wanted, {"rate": float(drift[k])})
+    drift[k] += wanted[k] * np.sqrt(3.0) / length * rng.choice([-1.0, 1.0])
+    return Concealed(replace(machine, drift=drift), f"tau.joint{k + 1}", k, wanted[k], {"rate": float(drift[k])})
 
 
-def _late(machine: Machine, motion: Motion, k: int, wanted: float, rng: Rng) -> Concealed:
+def _late(machine: Machine, motion: Motion, k: int, wanted: NDArray, rng: Rng) -> Concealed:
     tau = machine.torque(motion)
     slope = np.gradient(tau[:, k], 1e-3)
     delay = machine.delay.copy()
-    delay[k] = wanted / rms(slope)
+    delay[k] = wanted[k] / rms(slope)
     if delay[k] > 0.03:
         raise TooMuch("a position 30 ms late")
-    return Concealed(replace(machine, delay=delay), f"q.joint{k + 1}", k, wanted, {"delay": float(delay[k])})
+    return Concealed(replace(machine, delay=delay), f"q.joint{k + 1}", k, wanted[k], {"delay": float(delay[k])})
 
 
 NAMES: dict[str, Maker] = {
