@@ -1,41 +1,39 @@
-"""The search with what the evidence chooses beside it: the masses' tolerance, and each channel's noise."""
+"""The search with what the evidence chooses beside it: how far the model may be off, and each channel's noise."""
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..deciding import TOLERANCES
 from ..nuisance.noise import Noise
 from .arm import WeighedRecordings
 from .evidence import Evidence
+from .nuisance_columns import Tolerance
 from .projected import ProjectedEvidence
 from .search import Member, MemberOdds, Search
 
 
 @dataclass(frozen=True)
 class _Best:
-    """The best set of a search, its log evidence, and the tolerance of the masses."""
+    """The best set of a search, its log evidence, and how far the model may be off."""
 
     value: float
     search: Search
     taken: tuple[Member, ...]
-    tolerance: float
+    tolerance: Tolerance
 
 
 def searched(
     weighed: WeighedRecordings, recordings: Sequence[int], barred: Collection[str], channels: Collection[int]
-) -> tuple[WeighedRecordings, Search, list[MemberOdds], float]:
-    """The best set of explanations of some recordings, with its noise and its tolerance of the masses.
+) -> tuple[WeighedRecordings, Search, list[MemberOdds], Tolerance]:
+    """The best set of explanations of some recordings, with its noise and its tolerance of masses and laws.
 
     Chosen before the search, a wide tolerance would take a payload in; without any, it would be named a payload. So
-    with the noise: beside all that could be missing, a torque that wanders is taken for some of it; beside nothing,
-    what is missing is taken for a wander. Where something is found, both are tried; and everywhere that nothing
-    wanders. ``channels`` are those of which that may have changed.
+    with laws, and with the noise: beside all that could be missing, a torque that wanders is taken for some of it;
+    beside nothing, what is missing is taken for a wander. Where something is found, both are tried; and everywhere that
+    nothing wanders. ``channels`` are those of which that may have changed.
     """
-    masses = weighed.beside.tolerant
-    tolerances = (*TOLERANCES, *weighed.beside.more) if masses.stop > masses.start else TOLERANCES[:1]
-    best = max((_best(weighed, recordings, barred, x) for x in tolerances), key=lambda b: b.value)
+    best = max((_best(weighed, recordings, barred, x) for x in weighed.beside.tolerances), key=lambda b: b.value)
     before = weighed
     for c in sorted(channels):
         weighed = _chosen(weighed, c, best, recordings, barred)
@@ -83,7 +81,9 @@ def _others(weighed: WeighedRecordings, c: int, best: _Best) -> list[Callable[[N
     return changes
 
 
-def _best(weighed: WeighedRecordings, recordings: Sequence[int], barred: Collection[str], tolerance: float) -> _Best:
+def _best(
+    weighed: WeighedRecordings, recordings: Sequence[int], barred: Collection[str], tolerance: Tolerance
+) -> _Best:
     """The best set that simple moves reach from nothing."""
     out = {h for h, x in enumerate(weighed.pool) if x.key in barred}
     search = Search(

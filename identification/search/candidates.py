@@ -46,8 +46,8 @@ class EffectVariant:
     high: Array
 
     def subsets(self) -> list[NDArray[np.int_]]:
-        """Positions of the columns to try together: all and single ones; of a vector's few components, every set;
-        of amplitudes that exclude each other, single ones."""
+        """Positions of the columns to try together: all and single ones; of a vector's few components, every set; of
+        many components, those of one unit; of amplitudes that exclude each other, single ones."""
         n = max(len(self.amplitudes), 1)
         parameters = [self.placed.effect.parameters[i] for i in self.amplitudes]
         alone = {k for k, p in enumerate(parameters) if p.alone and not p.grid}
@@ -56,7 +56,12 @@ class EffectVariant:
         effect = self.placed.effect
         counts = range(1, n + 1) if effect.at == "link" and n <= MOST_COMBINED else sorted({1, n})
         counts = (1,) if effect.exclusive else counts
-        return [np.array(some) for k in counts for some in combinations(range(n), k) if alone & set(some)]
+        found = [np.array(some) for k in counts for some in combinations(range(n), k) if alone & set(some)]
+        if effect.at == "link" and n > MOST_COMBINED:
+            units = [p.unit for p in parameters]
+            alike = [np.flatnonzero([u == unit for u in units]) for unit in dict.fromkeys(units)]
+            found += [some for some in alike if 1 < len(some) < n]
+        return found
 
     def start(self, amplitudes: Array) -> Array:
         """All parameters of the effect (p,) for amplitudes found."""

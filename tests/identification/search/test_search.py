@@ -32,7 +32,7 @@ def test_where_a_payload_sits_is_read_off_its_slopes(tmp_path):
     [
         ("com_offset", "link1", {1: 3, 2: 3, 3: 1}),  # a link's few columns: every set of them, 2³ - 1
         ("external_torque", "base", {1: 3, 3: 1}),  # as few, of no link
-        ("inertia_error", "link1", {1: 10, 10: 1}),  # a link's, but too many for 2¹⁰ - 1
+        ("inertia_error", "link1", {1: 10, 3: 1, 6: 1, 10: 1}),  # too many for 2¹⁰ - 1: those of one unit
         ("harness_stiffness", "joint1", {1: 1, 2: 1}),  # a spring's rest torque alone would be a bias
     ],
 )
