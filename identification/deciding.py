@@ -34,7 +34,8 @@ BASELINE_SHAPE = 0.3
 TOLERANCES = (0.001, 0.003, 0.01, 0.03)
 """Tolerances that a model's masses may have [share]; the evidence chooses one."""
 LAWS = (0.1, 1.0)
-"""How far laws may be off [times `DISCREPANCY` and `LAW_ERROR`]; the evidence chooses one."""
+"""How far laws may be off [times `DISCREPANCY` and `LAW_ERROR`]; the evidence chooses one. Nothing nameless is missing
+where it is not the largest."""
 ROUNDS = 4
 """Most searches for what is missing, each after a joint fit of what was found."""
 SECOND_CHOICES = 2

@@ -5,10 +5,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..deciding import LAWS
 from ..nuisance.noise import Noise
 from .arm import WeighedRecordings
 from .evidence import Evidence
 from .nuisance_columns import Tolerance
+from .pool import Hypothesis
 from .projected import ProjectedEvidence
 from .search import Member, MemberOdds, Search
 
@@ -50,7 +52,7 @@ def _chosen(
     if not changes:
         return weighed
     alone, pool, always = weighed.evidence.alone(c, weighed.pool)
-    out = {h for h, x in enumerate(pool) if x.key in barred}
+    out = _out(pool, barred, best.tolerance)
     weight = weighed.beside.weight(best.tolerance)[always]
 
     def value(evidence: Evidence, noise: Noise) -> float:
@@ -66,6 +68,12 @@ def _chosen(
         if tried > most:
             own, alone, most = noise, other, tried
     return weighed.with_noise(c, own, alone) if most > first else weighed
+
+
+def _out(pool: Sequence[Hypothesis], barred: Collection[str], tolerance: Tolerance) -> set[int]:
+    """Hypotheses that no set may have: where laws are as good as exact, nothing without a name is missing."""
+    exact = tolerance.laws < max(LAWS)
+    return {h for h, x in enumerate(pool) if x.key in barred or (exact and not x.named)}
 
 
 def _others(weighed: WeighedRecordings, c: int, best: _Best) -> list[Callable[[Noise], Noise]]:
@@ -85,7 +93,7 @@ def _best(
     weighed: WeighedRecordings, recordings: Sequence[int], barred: Collection[str], tolerance: Tolerance
 ) -> _Best:
     """The best set that simple moves reach from nothing."""
-    out = {h for h, x in enumerate(weighed.pool) if x.key in barred}
+    out = _out(weighed.pool, barred, tolerance)
     search = Search(
         ProjectedEvidence(weighed.evidence, recordings, weighed.beside.weight(tolerance)), weighed.pool, out
     )

@@ -97,3 +97,20 @@ def test_a_name_is_told_beyond_what_masses_and_laws_are_known_to(monkeypatch, nu
         with monkeypatch.context() as patch:
             move(patch, number, factor)
             assert smallest(named) == pytest.approx(factor * before, rel=0.25)
+
+
+@pytest.mark.parametrize(("named", "laws"), [(True, 0.1), (False, 1.0)])
+def test_where_laws_are_exact_nothing_without_a_name_is_missing(named, laws):
+    """The same column as a name and as a curve: the evidence takes exact laws beside the name alone."""
+    made = planted(1.0)
+    own = made.pieces[0][0]
+    _, x = made.columns.of(0, 0)
+    beside = 0.03 * x[:, 1:2].astype(float)
+    made.pieces[0][0] = ResidualChannel(own.residual, own.covariance, np.zeros(1, int), beside)
+    made = Explained(made.pieces, made.columns, made.items[:1], 1)
+    columns = NuisanceColumns([], 1, slice(0, 0), [], np.ones(1), lawful=np.zeros(1, int))
+    pool = (Hypothesis("law", named, (made.items[0],), -6.0),)
+    weighed: Any = SimpleNamespace(beside=columns, evidence=made.evidence(), pool=pool, noises=())
+    _, _, slots, tolerance = tolerant.searched(weighed, (0,), (), ())
+    assert len(slots) == 1
+    assert tolerance.laws == laws
