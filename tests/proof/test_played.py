@@ -282,7 +282,7 @@ def test_effect_that_no_hardware_has_is_drawn_again():
         NAMES["sensor_delay"](bare(arm), asked, 1, np.full(6, 1e3), np.random.default_rng(0))
     never = by_search(lambda machine, *_: machine, "joint", 1e-3, 1.0)
     with pytest.raises(TooMuch):
-        never(bare(arm), asked, 1, 1.0, np.random.default_rng(0))
+        never(bare(arm), asked, 1, np.ones(6), np.random.default_rng(0))
 
 
 def test_true_arm_is_off_by_one_to_five_per_cent():
