@@ -33,9 +33,6 @@ BASELINE_SHAPE = 0.3
 """How far a parameter may move in which the torque is nonlinear [share of its value]: as far as its slope holds."""
 TOLERANCES = (0.001, 0.003, 0.01, 0.03)
 """Tolerances that a model's masses may have [share]; the evidence chooses one."""
-LAWS = (0.1, 1.0)
-"""How far laws may be off [times `DISCREPANCY` and `LAW_ERROR`]; the evidence chooses one. Nothing nameless is missing
-where it is not the largest."""
 ROUNDS = 4
 """Most searches for what is missing, each after a joint fit of what was found."""
 SECOND_CHOICES = 2

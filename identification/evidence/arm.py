@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ...models.axes import neighbours, place
 from ...models.model import Model, PlacedEffect
 from ...recordings.condition import Motion
-from ..deciding import LEAST_LEVEL
+from ..deciding import LEAST_LEVEL, TOLERANCES
 from ..fitting.assembly import TorqueModel
 from ..fitting.experiment import Experiment, Scales
 from ..fitting.fit import Fit
@@ -124,7 +124,7 @@ def weigh(
             residuals[:n_train],
             [[x.covariance(own[c]) for c, x in enumerate(noises or rough)] for own in runs[:n_train]],
             others,
-            others.weight(max(others.tolerances)),
+            others.weight(max(TOLERANCES)),
         )
         along = replace(along, peaks=periods.of(library(model)))
         named = names(along, by_words, columns)

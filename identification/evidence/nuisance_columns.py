@@ -1,25 +1,14 @@
 """Columns that stand beside every explanation: the baseline's parameters, the tolerance of the masses, small curves."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from itertools import product
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...models.model import PlacedEffect
 from ...models.regressor import OWN
-from ..deciding import (
-    BASELINE,
-    BASELINE_OWN,
-    BASELINE_SHAPE,
-    BENDS,
-    DISCREPANCY,
-    LAW_ERROR,
-    LAWS,
-    TOLERANCES,
-)
+from ..deciding import BASELINE, BASELINE_OWN, BASELINE_SHAPE, BENDS, DISCREPANCY, LAW_ERROR
 from ..fitting.assembly import TorqueModel
 from ..fitting.experiment import Experiment
 from ..fitting.fit import Fit
@@ -35,17 +24,10 @@ Part = tuple[NDArray[np.int_], Array]
 """Positions (p,) among all that stands beside, and columns (n, p) in units of their prior deviation."""
 
 
-class Tolerance(NamedTuple):
-    """How far a model may be off: its masses, as a share; its laws, in units of `DISCREPANCY` and `LAW_ERROR`."""
-
-    masses: float
-    laws: float = 1.0
-
-
 @dataclass(frozen=True)
 class NuisanceColumns:
     """``parts[i][c]`` are those of recording i and channel c; ``tolerant`` is the position of the masses' tolerance in
-    them, ``lawful`` (k,) those of what laws may have wrong.
+    them.
     """
 
     parts: list[list[Part]]
@@ -56,20 +38,12 @@ class NuisanceColumns:
     spread: Array
     """Prior deviation of each of the baseline's parameters about its fit (P,), the first columns' unit."""
     more: tuple[float, ...] = ()
-    """Tolerances of masses beyond `TOLERANCES` that may be chosen."""
-    lawful: NDArray[np.int_] = field(default_factory=lambda: np.zeros(0, int))
+    """Tolerances beyond `TOLERANCES` that may be chosen."""
 
-    @property
-    def tolerances(self) -> list[Tolerance]:
-        """What the evidence may choose from."""
-        masses = (*TOLERANCES, *self.more) if self.tolerant.stop > self.tolerant.start else TOLERANCES[:1]
-        return [Tolerance(*x) for x in product(masses, LAWS if len(self.lawful) else (1.0,))]
-
-    def weight(self, tolerance: Tolerance) -> Array:
-        """Factors on the prior deviations (count,)."""
+    def weight(self, tolerance: float) -> Array:
+        """Factors on the prior deviations (count,) for masses that are known to a share."""
         weight = np.ones(self.count)
-        weight[self.tolerant] = tolerance.masses
-        weight[self.lawful] = tolerance.laws
+        weight[self.tolerant] = tolerance
         return weight
 
 
@@ -102,12 +76,10 @@ def beside(
                     felt = felt + scale[:, None] * (at % OWN == 0)
                 own.append((tolerant.start + at, felt * one[at]))
         count = tolerant.stop
-    sizes, lawful = _small(found, baseline[:n], along.scale), []
+    sizes = _small(found, baseline[:n], along.scale)
     for (c, words), item in by_words.items():
         size = float(np.hypot(sizes.get((c, words), 0.0), nameless.get((c, words), 0.0)))
         if size > 0:
-            if (c, words) not in nameless:
-                lawful += range(count, count + len(item.index))
             for i, row in enumerate(parts):
                 index = count + np.arange(len(item.index))
                 row[c].append((index, columns.some(i, c, item.index) * (size * item.spread)))
@@ -137,13 +109,12 @@ def beside(
             continue
         made = _error_of_force(along, found, p)
         k = made[0][0][1].shape[1]
-        lawful += range(count, count + k)
         for row, own in zip(parts, made, strict=True):
             for c, x in own:
                 row[c].append((count + np.arange(k), x))
         count += k
     joined = [[_joined(own) for own in row] for row in parts]
-    return NuisanceColumns(joined, count, tolerant, baseline, spread, lawful=np.array(lawful, int))
+    return NuisanceColumns(joined, count, tolerant, baseline, spread)
 
 
 def _small(found: Fit, baseline: Sequence[Sequence[Part]], scale: Array) -> dict[tuple[int, str], float]:

@@ -10,7 +10,6 @@ from ...models.model import Model, PlacedEffect
 from ..fitting.experiment import Experiment
 from ..fitting.fit import Fit
 from .arm import WeighedRecordings
-from .nuisance_columns import Tolerance
 from .rival import RivalOdds
 from .search import MemberOdds, Search
 
@@ -76,7 +75,7 @@ class ArmSelection:
     """Of the last search."""
     search: Search
     instruments: tuple[Experiment, ...]
-    tolerance: Tolerance
+    tolerance: float
     tuned: Mapping[str, Array]
     """Parameters of every law that rings, by its key, fitted by itself."""
 

@@ -1,41 +1,41 @@
-"""The search with what the evidence chooses beside it: how far the model may be off, and each channel's noise."""
+"""The search with what the evidence chooses beside it: the masses' tolerance, and each channel's noise."""
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..deciding import LAWS
+from ..deciding import TOLERANCES
 from ..nuisance.noise import Noise
 from .arm import WeighedRecordings
 from .evidence import Evidence
-from .nuisance_columns import Tolerance
-from .pool import Hypothesis
 from .projected import ProjectedEvidence
 from .search import Member, MemberOdds, Search
 
 
 @dataclass(frozen=True)
 class _Best:
-    """The best set of a search, its log evidence, and how far the model may be off."""
+    """The best set of a search, its log evidence, and the tolerance of the masses."""
 
     value: float
     search: Search
     taken: tuple[Member, ...]
-    tolerance: Tolerance
+    tolerance: float
 
 
 def searched(
     weighed: WeighedRecordings, recordings: Sequence[int], barred: Collection[str], channels: Collection[int]
-) -> tuple[WeighedRecordings, Search, list[MemberOdds], Tolerance]:
-    """The best set of explanations of some recordings, with its noise and its tolerance of masses and laws.
+) -> tuple[WeighedRecordings, Search, list[MemberOdds], float]:
+    """The best set of explanations of some recordings, with its noise and its tolerance of the masses.
 
     Chosen before the search, a wide tolerance would take a payload in; without any, it would be named a payload. So
-    with laws, and with the noise: beside all that could be missing, a torque that wanders is taken for some of it;
-    beside nothing, what is missing is taken for a wander. Where something is found, both are tried; and everywhere that
-    nothing wanders. ``channels`` are those of which that may have changed.
+    with the noise: beside all that could be missing, a torque that wanders is taken for some of it; beside nothing,
+    what is missing is taken for a wander. Where something is found, both are tried; and everywhere that nothing
+    wanders. ``channels`` are those of which that may have changed.
     """
-    best = max((_best(weighed, recordings, barred, x) for x in weighed.beside.tolerances), key=lambda b: b.value)
+    masses = weighed.beside.tolerant
+    tolerances = (*TOLERANCES, *weighed.beside.more) if masses.stop > masses.start else TOLERANCES[:1]
+    best = max((_best(weighed, recordings, barred, x) for x in tolerances), key=lambda b: b.value)
     before = weighed
     for c in sorted(channels):
         weighed = _chosen(weighed, c, best, recordings, barred)
@@ -52,7 +52,7 @@ def _chosen(
     if not changes:
         return weighed
     alone, pool, always = weighed.evidence.alone(c, weighed.pool)
-    out = _out(pool, barred, best.tolerance)
+    out = {h for h, x in enumerate(pool) if x.key in barred}
     weight = weighed.beside.weight(best.tolerance)[always]
 
     def value(evidence: Evidence, noise: Noise) -> float:
@@ -70,12 +70,6 @@ def _chosen(
     return weighed.with_noise(c, own, alone) if most > first else weighed
 
 
-def _out(pool: Sequence[Hypothesis], barred: Collection[str], tolerance: Tolerance) -> set[int]:
-    """Hypotheses that no set may have: where laws are as good as exact, nothing without a name is missing."""
-    exact = tolerance.laws < max(LAWS)
-    return {h for h, x in enumerate(pool) if x.key in barred or (exact and not x.named)}
-
-
 def _others(weighed: WeighedRecordings, c: int, best: _Best) -> list[Callable[[Noise], Noise]]:
     """Changes of a channel's noise that are worth a try, one after the other."""
     own, evidence = weighed.noises[c], weighed.evidence
@@ -89,11 +83,9 @@ def _others(weighed: WeighedRecordings, c: int, best: _Best) -> list[Callable[[N
     return changes
 
 
-def _best(
-    weighed: WeighedRecordings, recordings: Sequence[int], barred: Collection[str], tolerance: Tolerance
-) -> _Best:
+def _best(weighed: WeighedRecordings, recordings: Sequence[int], barred: Collection[str], tolerance: float) -> _Best:
     """The best set that simple moves reach from nothing."""
-    out = _out(weighed.pool, barred, tolerance)
+    out = {h for h, x in enumerate(weighed.pool) if x.key in barred}
     search = Search(
         ProjectedEvidence(weighed.evidence, recordings, weighed.beside.weight(tolerance)), weighed.pool, out
     )

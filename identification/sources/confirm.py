@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..deciding import DISCREPANCY, GATE
+from ..deciding import DISCREPANCY, GATE, TOLERANCES
 from ..evidence.arm import WeighedRecordings
 from ..evidence.gain import Blocks, Remaining, scatter
 from ..evidence.members import Members
@@ -112,8 +112,9 @@ def _forecast(
     weighed = weigh(source, [*source.train, *source.held], given, _joined(here, there), known, search=False)
     evidence, n = weighed.evidence, len(source.train)
     every = range(n, n + len(source.held))
+    masses = weighed.beside.tolerant
     priors, ons = [], []
-    for tolerance in weighed.beside.tolerances:
+    for tolerance in (*TOLERANCES, *weighed.beside.more) if masses.stop > masses.start else TOLERANCES[:1]:
         weight = weighed.beside.weight(tolerance)
         own = ProjectedEvidence(evidence, range(n), weight)
         priors.append(own.null)

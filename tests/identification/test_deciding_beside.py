@@ -65,15 +65,8 @@ def test_small_curves_stand_beside_everything(monkeypatch):
             assert small(0.4)[0, "speed by direction"] == pytest.approx(np.hypot(everywhere, factor * of_law))
 
 
-@pytest.mark.parametrize(
-    ("number", "values", "unit", "beside"),
-    [
-        ("TOLERANCES", (0.001, 0.003, 0.01, 0.03), 1.0, {"tolerant": slice(0, 1)}),
-        ("LAWS", (0.1, 1.0), 0.03, {"tolerant": slice(0, 0), "lawful": np.zeros(1, int)}),
-    ],
-)
-def test_a_name_is_told_beyond_what_masses_and_laws_are_known_to(monkeypatch, number, values, unit, beside):
-    """Smaller ones are the tolerance's: the smallest that is named goes with how wide that may be."""
+def test_a_payload_is_named_beyond_what_masses_are_known_to(monkeypatch):
+    """Smaller ones are the masses' tolerance: the smallest that is named goes with how wide that may be."""
 
     def named(size):
         made = planted(1.0)
@@ -81,36 +74,19 @@ def test_a_name_is_told_beyond_what_masses_and_laws_are_known_to(monkeypatch, nu
         x *= 1000
         own = made.pieces[0][0]
         made.pieces[0][0] = ResidualChannel(
-            size * x[:, 0].astype(float), own.covariance, np.zeros(1, int), unit * x[:, :1].astype(float)
+            size * x[:, 0].astype(float), own.covariance, np.zeros(1, int), x[:, :1].astype(float)
         )
         made = Explained(made.pieces, made.columns, made.items[:1], 1)
         payload = Hypothesis("payload", True, (made.items[0],), -6.0)
-        columns = NuisanceColumns([], 1, baseline=[], spread=np.ones(1), **beside)
-        weighed: Any = SimpleNamespace(beside=columns, evidence=made.evidence(), pool=(payload,), noises=())
+        masses = NuisanceColumns([], 1, slice(0, 1), [], np.ones(1))
+        weighed: Any = SimpleNamespace(beside=masses, evidence=made.evidence(), pool=(payload,), noises=())
         return bool(tolerant.searched(weighed, (0,), (), range(len(weighed.noises)))[2])
 
     before = smallest(named)
     assert before > 0.03
-    less, as_it_is, more = about(monkeypatch, number, values, lambda: smallest(named))
+    less, as_it_is, more = about(monkeypatch, "TOLERANCES", (0.001, 0.003, 0.01, 0.03), lambda: smallest(named))
     assert less < as_it_is < more
     for factor in FACTORS:
         with monkeypatch.context() as patch:
-            move(patch, number, factor)
+            move(patch, "TOLERANCES", factor)
             assert smallest(named) == pytest.approx(factor * before, rel=0.25)
-
-
-@pytest.mark.parametrize(("named", "laws"), [(True, 0.1), (False, 1.0)])
-def test_where_laws_are_exact_nothing_without_a_name_is_missing(named, laws):
-    """The same column as a name and as a curve: the evidence takes exact laws beside the name alone."""
-    made = planted(1.0)
-    own = made.pieces[0][0]
-    _, x = made.columns.of(0, 0)
-    beside = 0.03 * x[:, 1:2].astype(float)
-    made.pieces[0][0] = ResidualChannel(own.residual, own.covariance, np.zeros(1, int), beside)
-    made = Explained(made.pieces, made.columns, made.items[:1], 1)
-    columns = NuisanceColumns([], 1, slice(0, 0), [], np.ones(1), lawful=np.zeros(1, int))
-    pool = (Hypothesis("law", named, (made.items[0],), -6.0),)
-    weighed: Any = SimpleNamespace(beside=columns, evidence=made.evidence(), pool=pool, noises=())
-    _, _, slots, tolerance = tolerant.searched(weighed, (0,), (), ())
-    assert len(slots) == 1
-    assert tolerance.laws == laws
