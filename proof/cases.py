@@ -4,7 +4,7 @@ A case is a random robot, its friction, disturbances, noise, motions and what it
 (seed, number, attempt), so that answers need not lie on a disk to be scored later.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -68,6 +68,9 @@ ROUND = (
 """One round of cases: (group, what is concealed, size as a multiple of the disturbance's RMS)."""
 
 
+Logged = Callable[[Mapping[str, NDArray]], Mapping[str, NDArray]]
+
+
 @dataclass(frozen=True)
 class Truth:
     """One right name and its place. ``also``: what hides there with it; two such names together are right as well."""
@@ -119,8 +122,11 @@ class Case:
     twin: ProofPlant
     twin_model: str
 
-    def write(self, folder: Path) -> None:
-        """Record it: model, URDF and recordings (`RECORDINGS`). Raises ValueError where the arm cannot be recorded."""
+    def write(self, folder: Path, logged: Logged = dict) -> None:
+        """Record it: model, URDF and recordings (`RECORDINGS`), each as ``logged`` makes them of what sensors read.
+
+        Raises ValueError where the arm cannot be recorded.
+        """
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "arm.urdf").write_text(self.plant.arm.urdf())
         (folder / "arm.toml").write_text(self.model)
@@ -134,7 +140,7 @@ class Case:
             for joint in self.plant.arm.joints:
                 if rattles(recording[f"tau.{joint}"], self.answer.noise):
                     raise ValueError(f"the servo of {joint} rattles")
-            write_csv(folder / name, recording)
+            write_csv(folder / name, logged(recording))
 
 
 def rattles(torque: NDArray, noise: float) -> bool:
@@ -200,7 +206,11 @@ def _drawn(plan: tuple[str, tuple[str, ...], float], number: int, rng: Rng, outs
         if made.law:
             laws[m.name] = made.law
         for name, value in made.plant.items():
-            parts[name] = parts.get(name, {}) | value if isinstance(value, dict) else value
+            if isinstance(value, dict):
+                value = parts.get(name, {}) | value
+            elif isinstance(value, tuple):
+                value = (*parts.get(name, ()), *value)
+            parts[name] = value
     disturbance = Disturbance(rms, float(rng.uniform(0.2, 1.0)), float(rng.uniform(10.0, 15.0)))
     twin = ProofPlant(
         arm,

@@ -11,21 +11,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .concealed import Made, TooMuch
+from .faults import FAULTS
 from .laws import Friction
 from .loop import TICK
 from .motions import KINDS, STILL, disturbance, motion, scale
 from .nameless import NAMELESS, lawless
 from .places import joint
-from .plant import Planned, Plant, recorded, rms
+from .plant import Logger, Planned, Plant, recorded, rms
 from .robots import Rng, believed, random_robot
 from .springs import NAMES, SPRINGS, makers
 
-CLEAN, SINGLE, PAIR, LAWLESS = "clean", "single", "pair", "nameless"
-FAULTY = "faulty"
-"""Recordings at fault, which only the third generator makes."""
-GROUPS = (CLEAN, SINGLE, PAIR, LAWLESS)
-DECK = (*[CLEAN] * 25, *[SINGLE] * 15, *[PAIR] * 4, *[LAWLESS] * 6)
-"""Fifty cases: 50, 30, 8 and 12 %."""
+CLEAN, SINGLE, PAIR, LAWLESS, FAULTY = "clean", "single", "pair", "nameless", "faulty"
+GROUPS = (CLEAN, SINGLE, PAIR, LAWLESS, FAULTY)
+DECK = (*[CLEAN] * 25, *[SINGLE] * 10, *[PAIR] * 8, *[LAWLESS] * 4, *[FAULTY] * 3)
+"""Fifty cases: 50, 20, 16, 8 and 6 %. A third of those with something in them have two to four effects."""
 
 SIZES = (0.5, 1.0, 2.0, 4.0)
 RECORDINGS = {"train": 20.0, "hold": 12.0, "third": 12.0}  # s
@@ -55,6 +54,7 @@ def planned(seed: int, count: int) -> list[Plan]:
     """The first ``count`` cases of a seed, the same however many follow."""
     singles = endless(seed, 1, [(name, size) for name in NAMES for size in SIZES])
     lawless = endless(seed, 2, [(name, size) for name in NAMELESS for size in (2.0, 4.0)])
+    faults = endless(seed, 8, [(name, 0.0) for name in FAULTS])
     kinds = {group: endless(seed, 3 + k, KINDS) for k, group in enumerate(GROUPS)}
     pairs = np.random.default_rng([seed, 0, 9])
     plans: list[Plan] = []
@@ -66,8 +66,10 @@ def planned(seed: int, count: int) -> list[Plan]:
                 concealed = (next(singles),)
             elif group == LAWLESS:
                 concealed = (next(lawless),)
+            elif group == FAULTY:
+                concealed = (next(faults),)
             elif group == PAIR:
-                several = int(pairs.integers(2, 4))
+                several = int(pairs.integers(2, 5))
                 names = pairs.choice(NAMES, several, replace=False).tolist()
                 while len(set(names) & set(SPRINGS)) > 1:  # each would be sized by both
                     names = pairs.choice(NAMES, several, replace=False).tolist()
@@ -138,7 +140,7 @@ def _drawn(plan: Plan, seed: int, number: int, rng: Rng) -> Case:
     if len(plan.concealed) > len(joints):
         raise TooMuch("more effects than joints")
     plant, concealed = bare, []
-    for k, (name, size) in enumerate(plan.concealed):
+    for k, (name, size) in enumerate(() if plan.group == FAULTY else plan.concealed):
         # The bodies as they are with what is concealed already.
         along = Planned.of(plant, motions["train"]) if concealed else m
         spot = int(joints[k])
@@ -205,6 +207,7 @@ def _recorded(
     memory = scale(rng, plan.disturbance)
     noise = level * rng.uniform(0.05, 0.3)
     speeds, step = bool(rng.random() < 0.25), 2.0 * np.pi / 2.0**bits
+    rough, jitter = float(rng.uniform(0.0, 0.5)), float(rng.uniform(0.0, 0.02))
     recordings, twin, limited = {}, {}, 0.0
 
     def reading(arm: Plant, asked: tuple[NDArray, NDArray, NDArray], pushes: NDArray, rng: Rng) -> dict[str, NDArray]:
@@ -214,7 +217,7 @@ def _recorded(
             raise TooMuch("the servo loses the arm")
         if arm is plant:
             limited = max(limited, float(np.mean(np.abs(true[:, 3]) > 0.98 * arm.limit)))
-        found = recorded(true, arm.sensors, rate, step, noise, rng)
+        found = recorded(true, arm.sensors, Logger(rate, step, rough, jitter), noise, rng)
         if speeds:
             first, stride = round(STILL / TICK), round(1.0 / (rate * TICK))
             qd = true[first::stride, 1]
@@ -228,6 +231,9 @@ def _recorded(
         recordings[name] = reading(plant, asked, pushes, rng)
         if concealed and name != "hold":
             twin[name] = reading(bare, asked, pushes, same)
+    if plan.group == FAULTY:
+        fault, where, chance = FAULTS[plan.concealed[0][0]], int(rng.integers(1, n)), int(rng.integers(2**31))
+        recordings = {part: fault(c, where, np.random.default_rng(chance)) for part, c in recordings.items()}
     bristles = bool(rng.integers(2))
     known = ["viscous_friction", "coulomb_friction", "rotor_inertia", *(["presliding_hysteresis"] if bristles else [])]
     hidden = {(name, made.at) for _, _, made in concealed for name in made.hides}
@@ -262,12 +268,15 @@ def _recorded(
             }
             for name, size, made in concealed
         ],
+        "fault": plan.concealed[0][0] if plan.group == FAULTY else "",
         "background": [*BACKGROUND, *([] if bristles else ["presliding_hysteresis"])],
         "known": values,
         "joints": n,
         "mass": sum(link.mass for link in plant.robot.links),
         "rate": rate,
         "bits": bits,
+        "rough": rough,
+        "jitter": jitter,
         "limited": limited,
     }
     model, whole = model_text([x for x in places if x not in hidden]), model_text(places)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,24 +118,37 @@ class Plant:
         return run(bodies, self.drives(q), self.friction, self.table(), asked, fed, pushes, -STILL, False)
 
 
-def recorded(true: NDArray, sensors: Sensors, rate: float, step: float, noise: NDArray, rng: Rng) -> dict[str, NDArray]:
+class Logger(NamedTuple):
+    """``rate`` [Hz]; ``step`` [rad] of the logged encoder, ``rough``: noise that it has before it counts [steps];
+    ``jitter`` of the time stamps [sampling periods]."""
+
+    rate: float
+    step: float
+    rough: float = 0.0
+    jitter: float = 0.0
+
+
+def recorded(true: NDArray, sensors: Sensors, logger: Logger, noise: NDArray, rng: Rng) -> dict[str, NDArray]:
     """Readings from a recording's start on: ``time`` [s], ``q.<joint>`` [rad] and ``tau.<joint>`` [N·m], (n_samples,).
 
-    ``step`` [rad] of the logged encoder; ``noise`` (n,) [N·m], white, of the torque channels.
+    ``noise`` (n,) [N·m], white, of the torque channels.
     """
-    first, stride = round(STILL / TICK), round(1.0 / (rate * TICK))
+    first, stride, step = round(STILL / TICK), round(1.0 / (logger.rate * TICK)), logger.step
     all_ticks = TICK * (np.arange(len(true)) - first)
     time = np.round(all_ticks[first::stride], 9)
     found = {"time": time}
     n = true.shape[2]
     hiss = rng.standard_normal((len(time), n)) * noise
+    rough = logger.rough * rng.standard_normal((len(time), n))
+    stamps = time + logger.jitter / logger.rate * rng.standard_normal(len(time))
+    found["time"] = stamps - stamps[0]
 
     def read(column: int, k: int, late: float) -> NDArray:
         return np.interp(time - late, all_ticks, true[:, column, k])
 
     for k in range(n):
         q = read(0, k, sensors.position_delay.get(k, 0.0))
-        found[f"q.joint{k + 1}"] = step * np.round(q / step)
+        found[f"q.joint{k + 1}"] = step * np.round(q / step + rough[:, k])
     for k in range(n):
         tau = read(3, k, sensors.torque_delay.get(k, 0.0)) * (1.0 + sensors.gain.get(k, 0.0))
         final, slow = sensors.drift.get(k, (0.0, 1.0))

@@ -4,34 +4,25 @@ import copy
 import json
 import shutil
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from snarelab.models.effects import get_effect
 
-from ..cases import Answer, Case, draw, planned_cases
+from ..cases import Answer, Case, draw
 from ..concealed import VALUES
-from ..drives.cases import LAWLESS, TWIN
+from ..drives.cases import FAULTY, LAWLESS, TWIN
 from ..drives.make import made
+from ..drives.places import joint
+from .deck import Plan, planned
+from .world import World
 
 ATTEMPTS = 100
 MASSES = ("payload_mass", "com_offset", "inertia_error")
-"""What a link's wrong mass may rightly be called."""
-
-
-@dataclass(frozen=True)
-class Plan:
-    """A case before it is drawn: its group, and (what, size) of what it conceals."""
-
-    group: str
-    concealed: tuple[tuple[str, float], ...]
-    drawn: tuple[str, tuple[str, ...], float]
-
-
-def planned(seed: int, count: int) -> list[Plan]:
-    """The first ``count`` cases of a seed."""
-    return [Plan(g, tuple((k, size) for k in kinds), (g, kinds, size)) for g, kinds, size in planned_cases(count, seed)]
+"""Names that are true of a case besides: links whose numbers are 1 to 5 % off."""
 
 
 def make(
@@ -55,13 +46,24 @@ def write(plan: Plan, seed: int, number: int, folder: Path) -> None:
     RuntimeError
         No such case in `ATTEMPTS` attempts.
     """
+    fault = plan.concealed[0][0] if plan.group == FAULTY else ""
+    kinds = () if fault else tuple(what for what, _ in plan.concealed)
+    size = plan.concealed[0][1] if plan.concealed else 0.0
+    group = {LAWLESS: "outside", FAULTY: "clean"}.get(plan.group, plan.group)
     for attempt in range(ATTEMPTS):
-        case = draw(plan.drawn, seed, number, attempt)
+        case = draw((group, kinds, size), seed, number, attempt)
+        world = World.random(case, plan.disturbance, np.random.default_rng([seed, number, attempt, 1]))
+        case = replace(case, plant=world.of(case.plant), twin=world.of(case.twin))
+        told = truth(case.answer, seed) | {"group": plan.group, "fault": fault}
+        told["disturbance"] = {"kind": plan.disturbance}
+        told |= {"bits": world.bits, "rough": world.rough, "jitter": world.jitter}
+        if len({joint(e["at"]) for e in told["effects"]}) < len(told["effects"]):
+            continue
         try:
-            told, twin = truth(case.answer, seed), twin_of(case)
-            case.write(folder)
+            twin = twin_of(case)
+            case.write(folder, lambda columns, of=world: of.logged(columns, fault))
             if told["effects"]:
-                twin.write(folder / TWIN)
+                twin.write(folder / TWIN, world.logged)
         except ValueError:
             shutil.rmtree(folder)
             continue
@@ -69,7 +71,7 @@ def write(plan: Plan, seed: int, number: int, folder: Path) -> None:
         part.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
         part.replace(folder / "truth.json")
         return
-    raise RuntimeError(f"case {number} ({plan.drawn}): no arm could be recorded in {ATTEMPTS} attempts")
+    raise RuntimeError(f"case {number} ({plan}): no arm could be recorded in {ATTEMPTS} attempts")
 
 
 def twin_of(case: Case) -> Case:
@@ -78,8 +80,8 @@ def twin_of(case: Case) -> Case:
 
 
 def truth(answer: Answer, seed: int) -> dict[str, Any]:
-    """What is true of a case. A law outside the vocabulary has no name; nor has a wrong number of the model, for which
-    the names of a link's masses are right. What hides with the whole friction of a joint counts neither way."""
+    """What is true of a case. A law outside the vocabulary has no name; nor has a wrong number of the model. What hides
+    with the whole friction of a joint counts neither way, nor do a link's masses, which are off in every case."""
     lawless, wrong = answer.group == "outside", answer.group == "wrong"
     effects = [
         {
@@ -100,7 +102,7 @@ def truth(answer: Answer, seed: int) -> dict[str, Any]:
         "group": LAWLESS if lawless else answer.group,
         "disturbance": {"kind": "white"},
         "effects": effects,
-        "background": [*(MASSES if wrong else ()), *(other for t in answer.truths for other in t.also)],
+        "background": [*MASSES, *(other for t in answer.truths for other in t.also)],
         "known": {},
         "joints": answer.joints,
     }

@@ -20,8 +20,8 @@ from .robots import ARMS, Rng, load, published, true_arm
 
 CLEAN, SINGLE, PAIR, LAWLESS, FAULTY = "clean", "single", "pair", "nameless", "faulty"
 GROUPS = (CLEAN, SINGLE, PAIR, LAWLESS, FAULTY)
-DECK = (*[CLEAN] * 20, *[SINGLE] * 14, *[PAIR] * 6, *[LAWLESS] * 6, *[FAULTY] * 4)
-"""Fifty cases: 40, 28, 12, 12 and 8 %."""
+DECK = (*[CLEAN] * 20, *[SINGLE] * 12, *[PAIR] * 10, *[LAWLESS] * 5, *[FAULTY] * 3)
+"""Fifty cases: 40, 24, 20, 10 and 6 %. A third of those with something in them have two to four effects."""
 
 SIZES = (0.5, 1.0, 2.0, 4.0)
 RECORDINGS = {"train": 20.0, "hold": 12.0, "third": 12.0}  # s

@@ -9,8 +9,9 @@ from scipy.signal import butter, sosfiltfilt
 
 from proof.drives import cases
 from proof.drives.bodies import Bodies, torques
-from proof.drives.cases import CLEAN, GROUPS, LAWLESS, PAIR, SINGLE, Plan, background, draw, planned
+from proof.drives.cases import CLEAN, FAULTY, GROUPS, LAWLESS, PAIR, SINGLE, Plan, background, draw, planned
 from proof.drives.concealed import LAWS, TooMuch
+from proof.drives.faults import FAULTS
 from proof.drives.laws import directions
 from proof.drives.loop import TICK
 from proof.drives.make import make, written
@@ -26,20 +27,20 @@ SEED = 77
 
 def test_plan_has_its_shares_and_goes_on_as_it_began():
     plans = planned(SEED, 150)
-    assert Counter(p.group for p in plans) == {CLEAN: 75, SINGLE: 45, PAIR: 12, LAWLESS: 18}
+    assert Counter(p.group for p in plans) == {CLEAN: 75, SINGLE: 30, PAIR: 24, LAWLESS: 12, FAULTY: 9}
     assert Counter(p.disturbance for p in plans if p.group == CLEAN) == dict.fromkeys(KINDS, 25)
     assert plans[:20] == planned(SEED, 20)
     assert planned(SEED + 1, 20) != plans[:20]
     # No effect and size comes again before every other has.
-    singles = [p.concealed for p in planned(SEED, 500) if p.group == SINGLE]
+    singles = [p.concealed for p in planned(SEED, 750) if p.group == SINGLE]
     assert len(set(singles[: 4 * len(NAMES)])) == 4 * len(NAMES)
     for p in plans:
         names = [name for name, _ in p.concealed]
-        assert set(names) <= set(NAMELESS if p.group == LAWLESS else NAMES)
+        assert set(names) <= set({LAWLESS: NAMELESS, FAULTY: FAULTS}.get(p.group, NAMES))
         assert len(set(names)) == len(names)
-        assert len(names) in ((0,), (1,), (2, 3), (1,))[GROUPS.index(p.group)]
+        assert len(names) in ((0,), (1,), (2, 3, 4), (1,), (1,))[GROUPS.index(p.group)]
         assert len(set(SPRINGS) & set(names)) <= 1
-    assert {len(p.concealed) for p in plans if p.group == PAIR} == {2, 3}
+    assert {len(p.concealed) for p in plans if p.group == PAIR} == {2, 3, 4}
 
 
 def test_names_are_the_vocabularys():
@@ -227,8 +228,23 @@ def test_recordings_are_what_the_truth_says():
     case = draw(Plan(CLEAN, WHITE, ()), SEED, 9)
     train = case.recordings["train"]
     period = np.diff(train["time"])
-    np.testing.assert_allclose(period, 1.0 / case.truth["rate"], rtol=1e-6)
-    assert {name: x["time"][-1] for name, x in case.recordings.items()} == pytest.approx(cases.RECORDINGS)
+    late = period * case.truth["rate"] - 1.0
+    assert np.std(late) == pytest.approx(np.sqrt(2.0) * case.truth["jitter"], rel=0.05)
+    ends = {name: x["time"][-1] for name, x in case.recordings.items()}
+    assert ends == pytest.approx(cases.RECORDINGS, abs=0.2 / case.truth["rate"])
     step = 2.0 * np.pi / 2 ** case.truth["bits"]
     np.testing.assert_allclose(np.round(train["q.joint1"] / step) * step, train["q.joint1"], atol=1e-9)
     assert case.truth["limited"] < 0.01
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_is_in_every_recording_and_in_its_channels_alone(fault):
+    sound = draw(Plan(FAULTY, WHITE, (("two encoders exchanged", 0.0),)), SEED, 11).recordings
+    broken = draw(Plan(FAULTY, WHITE, ((fault, 0.0),)), SEED, 11)
+    assert broken.truth["fault"] == fault
+    assert broken.truth["effects"] == []
+    assert not broken.twin
+    for part, columns in broken.recordings.items():
+        changed = {name for name, x in columns.items() if not np.array_equal(x, sound[part][name])}
+        assert changed or fault == "two encoders exchanged"
+        assert len({name for name in changed if not name.startswith("q")}) <= 1
