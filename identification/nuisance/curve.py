@@ -164,6 +164,11 @@ def family(joint: int, names: Sequence[str], training: Sequence[Coordinates], al
             reach.curve(f"position of {names[o]}", q(o), 0.2, 10),
             reach.curve(f"position of {names[o]}, fine", q(o), 0.06, 28),
             reach.curve(f"speed of {names[o]}", lambda x, o=o: x.qd[:, o], 0.2, 8),
+            reach.curve(f"speed of {names[o]} by direction", lambda x, o=o: x.qd[:, o], 0.2, 8, forth),
+            reach.curve(f"speed of {names[o]} by speed", lambda x, o=o: x.qd[:, o], 0.2, 8, speed),
+            reach.curve(f"position of {names[o]} by direction", q(o), 0.2, 10, forth),
+            reach.curve(f"position of {names[o]} by speed", q(o), 0.2, 10, speed),
+            reach.map(f"speed and speed of {names[o]} by direction", fast, lambda x, o=o: x.qd[:, o], forth),
             reach.map(f"position and position of {names[o]}", q(), q(o)),
             reach.map(f"position and position of {names[o]} by direction", q(), q(o), forth),
         ]

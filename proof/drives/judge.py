@@ -60,7 +60,8 @@ class Judged:
     """A case: its classes, its concealed effects, and whether all was right and nothing else said.
 
     ``fault``: nothing but a parameter or a sensor is wrong. ``closure``: (before - after) / (before - oracle) of the
-    RMS on the third recording, where what is concealed shows most; None where that was not recorded.
+    RMS on the third recording, where what is concealed shows most; None where that was not recorded. ``unknown``: a law
+    without a name is told as such, beside whatever names; ``nameless``: something is told that has no name.
     """
 
     group: str
@@ -76,6 +77,7 @@ class Judged:
     fault: bool
     closure: float | None
     classes: tuple[tuple[Place, ...], ...]
+    nameless: bool = False
 
     @property
     def wrong(self) -> list[Told]:
@@ -121,7 +123,7 @@ def judge(line: Line) -> Judged:
             )
         )
     by_name = any((e["name"], joint(e["at"])) in since for e in line["effects"])
-    location = line.get("location", {})
+    location, nameless = line.get("location", {}), line.get("description", "")
     loudest = max(location, key=lambda channel: location[channel], default="")
     return Judged(
         truth["group"],
@@ -130,13 +132,15 @@ def judge(line: Line) -> Judged:
         line["verdict"],
         tuple(told),
         tuple(_found(e, line["effects"], classes) for e in named),
-        bool(lawless) and (by_name or line["verdict"] == "unknown_effect"),
+        bool(lawless)
+        and (by_name or line["verdict"] == "unknown_effect" or f"on {lawless[0]['channel']}," in nameless),
         bool(lawless) and loudest == lawless[0]["channel"],
         tuple(_known(line)),
         float(line["seconds"]),
         truth["group"] == "wrong" or (bool(named) and not any(is_physics(e["name"]) for e in named) and not lawless),
         closure(line["third"], sorted({e["channel"] for e in truth["effects"]})) if "third" in line else None,
         tuple(map(tuple, classes)),
+        line["verdict"] == "unknown_effect" or bool(nameless),
     )
 
 

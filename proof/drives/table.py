@@ -57,7 +57,7 @@ def figures(cases: Sequence[Judged]) -> list[Figure]:
     rows += [
         _count("wandering, all groups: a false name", [bool(c.wrong) for c in cases if c.disturbance == WANDERING]),
         _count("clean: any name at all, also those true of the background", [bool(c.told) for c in clean]),
-        _count("clean: told that something has no name", [c.verdict == "unknown_effect" for c in clean]),
+        _count("clean: told that something has no name", [c.nameless for c in clean]),
     ]
     single = [c for c in cases if c.group == SINGLE]
     for size in SIZES:

@@ -89,6 +89,11 @@ def test_unknown_is_the_right_answer_to_a_law_without_a_name():
     assert found.unknown
     assert found.located
     assert not judge(line("nameless", [truth], [effect("torque_ripple", "joint2")])).unknown
+    # Names that are true of the background do not hide what is told beside them, on the law's own channel.
+    beside = line("nameless", [truth], [effect("presliding_hysteresis", "joint1")])
+    assert judge(beside | {"description": "on tau.joint2, a smooth curve over position"}).unknown
+    assert not judge(beside | {"description": "on tau.joint1, a smooth curve over position"}).unknown
+    assert judge(beside | {"description": "on tau.joint1, a smooth curve over position"}).nameless
     assert not judge(line("nameless", [truth], verdict="unknown_effect", location={"tau.joint1": 0.9})).located
 
 

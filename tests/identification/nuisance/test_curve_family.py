@@ -79,6 +79,24 @@ def test_by_direction_a_curve_turns_its_sign_and_else_does_not(arm, curves):
     np.testing.assert_allclose(curves["position by direction"].columns(x), plain * sign[:, None], atol=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("words", "law"),
+    [
+        ("speed of joint1 by speed", lambda v, way, w, q: v * np.abs(w)),  # grease that another joint stirs
+        ("speed of joint1 by direction", lambda v, way, w, q: way / (1 + w**2)),
+        ("position of joint1 by direction", lambda v, way, w, q: way * np.sin(q)),
+        ("position of joint1 by speed", lambda v, way, w, q: v * np.cos(q)),
+        ("speed and speed of joint1 by direction", lambda v, way, w, q: v * w),
+    ],
+)
+def test_a_law_over_two_joints_is_in_the_curve_over_both(arm, curves, words, law):
+    """All but a tenth of it, whatever the law."""
+    x = arm[2][1]
+    wanted, columns = law(x.qd[:, 1], x.direction, x.qd[:, 0], x.q[:, 0]), curves[words].columns(x)
+    left = wanted - columns @ np.linalg.lstsq(columns, wanted, rcond=None)[0]
+    assert np.sqrt(np.mean(left**2)) < 0.1 * np.sqrt(np.mean(wanted**2))
+
+
 def test_load_when_driving_and_when_braking_add_up_to_load_by_direction(arm, curves):
     """Where power flows out of the drive it drives; together they are the friction by load of both."""
     x = arm[2][1]
