@@ -22,8 +22,11 @@ from .rest import REST
 
 Array = NDArray[np.float64]
 
-LEAST = 4.0
-"""The band kept is never narrower than this many times the frequency that holds 90 % of the speed's energy."""
+LEAST = 2.0
+"""The band kept is never narrower than this many times the frequency that holds 90 % of the speed's energy.
+
+Less leaves no springs or delays to see; more lets disturbances pass for them.
+"""
 
 SHORTEST = 16
 """Samples that a spectrum is taken over at least, where eight seconds hold fewer."""
