@@ -54,7 +54,7 @@ def write(plan: Plan, seed: int, number: int, folder: Path) -> None:
         case = draw((group, kinds, size), seed, number, attempt)
         world = World.random(case, plan.disturbance, np.random.default_rng([seed, number, attempt, 1]))
         case = replace(case, plant=world.of(case.plant), twin=world.of(case.twin))
-        told = truth(case.answer, seed) | {"group": plan.group, "fault": fault}
+        told: dict[str, Any] = truth(case.answer, seed) | {"group": plan.group, "fault": fault}
         told["disturbance"] = {"kind": plan.disturbance}
         told |= {"bits": world.bits, "rough": world.rough, "jitter": world.jitter}
         if len({joint(e["at"]) for e in told["effects"]}) < len(told["effects"]):
