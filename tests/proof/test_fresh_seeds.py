@@ -25,12 +25,12 @@ def seed() -> int:
 @pytest.mark.slow
 @pytest.mark.parametrize("generator", list(GENERATORS))
 def test_unseen_cases_are_answered(generator, tmp_path):
-    """A failure says which seed; what a case was told is in the captured output."""
+    """A failure says which seed; what a case was told is in the captured output. How long it takes is no test of it."""
     if generator == "played" and not (RECORDINGS.exists() and published()):
         pytest.skip("recordings or example-robot-data are not there")
     fresh = seed()
     folders = GENERATORS[generator](tmp_path / "cases", fresh, 2)
-    lines = score(folders, tmp_path / "answers.jsonl", 240.0)
+    lines = score(folders, tmp_path / "answers.jsonl", 1200.0)
     for line in lines:
         assert line["verdict"] in ("adequate", "missing_physics", "unknown_effect", "data_fault"), (fresh, line)
         if line["truth"]["group"] != FAULTY:
