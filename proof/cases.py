@@ -68,7 +68,8 @@ ROUND = (
 """One round of cases: (group, what is concealed, size as a multiple of the disturbance's RMS)."""
 
 
-Logged = Callable[[Mapping[str, NDArray]], Mapping[str, NDArray]]
+Logged = Callable[[str, Mapping[str, NDArray]], Mapping[str, NDArray]]
+"""What is written of a recording, by its name (of `RECORDINGS`) and what the sensors read."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +123,7 @@ class Case:
     twin: ProofPlant
     twin_model: str
 
-    def write(self, folder: Path, logged: Logged = dict) -> None:
+    def write(self, folder: Path, logged: Logged = lambda _, read: read) -> None:
         """Record it: model, URDF and recordings (`RECORDINGS`), each as ``logged`` makes them of what sensors read.
 
         Raises ValueError where the arm cannot be recorded.
@@ -140,7 +141,7 @@ class Case:
             for joint in self.plant.arm.joints:
                 if rattles(recording[f"tau.{joint}"], self.answer.noise):
                     raise ValueError(f"the servo of {joint} rattles")
-            write_csv(folder / name, logged(recording))
+            write_csv(folder / name, logged(name, recording))
 
 
 def rattles(torque: NDArray, noise: float) -> bool:
@@ -206,11 +207,7 @@ def _drawn(plan: tuple[str, tuple[str, ...], float], number: int, rng: Rng, outs
         if made.law:
             laws[m.name] = made.law
         for name, value in made.plant.items():
-            if isinstance(value, dict):
-                value = parts.get(name, {}) | value
-            elif isinstance(value, tuple):
-                value = (*parts.get(name, ()), *value)
-            parts[name] = value
+            parts[name] = parts.get(name, {}) | value if isinstance(value, dict) else value
     disturbance = Disturbance(rms, float(rng.uniform(0.2, 1.0)), float(rng.uniform(10.0, 15.0)))
     twin = ProofPlant(
         arm,

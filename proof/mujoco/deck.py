@@ -7,11 +7,10 @@ import numpy as np
 from ..cases import SKEWED, WRONG
 from ..concealed import MAKERS
 from ..drives.cases import CLEAN, FAULTY, LAWLESS, PAIR, SINGLE, SIZES, endless
+from ..drives.motions import KINDS, WHITE
 from ..outside import OUTSIDE
 from .faults import FAULTS
 
-WHITE, COLOURED, WANDERING = "white", "coloured", "wandering"
-KINDS = (WHITE, COLOURED, WANDERING)
 GROUPS = (CLEAN, SINGLE, PAIR, LAWLESS, "wrong", "sensor", FAULTY)
 DECK = (*[CLEAN] * 16, *[SINGLE] * 13, *[PAIR] * 11, *[LAWLESS] * 4, *["wrong"] * 2, "sensor", *[FAULTY] * 3)
 """Fifty cases. A third of those with something in them have two to four effects."""

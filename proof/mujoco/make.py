@@ -61,7 +61,7 @@ def write(plan: Plan, seed: int, number: int, folder: Path) -> None:
             continue
         try:
             twin = twin_of(case)
-            case.write(folder, lambda columns, of=world: of.logged(columns, fault))
+            case.write(folder, lambda name, columns, of=world: of.logged(name, columns, fault))
             if told["effects"]:
                 twin.write(folder / TWIN, world.logged)
         except ValueError:

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from bench.arm import Arm
 from bench.parts import Disturbance
 
-from ..cases import Case
+from ..cases import RECORDINGS, Case
+from ..drives.motions import COLOURED, WANDERING
 from ..plant import ProofPlant
-from .deck import COLOURED, WANDERING
 from .faults import FAULTS
 
 Rng = np.random.Generator
@@ -55,15 +55,15 @@ class World:
         real = _off(plant.arm if plant.real is None else plant.real, self.off)
         return replace(plant, real=real, disturbance=dict.fromkeys(plant.arm.joints, self.disturbance))
 
-    def logged(self, columns: Columns, fault: str = "") -> dict[str, NDArray]:
-        """A recording as it is logged, with a fault of `FAULTS` where one is asked for."""
-        rng = np.random.default_rng([self.seed, len(columns["time"])])
+    def logged(self, name: str, columns: Columns, fault: str = "") -> dict[str, NDArray]:
+        """A recording as it is logged, by its name of `RECORDINGS`, with a fault of `FAULTS` where one is asked for."""
+        rng = np.random.default_rng([self.seed, RECORDINGS.index(name)])
         time, step = columns["time"], 2.0 * np.pi / 2.0**self.bits
         stamps = time + self.jitter * (time[1] - time[0]) * rng.standard_normal(len(time))
-        found = {name: column for name, column in columns.items()} | {"time": stamps - stamps[0]}
-        for name in columns:
-            if name.startswith("q."):
-                found[name] = step * np.round(columns[name] / step + self.rough * rng.standard_normal(len(time)))
+        found = {**columns, "time": stamps - stamps[0]}
+        for channel, read in columns.items():
+            if channel.startswith("q."):
+                found[channel] = step * np.round(read / step + self.rough * rng.standard_normal(len(time)))
         if fault:
             chance = np.random.default_rng(self.seed)
             found = FAULTS[fault](found, int(chance.integers(1, len(self.off))), chance)

@@ -131,12 +131,14 @@ def test_disturbances_are_as_large_and_as_slow_as_they_are_called(case):
 def test_logged_encoder_counts_and_clock_jitters(case):
     world = world_of(case)
     time = np.arange(2000) / 250.0
-    seen = world.logged({"time": time, "q.joint1": np.sin(time), "tau.joint1": np.cos(time)})
+    seen = world.logged("train.csv", {"time": time, "q.joint1": np.sin(time), "tau.joint1": np.cos(time)})
     counts = seen["q.joint1"] * 2.0**world.bits / (2.0 * np.pi)
     np.testing.assert_allclose(counts, np.round(counts), atol=1e-6)
     assert np.std(seen["q.joint1"] - np.sin(time)) < 2.0 * 2.0 * np.pi / 2.0**world.bits
     assert np.std(np.diff(seen["time"]) * 250.0) == pytest.approx(np.sqrt(2.0) * world.jitter, rel=0.1)
     np.testing.assert_array_equal(seen["tau.joint1"], np.cos(time))
+    other = world.logged("third.csv", {"time": time, "q.joint1": np.sin(time), "tau.joint1": np.cos(time)})
+    assert abs(np.corrcoef(np.diff(seen["time"]), np.diff(other["time"]))[0, 1]) < 0.1
 
 
 @pytest.mark.parametrize("fault", FAULTS)
@@ -144,7 +146,7 @@ def test_a_fault_changes_the_channels_of_two_joints_at_most(case, fault):
     world = world_of(case)
     time = np.arange(2000) / 250.0
     columns = {f"{x}.joint{k + 1}": np.sin((k + 2) * time + len(x)) for x in ("q", "tau") for k in range(3)}
-    sound, broken = (world.logged({"time": time, **columns}, name) for name in ("", fault))
+    sound, broken = (world.logged("hold.csv", {"time": time, **columns}, name) for name in ("", fault))
     changed = {name for name, x in broken.items() if not np.array_equal(x, sound[name])}
     assert 1 <= len(changed) <= 4
     assert len({name.split(".")[1] for name in changed}) <= 2
