@@ -89,14 +89,16 @@ def findings(case: CheckCase, judged: Sequence[ReadingScore]) -> list[CheckFindi
     share = np.exp(log_odds - log_odds.max())
     share /= share.sum()
     fault = float(share[1:].sum())
-    change = best.fit.relative / np.maximum(case.given.relative, 1e-12)
+    # Where a reading gives a recorded torque to another joint, its error is compared with its own, not that joint's.
+    before = case.given.relative[best.reading.torque_source]
+    change = best.fit.relative / np.maximum(before, 1e-12)
     worst = int(np.nanargmin(change))
     plain = change[worst] <= BETTER and best.fit.relative[worst] <= LEFT
     likelier = case.given.prior - best.fit.prior >= CHEAPER and np.nanmax(best.fit.relative) <= LEFT
     if fault < SURE or not (plain or likelier):
         return []
     fall = (
-        f"the error of tau.{case.joints[worst]} falls from {percent(case.given.relative[worst])} to "
+        f"the error of tau.{case.joints[worst]} falls from {percent(before[worst])} to "
         f"{percent(best.fit.relative[worst])}"
     )
     alike = [j.reading for j, s in zip(judged[1:], share[2:], strict=True) if s > 0.05]

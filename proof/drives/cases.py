@@ -57,25 +57,32 @@ def planned(seed: int, count: int) -> list[Plan]:
     faults = endless(seed, 8, [(name, 0.0) for name in FAULTS])
     kinds = {group: endless(seed, 3 + k, KINDS) for k, group in enumerate(GROUPS)}
     pairs = np.random.default_rng([seed, 0, 9])
-    plans: list[Plan] = []
-    while len(plans) < count:
-        rng = np.random.default_rng([seed, 0, 10 + len(plans)])
-        for group in [DECK[k] for k in rng.permutation(len(DECK))]:
-            concealed: tuple = ()
-            if group == SINGLE:
-                concealed = (next(singles),)
-            elif group == LAWLESS:
-                concealed = (next(lawless),)
-            elif group == FAULTY:
-                concealed = (next(faults),)
-            elif group == PAIR:
-                several = int(pairs.integers(2, 5))
+    plans = []
+    for group in dealt(seed, DECK, count):
+        concealed: tuple = ()
+        if group == SINGLE:
+            concealed = (next(singles),)
+        elif group == LAWLESS:
+            concealed = (next(lawless),)
+        elif group == FAULTY:
+            concealed = (next(faults),)
+        elif group == PAIR:
+            several = int(pairs.integers(2, 5))
+            names = pairs.choice(NAMES, several, replace=False).tolist()
+            while len(set(names) & set(SPRINGS)) > 1:  # each would be sized by both
                 names = pairs.choice(NAMES, several, replace=False).tolist()
-                while len(set(names) & set(SPRINGS)) > 1:  # each would be sized by both
-                    names = pairs.choice(NAMES, several, replace=False).tolist()
-                concealed = tuple((name, float(pairs.choice((1.0, 2.0, 4.0)))) for name in names)
-            plans.append(Plan(group, next(kinds[group]), concealed))
-    return plans[:count]
+            concealed = tuple((name, float(pairs.choice((1.0, 2.0, 4.0)))) for name in names)
+        plans.append(Plan(group, next(kinds[group]), concealed))
+    return plans
+
+
+def dealt(seed: int, deck: Sequence[str], count: int) -> list[str]:
+    """Groups of the first cases of a seed: a deck after another, each shuffled, so that shares hold from one on."""
+    found: list[str] = []
+    while len(found) < count:
+        rng = np.random.default_rng([seed, 0, 10 + len(found)])
+        found += [deck[k] for k in rng.permutation(len(deck))]
+    return found[:count]
 
 
 def endless(seed: int, stream: int, items: Sequence):

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..cases import SKEWED, WRONG
 from ..concealed import MAKERS
-from ..drives.cases import CLEAN, FAULTY, LAWLESS, PAIR, SINGLE, SIZES, endless
+from ..drives.cases import CLEAN, FAULTY, LAWLESS, PAIR, SINGLE, SIZES, dealt, endless
 from ..drives.motions import KINDS, WHITE
 from ..outside import OUTSIDE
 from .faults import FAULTS
@@ -40,14 +40,12 @@ def planned(seed: int, count: int) -> list[Plan]:
     ones = {group: endless(seed, 1 + k, some) for k, (group, some) in enumerate(items.items())}
     kinds = {group: endless(seed, 11 + k, KINDS) for k, group in enumerate(GROUPS)}
     several = np.random.default_rng([seed, 0, 9])
-    plans: list[Plan] = []
-    while len(plans) < count:
-        rng = np.random.default_rng([seed, 0, 10 + len(plans)])
-        for group in [DECK[k] for k in rng.permutation(len(DECK))]:
-            one = ones.get(group)
-            concealed = _several(several) if group == PAIR else (next(one),) if one else ()
-            plans.append(Plan(group, concealed, next(kinds[group])))
-    return plans[:count]
+    plans = []
+    for group in dealt(seed, DECK, count):
+        one = ones.get(group)
+        concealed = _several(several) if group == PAIR else (next(one),) if one else ()
+        plans.append(Plan(group, concealed, next(kinds[group])))
+    return plans
 
 
 def _several(rng: np.random.Generator) -> tuple[tuple[str, float], ...]:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..drives.cases import TWIN, endless, model_text, write_arm
+from ..drives.cases import TWIN, dealt, endless, model_text, write_arm
 from .concealed import NAMES, Concealed, TooMuch
 from .laws import Slip
 from .machine import Machine, TooSoft
@@ -51,22 +51,20 @@ def planned(seed: int, count: int) -> list[Plan]:
     outside = endless(seed, 2, [(name, size) for name in OUTSIDE for size in (1.0, 2.0, 4.0)])
     faults = endless(seed, 3, [(name, 0.0) for name in FAULTS])
     several = np.random.default_rng([seed, 0, 9])
-    plans: list[Plan] = []
-    while len(plans) < count:
-        rng = np.random.default_rng([seed, 0, 10 + len(plans)])
-        for group in [DECK[k] for k in rng.permutation(len(DECK))]:
-            concealed: tuple = ()
-            if group == SINGLE:
-                concealed = (next(singles),)
-            elif group == LAWLESS:
-                concealed = (next(outside),)
-            elif group == FAULTY:
-                concealed = (next(faults),)
-            elif group == PAIR:
-                names = several.choice(list(NAMES), int(several.integers(2, 5)), replace=False).tolist()
-                concealed = tuple((name, float(several.choice((1.0, 2.0, 4.0)))) for name in names)
-            plans.append(Plan(group, concealed))
-    return plans[:count]
+    plans = []
+    for group in dealt(seed, DECK, count):
+        concealed: tuple = ()
+        if group == SINGLE:
+            concealed = (next(singles),)
+        elif group == LAWLESS:
+            concealed = (next(outside),)
+        elif group == FAULTY:
+            concealed = (next(faults),)
+        elif group == PAIR:
+            names = several.choice(list(NAMES), int(several.integers(2, 5)), replace=False).tolist()
+            concealed = tuple((name, float(several.choice((1.0, 2.0, 4.0)))) for name in names)
+        plans.append(Plan(group, concealed))
+    return plans
 
 
 def write(
