@@ -10,7 +10,6 @@ from ..deciding import SECOND_CHOICES
 from ..fitting.base_parameters import BaseParameters
 from ..fitting.experiment import Experiment, Scales
 from ..verdict import Verdict, verdict
-from .barred import barred
 from .confirm import ArmConfirmation, confirm
 from .nameless import NamelessParts, left_over
 from .rounds import search
@@ -60,15 +59,16 @@ def decide(
     """
     found = search(model, base, scales, train, held, progress=progress, seed=seed)
     best = last = confirm(found, train, held, scales, progress)
-    rejected, out = {n.placed.key: n for n in last.rejected}, barred(last.rejected, last.weak)
+    rejected = {n.placed.key: n for n in last.rejected}
     for _ in range(SECOND_CHOICES):
         if not last.rejected:
             break
         progress("searching another explanation for what the held-out recordings did not confirm")
-        again = search(model, base, scales, train, held, before=last.found, barred=out, progress=progress, seed=seed)
+        again = search(
+            model, base, scales, train, held, before=last.found, barred=rejected, progress=progress, seed=seed
+        )
         last = confirm(again, train, held, scales, progress)
         rejected |= {n.placed.key: n for n in last.rejected}
-        out |= barred(last.rejected, last.weak)
         if last.forecast.density > best.forecast.density:
             best = last
     return ArmDecision(best, left_over(best, scales, train, held, rejected), tuple(rejected.values()))

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt, welch
 
-from ..fitting.assembly import TorqueEvaluation
 from ..fitting.experiment import Experiment
 from ..fitting.fit import Fit
 from ..fitting.problem import gather
@@ -23,7 +22,7 @@ from .rest import REST
 
 Array = NDArray[np.float64]
 
-LEAST = 2.0
+LEAST = 4.0
 """The band kept is never narrower than this many times the frequency that holds 90 % of the speed's energy."""
 
 SHORTEST = 16
@@ -87,8 +86,7 @@ def _bands(found: Fit, experiments: Sequence[Experiment], share: float) -> Array
         for c in range(assembly.tree.carriers, n_joints):
             index, own = gather(blocks, c)
             fitted = [own] if len(index) else []
-            named = [*fitted, *smooth_columns([e], [state], c), _directed(e, c), _late(e, state, c)]
-            columns = np.concatenate(named, axis=1)
+            columns = np.concatenate([*fitted, *smooth_columns([e], [state], c), _directed(e, c)], axis=1)
             left = residual[:, c] - columns @ np.linalg.lstsq(columns, residual[:, c], rcond=1e-8)[0]
             # Friction that sticks is physics that the model may lack, not a disturbance.
             left = left * (np.abs(e.motion.to_band(e.motion.qd)[:, c]) > REST * np.max(np.abs(e.motion.qd[:, c])))
@@ -110,18 +108,6 @@ def _directed(experiment: Experiment, joint: int) -> Array:
     qd = experiment.motion.qd[:, joint]
     direction = np.tanh(qd / max(0.005 * np.max(np.abs(qd)), 1e-300))
     return experiment.motion.to_band(np.stack([direction, qd * direction], axis=1))
-
-
-def _late(experiment: Experiment, state: TorqueEvaluation, joint: int) -> Array:
-    """What a late or elastic drive leaves of a joint's torque, in the analysis band (n_band, n_joints + 2): each
-    joint's jerk times the inertia between the two, and the first and second derivative of the load.
-    """
-    motion, found = experiment.motion, np.empty((len(experiment.motion.qdd), experiment.motion.qdd.shape[1] + 2))
-    for s in motion.segments:
-        slope = np.gradient(state.load[s, joint], motion.period)
-        found[s, :-2] = experiment.mass_matrix[s, joint] * np.gradient(motion.qdd[s], motion.period, axis=0)
-        found[s, -2:] = np.stack([slope, np.gradient(slope, motion.period)], axis=1)
-    return motion.to_band(found)
 
 
 def _low_passed(experiment: Experiment, bands: Array) -> Experiment:

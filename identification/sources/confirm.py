@@ -56,8 +56,6 @@ class Confirmation:
     names: tuple[Naming, ...]
     missed: Mapping[str, HeldOutLoss]
     rejected: tuple[Naming, ...]
-    weak: Mapping[str, HeldOutLoss]
-    """What the held-out recordings miss of the rejected."""
     train: Linearisation
     held: Linearisation
     density: float
@@ -78,7 +76,6 @@ def confirm(
     noise = replace(found.weighed, runs=[*found.weighed.runs, *source.noise_channels(held, there, could)])
     whole = _forecast(source, given, last, there, noise)
     missed: dict[str, HeldOutLoss] = {}
-    weak: dict[str, HeldOutLoss] = {}
     rejected: list[Naming] = []
     while names:
         for name in names:
@@ -92,10 +89,10 @@ def confirm(
             break
         names.remove(weakest)
         rejected.append(weakest)
-        gone = weak[weakest.placed.key] = missed.pop(weakest.placed.key)
+        gone = missed.pop(weakest.placed.key)
         last, there = gone.train, gone.held
         whole = _forecast(source, given, last, there, noise)
-    return Confirmation(tuple(names), missed, tuple(rejected), weak, last, there, whole[0], noise)
+    return Confirmation(tuple(names), missed, tuple(rejected), last, there, whole[0], noise)
 
 
 def _forecast(

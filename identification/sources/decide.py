@@ -4,7 +4,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ..deciding import SECOND_CHOICES
-from ..evidence.barred import barred
 from ..evidence.selection import Remainder
 from ..verdict import Verdict, verdict
 from .confirm import Confirmation, confirm, remainders
@@ -36,15 +35,14 @@ def decide(source: Source, given: ModelPoint, progress: Callable[[str], None] = 
     """Name what a model leaves out of some recordings."""
     found = search(source, given, progress=progress)
     best = last = confirm(source, given, found, progress)
-    rejected, out = {n.placed.key: n for n in last.rejected}, barred(last.rejected, last.weak)
+    rejected = {n.placed.key: n for n in last.rejected}
     for _ in range(SECOND_CHOICES):
         if not last.rejected:
             break
         progress("searching another explanation for what the held-out recordings did not confirm")
-        again = search(source, given, barred=out, progress=progress)
+        again = search(source, given, barred=rejected, progress=progress)
         last = confirm(source, given, again, progress)
         rejected |= {n.placed.key: n for n in last.rejected}
-        out |= barred(last.rejected, last.weak)
         if last.density > best.density:
             found, best = again, last
     left = remainders(source, given, best, rejected)

@@ -66,25 +66,20 @@ def test_names_what_is_missing_in_order(folder):
     # No law beside another that holds it. The force is what the controller asks for; a late encoder looks alike.
     # Friction changes along the screw by some 1 N, which was a curve without a name before.
     friction = [(f"{x}_friction", "slide") for x in ("coulomb", "asymmetric", "position_dependent")]
-    assert names[:4] == [*friction[:2], ("command_delay", "tau.slide"), friction[2]]
-    # What is told besides is hardly there, and not sure: without it the held-out error is the same to 0.05 points.
-    fourth = found["steps"][4]
-    assert fourth["label"] == "+ position_dependent_friction at slide"
-    assert fourth["holdout"] - found["steps"][-1]["holdout"] < 5e-4
-    assert all(e["probability"] < 0.7 for e in found["effects"][4:])
+    assert names == [*friction[:2], ("command_delay", "tau.slide"), friction[2]]
     assert ("sensor_delay", "q.slide") in {
         (r["name"], r["at"]) for r in found["effects"][2]["rivals"] if not r["separable"]
     }
     assert found["effects"][0]["parameters"]["level"]["value"] == pytest.approx(20.4, abs=1.0)
-    # The saved model has what was confirmed.
+    # The table beside them does not change what was confirmed, in the saved model neither.
     saved = load_model(folder / "model.toml").values
     for e in found["effects"]:
         for name, p in e["parameters"].items():
             assert saved[f"{e['name']}.{e['at']}.{name}"] == pytest.approx(p["value"], rel=1e-5)
-    for e in found["effects"][:4]:
+    for e in found["effects"]:
         # Names that cannot be told apart share a probability; the one that is told has the most of it.
         alike = [r["probability"] for r in e["rivals"] if not r["separable"]]
-        assert e["probability"] + sum(alike) > (0.8 if alike else 0.75)
+        assert e["probability"] + sum(alike) > 0.8
         assert e["probability"] > max(alike, default=0.0)
 
 

@@ -90,11 +90,11 @@ def disturbed(
     return e, residual
 
 
-def bands(*several, blocks=(), share=0.1, load=None):
+def bands(*several, blocks=(), share=0.1):
     residuals = {id(e): r for e, r in several}
     assembly = Made(
         residual=lambda e, _theta: (residuals[id(e)], list(blocks)),
-        evaluate=lambda e, _theta: Made(load=np.zeros((N, 1)) if load is None else load),
+        evaluate=lambda e, _theta: Made(load=np.zeros((N, 1))),
         tree=Made(carriers=0),
     )
     found: Any = Made(assembly=assembly, theta=None)
@@ -131,11 +131,11 @@ def test_half_the_share_that_may_be_driven_is_a_cube_roots_less_of_the_band(shar
     assert abs(found - 16.0) > 1.0
 
 
-def test_the_band_is_twice_the_speeds_own_at_least():
-    """Speed at 12 Hz: 24 Hz, to the eighth of a hertz that the spectrum tells (and the window's width)."""
-    (found,) = bands(disturbed(slow=12.0))
-    assert found == pytest.approx(24.0, abs=1.0)
-    (found,) = bands(disturbed(slow=6.0))
+def test_the_band_is_four_times_the_speeds_own_at_least():
+    """Speed at 5 Hz: 20 Hz, to the eighth of a hertz that the spectrum tells (and the window's width)."""
+    (found,) = bands(disturbed(slow=5.0))
+    assert found == pytest.approx(20.0, abs=1.0)
+    (found,) = bands(disturbed(slow=3.0))
     assert found == pytest.approx(16.0, rel=0.06)  # 12 Hz would be less
 
 
@@ -150,19 +150,6 @@ def test_of_several_recordings_the_narrowest_band_counts_and_of_one_its_longest_
 
 def test_what_sticks_near_rest_is_no_disturbance():
     assert bands(disturbed(rest=True)) == pytest.approx([np.inf])
-
-
-def test_what_a_late_or_elastic_drive_leaves_is_no_disturbance():
-    """It would hide itself: the larger it is, the narrower the band in which it is sought."""
-    e, residual = disturbed()
-    jerk = np.gradient(e.motion.qdd, PERIOD, axis=0)
-    load = disturbed(seed=7)[0].motion.qdd
-    slope = np.gradient(load, PERIOD, axis=0)
-    bend = np.gradient(slope, PERIOD, axis=0)
-    for late in (jerk, slope, bend):
-        late = 3.0 * np.std(residual) / np.std(late) * late
-        assert bands((e, residual + late), load=load) == pytest.approx([16.0], rel=0.06)
-        assert bands((e, residual + late[::-1]), load=load) < [12.0]
 
 
 def test_what_the_models_own_columns_explain_is_no_disturbance():
