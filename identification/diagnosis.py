@@ -163,6 +163,11 @@ class FrictionCurve:
     value, std : array (n,)
         Friction and its standard deviation [unit]; the band is two deviations either side.
     unit : str
+    parts : tuple of array (n,)
+        What each of ``effects`` adds [unit].
+    measured : tuple of array (m,), or None
+        The measured torque less everything else in the model, in bins of speed: speed, mean, standard deviation. None
+        where several joints feel the friction, and for slides.
     """
 
     at: str
@@ -172,11 +177,18 @@ class FrictionCurve:
     value: Array
     std: Array
     unit: str
+    parts: tuple[Array, ...]
+    measured: tuple[Array, Array, Array] | None = None
 
     def to_json(self) -> dict[str, Any]:
         """The published form."""
         numbers = {name: getattr(self, name).tolist() for name in ("speed", "value", "std")}
-        return {"at": self.at, "kind": self.kind, "effects": list(self.effects), **numbers, "unit": self.unit}
+        told = {"at": self.at, "kind": self.kind, "effects": list(self.effects), **numbers, "unit": self.unit}
+        told["parts"] = [part.tolist() for part in self.parts]
+        if self.measured is not None:
+            names = ("speed", "value", "std")
+            told["measured"] = {name: x.tolist() for name, x in zip(names, self.measured, strict=True)}
+        return told
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,7 +26,7 @@ from ..identification.sources.weigh import covariances
 from ..models.model_file import load_model
 from ..models.model_write import save_model
 from ..models.servo_loop import DRIVE
-from ..report.words import percent
+from ..report.words import percent, words
 from .bam_figures import explained, positions
 from .bam_recordings import BamRun, duty_error, position_error, read_all
 from .outcome import FOLDER, Quantity, interval, table, write_result
@@ -125,7 +125,7 @@ def sentence(decided: Decision, lines: Sequence[Mapping[str, Any]]) -> str:
     before, after = (lines[k]["holdout"] for k in (0, -1))
     if not decided.best.names:
         return f"Coulomb and viscous friction are adequate: the held-out position error is {1e3 * before:.1f} mrad."
-    names = " and ".join(n.placed.effect.name.replace("_", " ") for n in decided.best.names)
+    names = " and ".join(words(n.placed.effect.name) for n in decided.best.names)
     return (
         f"The model leaves out {names}. With that added, the position error at the gain that the fit never saw falls "
         f"from {1e3 * before:.1f} to {1e3 * after:.1f} mrad, by {percent(1 - after / before)}."
@@ -173,18 +173,18 @@ def candidates(decided: Decision) -> list[dict[str, Any]]:
 def sections(held: Sequence[BamRun], decided: Decision) -> list[Section]:
     """What is drawn, and what was not named."""
     before, after = (plain(x.at.all_values) for x in (decided.found.first, decided.best.train))
-    words = [
+    lines = [
         f"{t.placed.effect.name.replace('_', ' ').capitalize()}: log posterior odds {t.odds:.0f}."
         for t in decided.found.trials
     ]
     names = {n.placed.key for n in decided.best.names}
-    words += [
+    lines += [
         f"{n.placed.effect.name.replace('_', ' ').capitalize()} was found too; the held-out gain did not confirm it."
         for n in decided.rejected
         if n.placed.key not in names
     ]
-    words += [
-        f"Without {n.placed.effect.name.replace('_', ' ')} the held-out gain loses "
+    lines += [
+        f"Without {words(n.placed.effect.name)} the held-out gain loses "
         f"{decided.best.missed[n.placed.key].sure:.1f} standard errors."
         for n in decided.best.names
     ]
@@ -209,7 +209,7 @@ def sections(held: Sequence[BamRun], decided: Decision) -> list[Section]:
     ]
     return [
         Section("On the held-out gain", [f"Mean absolute error, {'; '.join(by_run)}."], pictures[:1]),
-        Section("What each law explains", words, pictures[1:]),
+        Section("What each law explains", lines, pictures[1:]),
     ]
 
 

@@ -9,6 +9,7 @@ from ..identification.sources.search import Trial
 from ..models.servo_loop import simulate
 from ..report.drawing import AFTER, BEFORE, GREY, MEASURED, drawing, line, margins, svg
 from ..report.time_axes import over_time
+from ..report.words import words
 from .bam_recordings import BamRun
 
 Values = Mapping[str, float]
@@ -43,7 +44,7 @@ def explained(trials: Sequence[Trial], named: Sequence[str]) -> bytes:
         places = np.arange(len(trials))
         colours = [AFTER if t.placed.effect.name in named else GREY for t in trials]
         axes.barh(places, [100 * t.explained for t in trials], 0.6, color=colours)
-        axes.set_yticks(places, [t.placed.effect.name.replace("_", " ") for t in trials])
+        axes.set_yticks(places, [words(t.placed.effect.name) for t in trials])
         axes.invert_yaxis()
         axes.set_xlabel("share of the whitened residual explained [%]")
         return svg(figure)

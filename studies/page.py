@@ -12,7 +12,7 @@ from ..files import written_whole
 from ..report.html import figure, headline, page, paragraph, table
 from ..report.provenance import PACKAGES, provenance
 from ..report.strips import StripDrawing
-from ..report.words import unit_words
+from ..report.words import unit_words, words
 from ..report.zoom import zoomable
 from .outcome import FOLDER, Quantity
 
@@ -160,7 +160,7 @@ def write_page(
 def _numbers(quantities: Sequence[Quantity]) -> str:
     rows = [
         [
-            escape(q.name.replace("_", " ")),
+            escape(words(q.name)),
             escape("" if q.unit == "1" else unit_words(q.unit)),
             "–" if q.paper is None else f"{q.paper:g}",
             _text(q.ours) if isinstance(q.ours, float) else _said(_text(q.ours)),

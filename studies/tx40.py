@@ -12,6 +12,7 @@ from ..errors import InputError
 from ..exit_status import status_of
 from ..identification.diagnose import Answer
 from ..recordings import find_recording
+from ..report.words import words
 from .foreign import Machine, alike, run
 from .outcome import Quantity, interval
 from .page import Section
@@ -59,8 +60,8 @@ def coupling(answer: Answer) -> list[Quantity]:
 
 def sections(answer: Answer) -> list[Section]:
     """What the makers say, what we say, and what cannot be told apart."""
-    at_motor = [e.name.replace("_", " ") for e in answer.diagnosis.effects if e.at == "motor6"]
-    seen = f"At motor 6 the diagnosis names {', '.join(at_motor)}." if at_motor else "At motor 6 nothing is named."
+    at_motor = [words(e.name) for e in answer.diagnosis.effects if e.at == "motor6"]
+    seen = f"At motor 6 the diagnosis names {' and '.join(at_motor)}." if at_motor else "At motor 6 nothing is named."
     return [
         Section(
             "What the makers say",

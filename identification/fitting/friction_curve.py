@@ -4,12 +4,15 @@ Parameters of a friction law trade off against one another, and none may be know
 from the parameters' joint covariance S through the law's derivative G (the delta method): var f = diag(G S G').
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ...models.axes import Place, place
 from ...models.hidden_state import evaluate_law, reads
 from ...models.model import PlacedEffect
+from ...report.bins import binned
 from ..diagnosis import FrictionCurve
 from .experiment import Experiment
 from .fit import Fit
@@ -20,7 +23,7 @@ POINTS = 61
 """Speeds at which a curve is drawn, evenly over the speeds travelled and dense near rest."""
 
 
-def friction_curves(found: Fit, experiments: list[Experiment] | tuple[Experiment, ...]) -> list[FrictionCurve]:
+def friction_curves(found: Fit, experiments: Sequence[Experiment]) -> list[FrictionCurve]:
     """Curve of every place whose friction depends on speed alone, over the speeds of the recordings."""
     assembly = found.assembly
     places: dict[tuple[str, str], list[tuple[int, PlacedEffect]]] = {}
@@ -31,19 +34,50 @@ def friction_curves(found: Fit, experiments: list[Experiment] | tuple[Experiment
     curves = []
     for (kind, at), members in places.items():
         joint = assembly.joint_of(members[0][1])
-        speed = _speeds(experiments, place(assembly.tree, at))
-        signals = {"qd": speed, "speed_scale": np.full(len(speed), assembly.speed_scale(members[0][1]))}
-        value, slope = np.zeros(len(speed)), np.zeros((len(speed), len(found.theta)))
+        here = place(assembly.tree, at)
+        speed = _speeds(experiments, here)
+        scale = assembly.speed_scale(members[0][1])
+        parts, slope = [], np.zeros((len(speed), len(found.theta)))
         for k, p in members:
-            law = evaluate_law(p.effect, signals, assembly.parameters(k, found.theta))
+            law = evaluate_law(p.effect, _signals(speed, scale), assembly.parameters(k, found.theta))
             free = [x.name not in p.hold for x in p.effect.parameters]
-            value += law.values[:, 0]
+            parts.append(law.values[:, 0])
             slope[:, assembly.index_of(p)] += law.by_parameter[:, 0][:, free]
         std = np.sqrt(np.maximum(np.einsum("np,pq,nq->n", slope, found.covariance, slope), 0.0))
         prismatic = assembly.tree.joints[joint].kind == "prismatic"
         unit = "N" if kind == "slide" or prismatic else "N*m"
-        curves.append(FrictionCurve(at, kind, tuple(p.effect.name for _, p in members), speed, value, std, unit))
+        measured = (
+            _measured(found, experiments, joint, members, scale) if kind == "joint" and here.alone is not None else None
+        )
+        names = tuple(p.effect.name for _, p in members)
+        curves.append(FrictionCurve(at, kind, names, speed, np.sum(parts, axis=0), std, unit, tuple(parts), measured))
     return curves
+
+
+def _signals(speed: Array, scale: float) -> dict[str, Array]:
+    return {"qd": speed, "speed_scale": np.full(len(speed), scale)}
+
+
+def _measured(
+    found: Fit, experiments: Sequence[Experiment], joint: int, members: Sequence[tuple[int, PlacedEffect]], scale: float
+) -> tuple[Array, Array, Array] | None:
+    """Measured torque of a joint less everything in the model but some laws, over its speed: bin centres, mean and
+    standard deviation in each; None where it was not recorded in motion."""
+    speeds, torques = [], []
+    for e in experiments:
+        speed = e.motion.to_band(e.motion.qd)[:, joint]
+        left = found.assembly.residual(e, found.theta)[0][:, joint]
+        for k, p in members:
+            law = evaluate_law(p.effect, _signals(speed, scale), found.assembly.parameters(k, found.theta))
+            left = left + law.values[:, 0]
+        speeds.append(speed)
+        torques.append(left)
+    speed, torque = np.concatenate(speeds), np.concatenate(torques)
+    if not np.ptp(speed) > 0:
+        return None
+    at, mean, spread = binned(speed, torque)
+    told = np.isfinite(mean)
+    return (at[told], mean[told], spread[told]) if told.any() else None
 
 
 def identifiable(found: Fit) -> NDArray[np.bool_]:
@@ -53,7 +87,7 @@ def identifiable(found: Fit) -> NDArray[np.bool_]:
     return (found.std <= np.abs(found.theta)) & ~(is_shape & found.at_bound)
 
 
-def _speeds(experiments: list[Experiment] | tuple[Experiment, ...], here: Place) -> Array:
+def _speeds(experiments: Sequence[Experiment], here: Place) -> Array:
     """Speeds travelled, closer together near rest, where friction bends."""
     speeds = np.concatenate([here.coordinate(e.motion.qd) for e in experiments])
     even = np.linspace(-1.0, 1.0, POINTS)

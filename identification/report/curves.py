@@ -1,17 +1,17 @@
 """Residual against speed and position: where a friction law, a spring or a ripple shows its shape."""
 
 from collections.abc import Sequence
+from itertools import cycle
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ...report.drawing import AFTER, BEFORE, GREY, drawing, margins, svg
+from ...report.bins import FEWEST, binned
+from ...report.drawing import AFTER, BEFORE, GREY, MEASURED, drawing, margins, svg
 from ...report.words import unit_words, words
 from ..diagnosis import Array, FrictionCurve, Trace
 
-_BINS = 40
-_FEWEST = 8
 _POINTS = 2500
 _COORDINATE_UNIT = {"N*m": "rad", "N": "m"}
 
@@ -46,17 +46,28 @@ def residual_curves(traces: Sequence[Trace], changed: bool) -> bytes | None:
 
 
 def friction_over_speed(curve: FrictionCurve) -> bytes:
-    """Friction of one joint that depends on speed alone, with a band of two standard deviations either side."""
+    """Friction of one joint that depends on speed alone, with a band of two standard deviations either side; the laws
+    that add up to it; and what was measured."""
     unit = _COORDINATE_UNIT.get(curve.unit, "")
     with drawing():
-        figure = Figure(figsize=(5.4, 2.8))
+        rows = 1 + (len(curve.parts) + 1) // 2
+        figure = Figure(figsize=(5.4, 2.8 + 0.2 * rows))
         axes = figure.subplots()
-        figure.subplots_adjust(**margins(figure, 0.75, 0.15, 0.5, 0.15))
+        figure.subplots_adjust(**margins(figure, 0.75, 0.15, 0.5, 0.15 + 0.2 * rows))
         axes.axhline(0, color=GREY, linewidth=0.6)
         axes.axvline(0, color=GREY, linewidth=0.6)
         low, high = curve.value - 2 * curve.std, curve.value + 2 * curve.std
         axes.fill_between(curve.speed, low, high, color=AFTER, alpha=0.25, linewidth=0)
-        axes.plot(curve.speed, curve.value, color=AFTER, linewidth=1.6)
+        axes.plot(curve.speed, curve.value, color=AFTER, linewidth=1.6, label="friction")
+        if len(curve.parts) > 1:
+            for name, part, dashes in zip(curve.effects, curve.parts, cycle(("--", ":", "-.")), strict=False):
+                axes.plot(curve.speed, part, dashes, color=GREY, linewidth=1.1, label=words(name))
+        if curve.measured is not None:
+            at, mean, spread = curve.measured
+            axes.errorbar(
+                at, mean, spread, fmt=".", color=MEASURED, markersize=4, linewidth=0.7, zorder=1.5, label="measured"
+            )
+        figure.legend(loc="upper left", ncols=2, bbox_to_anchor=(0.06, 1.0))
         axes.set_xlabel(f"speed of {curve.at} [{unit}/s]" if unit else f"speed of {curve.at}")
         axes.set_ylabel(f"friction [{unit_words(curve.unit)}]")
         return svg(figure)
@@ -65,27 +76,11 @@ def friction_over_speed(curve: FrictionCurve) -> bytes:
 def friction_words(curve: FrictionCurve) -> str:
     """What stands in the picture of a friction curve."""
     laws = ", ".join(words(name) for name in curve.effects)
-    return f"Friction of {curve.at} over its speed, of the laws there that depend on speed alone: {laws}."
-
-
-def binned(coordinate: Array, residual: Array, bins: int = _BINS) -> tuple[Array, Array, Array]:
-    """Bin centres, mean and standard deviation of the residual in bins of equal width, each (n_bins,).
-
-    Where the coordinate changes sign zero is an edge, so that a jump there is not smeared. Bins with fewer than eight
-    samples are NaN.
-    """
-    low, high = float(coordinate.min()), float(coordinate.max())
-    width = (high - low) / bins
-    first = np.floor(low / width) if low < 0 < high else low / width
-    edges = width * (first + np.arange(bins + 2))
-    index = np.clip(np.searchsorted(edges, coordinate, side="right") - 1, 0, bins)
-    count = np.bincount(index, minlength=bins + 1)
-    enough = count >= _FEWEST
-    count = np.where(enough, count, 1)
-    mean = np.bincount(index, residual, bins + 1) / count
-    spread = np.bincount(index, (residual - mean[index]) ** 2, bins + 1) / count
-    centres = 0.5 * (edges[1:] + edges[:-1])
-    return centres, np.where(enough, mean, np.nan), np.where(enough, np.sqrt(spread), np.nan)
+    said = f"Friction of {curve.at} over its speed, of the laws there that depend on speed alone: {laws}."
+    if curve.measured is None:
+        return said
+    kind = "force" if curve.unit == "N" else "torque"
+    return f"{said} Points: the measured {kind} less everything else in the model, mean and standard deviation."
 
 
 def _curve(axes: Axes, coordinate: Array, residual: Array, colour: str, label: str) -> None:
@@ -116,7 +111,7 @@ def _join(traces: Sequence[Trace], model: str) -> Array:
 
 def _moves(coordinate: Array) -> bool:
     finite = coordinate[np.isfinite(coordinate)]
-    return finite.size >= _FEWEST and float(np.ptp(finite)) > 1e-9 * max(1.0, float(np.abs(finite).max()))
+    return finite.size >= FEWEST and float(np.ptp(finite)) > 1e-9 * max(1.0, float(np.abs(finite).max()))
 
 
 def _limits(residual: Array) -> tuple[float, float]:

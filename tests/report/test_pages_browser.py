@@ -61,7 +61,15 @@ def crowded() -> Diagnosis:
     made = VERDICTS["missing_physics"]()
     speed = np.linspace(-1.0, 1.0, 61)
     curve = FrictionCurve(
-        "joint5", "joint", ("stribeck_friction",), speed, np.tanh(speed / 0.1), np.full(61, 0.1), "N*m"
+        "joint5",
+        "joint",
+        ("viscous_friction", "stribeck_friction"),
+        speed,
+        speed + np.tanh(speed / 0.1),
+        np.full(61, 0.1),
+        "N*m",
+        (speed, np.tanh(speed / 0.1)),
+        (speed[::6], speed[::6], np.full(11, 0.2)),
     )
     names = tuple(replace(made.effects[1], at=f"joint{5 + k}", probability=0.95 - 0.01 * k) for k in range(20))
     return replace(made, effects=names, curves=(curve,))

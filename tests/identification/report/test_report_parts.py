@@ -7,9 +7,9 @@ import pytest
 from diagnoses import missing_physics, spelt
 
 from snarelab.identification.diagnosis import Trace
-from snarelab.identification.report.curves import binned
 from snarelab.identification.report.findings import missing
 from snarelab.identification.report.fit import changes
+from snarelab.report.bins import binned
 from snarelab.report.drawing import thinned
 from snarelab.report.words import chance, number, percent, spans, unit_words, with_std, words
 

@@ -7,8 +7,9 @@ import pytest
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
-from snarelab.identification.diagnosis import Candidate, Location, Step, Trace
+from snarelab.identification.diagnosis import Candidate, FrictionCurve, Location, Step, Trace
 from snarelab.identification.report import curves, figures
+from snarelab.report.bins import binned
 from snarelab.report.drawing import AFTER, BEFORE, GREY, MEASURED, SHADE
 
 TIME = np.arange(1281) / 64
@@ -205,7 +206,7 @@ def test_a_label_of_over_52_letters_is_cut_to_51_and_a_sign():
 )
 def test_bins_are_equally_wide_and_one_more_than_asked_for(low, high, centres):
     """The range is 4, in 4 bins."""
-    found, mean, spread = curves.binned(np.array([low, high]), np.zeros(2), 4)
+    found, mean, spread = binned(np.array([low, high]), np.zeros(2), 4)
     assert found == pytest.approx(centres)
     assert np.isnan(mean).all()
     assert np.isnan(spread).all()
@@ -215,7 +216,7 @@ def test_a_bin_has_mean_and_spread_from_eight_samples_on():
     """A sample on an edge belongs to what lies above: 8 samples in the first bin, 7 in the second, 9 in the last."""
     coordinate = np.r_[np.zeros(4), np.full(4, 0.9), np.full(7, 1.0), np.full(9, 4.0)]
     residual = np.r_[np.full(4, 1.0), np.full(4, 5.0), np.full(7, 100.0), np.full(9, -2.0)]
-    _, mean, spread = curves.binned(coordinate, residual, 4)
+    _, mean, spread = binned(coordinate, residual, 4)
     np.testing.assert_array_equal(mean, [3.0, np.nan, np.nan, np.nan, -2.0])
     np.testing.assert_array_equal(spread, [2.0, np.nan, np.nan, np.nan, 0.0])
 
@@ -326,3 +327,28 @@ def test_a_channel_that_is_known_only_where_nothing_moves_has_no_points():
     known = np.where(np.arange(40) < 20, 1.0, np.nan)
     one = trace(measured=known, speed=moves, position=moves, before=np.zeros(40), after=np.zeros(40), time=moves)
     assert all(not axes.collections for axes in drawn(curves.residual_curves([one], True)).axes)
+
+
+def test_a_friction_curve_has_its_band_its_parts_and_the_points_measured():
+    speed = np.linspace(-1.0, 1.0, 5)
+    viscous, dry = 2 * speed, 3 * np.sign(speed)
+    points = np.array([-0.5, 0.5]), np.array([-4.2, 3.9]), np.array([0.1, 0.3])
+    names = ("viscous_friction", "coulomb_friction")
+    curve = FrictionCurve("a", "joint", names, speed, viscous + dry, np.full(5, 0.5), "N*m", (viscous, dry), points)
+    (axes,) = drawn(curves.friction_over_speed(curve)).axes
+    lines = {line.get_label(): line for line in axes.lines}
+    np.testing.assert_allclose(lines["friction"].get_ydata(), viscous + dry)
+    np.testing.assert_allclose(lines["viscous friction"].get_ydata(), viscous)
+    np.testing.assert_allclose(lines["Coulomb friction"].get_ydata(), dry)
+    (measured,) = axes.containers
+    at, (low, high) = measured.lines[0], (segment[:, 1] for segment in measured.lines[2][0].get_segments())
+    np.testing.assert_allclose(at.get_xydata(), np.column_stack(points[:2]))
+    np.testing.assert_allclose([low, high], [(-4.3, -4.1), (3.6, 4.2)])
+
+
+def test_a_friction_of_one_law_has_no_parts_beside_it():
+    speed = np.linspace(-1.0, 1.0, 5)
+    curve = FrictionCurve("a", "joint", ("viscous_friction",), speed, speed, np.full(5, 0.5), "N*m", (speed,))
+    (axes,) = drawn(curves.friction_over_speed(curve)).axes
+    assert [line.get_label() for line in axes.lines if not line.get_label().startswith("_")] == ["friction"]
+    assert not axes.containers
