@@ -81,7 +81,7 @@ def dealt(seed: int, deck: Sequence[str], count: int) -> list[str]:
     found: list[str] = []
     while len(found) < count:
         rng = np.random.default_rng([seed, 0, 10 + len(found)])
-        found += [deck[k] for k in rng.permutation(len(deck))]
+        found += [deck[int(k)] for k in rng.permutation(len(deck))]
     return found[:count]
 
 

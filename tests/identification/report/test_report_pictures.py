@@ -335,7 +335,7 @@ def test_a_friction_curve_has_its_band_its_parts_and_the_points_measured():
     points = np.array([-0.5, 0.5]), np.array([-4.2, 3.9]), np.array([0.1, 0.3])
     names = ("viscous_friction", "coulomb_friction")
     curve = FrictionCurve("a", "joint", names, speed, viscous + dry, np.full(5, 0.5), "N*m", (viscous, dry), points)
-    (axes,) = drawn(curves.friction_over_speed(curve)).axes
+    axes: Any = drawn(curves.friction_over_speed(curve)).axes[0]
     lines = {line.get_label(): line for line in axes.lines}
     np.testing.assert_allclose(lines["friction"].get_ydata(), viscous + dry)
     np.testing.assert_allclose(lines["viscous friction"].get_ydata(), viscous)
@@ -349,6 +349,6 @@ def test_a_friction_curve_has_its_band_its_parts_and_the_points_measured():
 def test_a_friction_of_one_law_has_no_parts_beside_it():
     speed = np.linspace(-1.0, 1.0, 5)
     curve = FrictionCurve("a", "joint", ("viscous_friction",), speed, speed, np.full(5, 0.5), "N*m", (speed,))
-    (axes,) = drawn(curves.friction_over_speed(curve)).axes
+    axes: Any = drawn(curves.friction_over_speed(curve)).axes[0]
     assert [line.get_label() for line in axes.lines if not line.get_label().startswith("_")] == ["friction"]
     assert not axes.containers
