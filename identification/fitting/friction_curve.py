@@ -70,10 +70,13 @@ def _measured(
         for k, p in members:
             law = evaluate_law(p.effect, _signals(speed, scale), found.assembly.parameters(k, found.theta))
             left = left + law.values[:, 0]
-        speeds.append(speed)
-        torques.append(left)
-    speed, torque = np.concatenate(speeds), np.concatenate(torques)
-    if not np.ptp(speed) > 0:
+        # Where a sample is no data, the residual says nothing: the points would be the fitted laws.
+        told = np.ones(len(speed), bool) if e.kept is None else e.kept[:, joint]
+        if joint not in e.motion.silent:
+            speeds.append(speed[told])
+            torques.append(left[told])
+    speed, torque = np.concatenate([*speeds, np.zeros(0)]), np.concatenate([*torques, np.zeros(0)])
+    if len(speed) == 0 or not np.ptp(speed) > 0:
         return None
     at, mean, spread = binned(speed, torque)
     told = np.isfinite(mean)

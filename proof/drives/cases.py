@@ -52,28 +52,28 @@ class Plan:
 
 def planned(seed: int, count: int) -> list[Plan]:
     """The first ``count`` cases of a seed, the same however many follow."""
-    singles = endless(seed, 1, [(name, size) for name in NAMES for size in SIZES])
-    lawless = endless(seed, 2, [(name, size) for name in NAMELESS for size in (2.0, 4.0)])
-    faults = endless(seed, 8, [(name, 0.0) for name in FAULTS])
+    ones = {
+        SINGLE: endless(seed, 1, [(name, size) for name in NAMES for size in SIZES]),
+        LAWLESS: endless(seed, 2, [(name, size) for name in NAMELESS for size in (2.0, 4.0)]),
+        FAULTY: endless(seed, 8, [(name, 0.0) for name in FAULTS]),
+    }
     kinds = {group: endless(seed, 3 + k, KINDS) for k, group in enumerate(GROUPS)}
     pairs = np.random.default_rng([seed, 0, 9])
     plans = []
     for group in dealt(seed, DECK, count):
-        concealed: tuple = ()
-        if group == SINGLE:
-            concealed = (next(singles),)
-        elif group == LAWLESS:
-            concealed = (next(lawless),)
-        elif group == FAULTY:
-            concealed = (next(faults),)
-        elif group == PAIR:
-            several = int(pairs.integers(2, 5))
-            names = pairs.choice(NAMES, several, replace=False).tolist()
-            while len(set(names) & set(SPRINGS)) > 1:  # each would be sized by both
-                names = pairs.choice(NAMES, several, replace=False).tolist()
-            concealed = tuple((name, float(pairs.choice((1.0, 2.0, 4.0)))) for name in names)
+        one = ones.get(group)
+        concealed = _several(pairs) if group == PAIR else (next(one),) if one else ()
         plans.append(Plan(group, next(kinds[group]), concealed))
     return plans
+
+
+def _several(rng: Rng) -> tuple[tuple[str, float], ...]:
+    """Two to four effects, each of a size of its own."""
+    several = int(rng.integers(2, 5))
+    names = rng.choice(NAMES, several, replace=False).tolist()
+    while len(set(names) & set(SPRINGS)) > 1:  # each would be sized by both
+        names = rng.choice(NAMES, several, replace=False).tolist()
+    return tuple((name, float(rng.choice((1.0, 2.0, 4.0)))) for name in names)
 
 
 def dealt(seed: int, deck: Sequence[str], count: int) -> list[str]:

@@ -47,24 +47,23 @@ class Plan:
 
 def planned(seed: int, count: int) -> list[Plan]:
     """The first ``count`` cases of a seed, the same however many follow."""
-    singles = endless(seed, 1, [(name, size) for name in NAMES for size in SIZES])
-    outside = endless(seed, 2, [(name, size) for name in OUTSIDE for size in (1.0, 2.0, 4.0)])
-    faults = endless(seed, 3, [(name, 0.0) for name in FAULTS])
+    ones = {
+        SINGLE: endless(seed, 1, [(name, size) for name in NAMES for size in SIZES]),
+        LAWLESS: endless(seed, 2, [(name, size) for name in OUTSIDE for size in (1.0, 2.0, 4.0)]),
+        FAULTY: endless(seed, 3, [(name, 0.0) for name in FAULTS]),
+    }
     several = np.random.default_rng([seed, 0, 9])
     plans = []
     for group in dealt(seed, DECK, count):
-        concealed: tuple = ()
-        if group == SINGLE:
-            concealed = (next(singles),)
-        elif group == LAWLESS:
-            concealed = (next(outside),)
-        elif group == FAULTY:
-            concealed = (next(faults),)
-        elif group == PAIR:
-            names = several.choice(list(NAMES), int(several.integers(2, 5)), replace=False).tolist()
-            concealed = tuple((name, float(several.choice((1.0, 2.0, 4.0)))) for name in names)
-        plans.append(Plan(group, concealed))
+        one = ones.get(group)
+        plans.append(Plan(group, _several(several) if group == PAIR else (next(one),) if one else ()))
     return plans
+
+
+def _several(rng: Rng) -> tuple[tuple[str, float], ...]:
+    """Two to four effects, each of a size of its own."""
+    names = rng.choice(list(NAMES), int(rng.integers(2, 5)), replace=False).tolist()
+    return tuple((name, float(rng.choice((1.0, 2.0, 4.0)))) for name in names)
 
 
 def write(

@@ -1,21 +1,27 @@
 """Friction over speed: its parts, and the points measured, on a pendulum simulated by another hand than the fit's."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from pendulum import recorded
 
+from snarelab.identification.fitting.friction_curve import friction_curves
 from snarelab.identification.identify import identify
 
 
 @pytest.fixture(scope="module")
-def curve(tmp_path_factory):
-    """Of a joint with 3 N·m of dry friction, 2 N·m·s/rad of viscous, and drag of 1.5 N·m·s²/rad² that the model has no
-    law for."""
+def identified(tmp_path_factory):
+    """A joint with 3 N·m of dry friction, 2 N·m·s/rad of viscous, and drag of 1.5 N·m·s²/rad² that the model has no law
+    for."""
     folder = tmp_path_factory.mktemp("curve")
-    model = recorded(folder, 3, drag=1.5)
-    (found,) = json.loads(json.dumps(identify(model, [folder / "train.csv"]).to_json()))["curves"]
+    return identify(recorded(folder, 3, drag=1.5), [folder / "train.csv"])
+
+
+@pytest.fixture(scope="module")
+def curve(identified):
+    (found,) = json.loads(json.dumps(identified.to_json()))["curves"]
     return {k: [np.array(part) for part in v] if k == "parts" else v for k, v in found.items()}
 
 
@@ -39,3 +45,15 @@ def test_points_are_what_was_measured_and_not_the_fitted_laws(curve):
     assert off < 0.3  # the disturbance
     assert off < 0.25 * np.sqrt(np.mean((fitted - has)[moving] ** 2))
     assert np.all(std[moving] > 0.02)
+
+
+def test_samples_that_are_no_data_are_no_points(identified):
+    """Nor is a joint whose torque nobody recorded: its residual is none."""
+    (e,) = identified.train
+    speed = e.motion.to_band(e.motion.qd)
+    fast = speed > 1.0
+    (some,) = friction_curves(identified.fit, [replace(e, kept=~fast)])
+    assert some.measured is not None
+    assert 0.8 < some.measured[0].max() < 1.0
+    (none,) = friction_curves(identified.fit, [replace(e, motion=replace(e.motion, silent=(0,)))])
+    assert none.measured is None
