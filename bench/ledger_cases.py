@@ -134,7 +134,7 @@ def _bam(folder: Path) -> Said:
         }
         for f in bam.findings(source, decided)
     ]
-    errors = [_short(float(rms(x)[0])) for x in (decided.before, decided.best.held)]
+    errors = [_short(float(rms(x)[0])) for x in (decided.before, decided.held)]
     return {"verdict": decided.verdict, "effects": effects, "location": {}, "held_out": errors}
 
 

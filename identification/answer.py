@@ -10,6 +10,10 @@ from numpy.typing import NDArray
 from ..models.floating.tree import channel
 from ..models.model import Model
 from ..report.words import percent
+from .arms.kind import ArmFit
+from .decision.confirm import Loss
+from .decision.decide import Decision
+from .decision.selection import Naming
 from .diagnosis import (
     Candidate,
     ChannelFit,
@@ -23,8 +27,6 @@ from .diagnosis import (
     Step,
     Trace,
 )
-from .evidence.diagnose import ArmDecision
-from .evidence.selection import ArmNaming
 from .fitting.experiment import Experiment
 from .fitting.fit import Fit, channel_rms
 from .fitting.floating_terms import momentum_floor
@@ -37,7 +39,7 @@ Array = NDArray[np.float64]
 
 def report_on(
     model: Model,
-    decided: ArmDecision,
+    decided: Decision[ArmFit],
     final: Fit,
     steps: tuple[Step, ...],
     train: Sequence[Experiment],
@@ -58,8 +60,8 @@ def report_on(
     """
     found, best = decided.best.found, decided.best
     channels = [channel(model.tree, c) for c in range(model.tree.n_joints)]
-    findings = tuple(_finding(n, decided, final, channels) for n in best.names)
-    fits = channel_fits(model, found.first, final, train, held)
+    findings = tuple(_finding(n, decided, final, held, channels) for n in best.names)
+    fits = channel_fits(model, found.first.fit, final, train, held)
     left = decided.left
     again = {c: b for c, b in left.bursts.items() if b.again}
     loud = sorted({r.channel for r in left.curves} | set(again))
@@ -101,7 +103,7 @@ def report_on(
         for t in found.trials
         if t.explained > 0
     )
-    explained = [_explained(found.first, final, e) for e in train]
+    explained = [_explained(found.first.fit, final, e) for e in train]
     if not findings:
         # What has no name stands in the residual itself, on the channels that have something to say.
         spoken = [c in loud for c in range(len(channels))]
@@ -117,8 +119,8 @@ def report_on(
         fits,
         steps,
         candidates,
-        moved(found.first, final),
-        traces(found.first, final, train, held),
+        moved(found.first.fit, final),
+        traces(found.first.fit, final, train, held),
         _limits(decided, final),
         tuple(notes),
         train[0].motion.band,
@@ -132,7 +134,9 @@ def _explained(first: Fit, final: Fit, experiment: Experiment) -> Array:
     return experiment.motion.to_band(change)
 
 
-def _finding(n: ArmNaming, decided: ArmDecision, final: Fit, every: Sequence[str]) -> Finding:
+def _finding(
+    n: Naming, decided: Decision[ArmFit], final: Fit, held: Sequence[Experiment], every: Sequence[str]
+) -> Finding:
     placed = n.placed
     parameters = {
         final.assembly.slots[i].name: Estimate(
@@ -143,7 +147,8 @@ def _finding(n: ArmNaming, decided: ArmDecision, final: Fit, every: Sequence[str
     missed = decided.best.missed[placed.key]
     # The posterior is shared among those that cannot be told apart; how often such a name is right was counted.
     whole = n.share + sum(r.probability for r in n.rivals if not r.separable)
-    right = of_name(n.gain, missed.sure, missed.explained)
+    share = _share_of_energy(decided, missed, held)
+    right = of_name(n.gain, missed.sure, share)
     scale = right / max(whole, 1e-12)
     rivals = tuple(
         Rival(
@@ -155,7 +160,7 @@ def _finding(n: ArmNaming, decided: ArmDecision, final: Fit, every: Sequence[str
         )
         for r in n.rivals
     )
-    sentence = evidence_sentence(placed, [every[c] for c in n.channels], *missed.trial)
+    sentence = evidence_sentence(placed, [every[c] for c in n.channels], *_trial(decided.best.last.fit, missed, held))
     return Finding(
         placed.effect.name,
         placed.at,
@@ -165,11 +170,28 @@ def _finding(n: ArmNaming, decided: ArmDecision, final: Fit, every: Sequence[str
         sentence,
         rivals,
         n.gain,
-        missed.explained,
+        share,
     )
 
 
-def _limits(decided: ArmDecision, final: Fit) -> tuple[Limit, ...]:
+def _trial(final: Fit, missed: Loss[ArmFit], held: Sequence[Experiment]) -> tuple[float, float]:
+    """Relative errors of the held-out recordings with an effect and without it, where the two differ most."""
+    both = [channel_rms(f.assembly, held, f.theta) for f in (final, missed.fit.fit)]
+    with_it, without = (float(rms[missed.channel] / both[0][1][missed.channel]) for rms, _ in both)
+    return with_it, without
+
+
+def _share_of_energy(decided: Decision[ArmFit], missed: Loss[ArmFit], held: Sequence[Experiment]) -> float:
+    """Share of a channel's residual energy that goes with an effect, every sample by its own variance: near rest, where
+    a joint holds any torque, little counts. A wander counts as residual: a law without a name may look like it."""
+    weighed, sums, c = decided.found.weighed, np.zeros(2), missed.channel
+    for e, row in zip(held, weighed.evidence.channels[weighed.n_train :], strict=True):
+        both = [f.assembly.residual(e, f.theta)[0][:, c] for f in (decided.best.last.fit, missed.fit.fit)]
+        sums += [float(np.sum(x**2 / row[c].covariance.variance)) for x in both]
+    return float(np.clip(1 - sums[0] / sums[1], 0.0, 1.0)) if sums[1] > 0 else 0.0
+
+
+def _limits(decided: Decision[ArmFit], final: Fit) -> tuple[Limit, ...]:
     """What would have been named beside all that was, had it been there."""
     return tuple(
         Limit(t.placed.effect.name, t.placed.at, p.name, t.smallest[p.name], final.assembly.unit(t.placed, p))

@@ -11,12 +11,13 @@ from ..models.hidden_state import prepare
 from ..models.model import Model, effect_on
 from ..models.rigid_body import RigidBody
 from .answer import report_on
+from .arms.kind import ArmFit, ArmRecordings
 from .checks.run import early_checks, run_checks
 from .data_fault import contradict, data_fault
+from .decision.decide import Decision, decide
 from .diagnosis import Diagnosis, Step
 from .empirical import empirical_laws
 from .empirical_answer import with_laws
-from .evidence.diagnose import ArmDecision, decide
 from .fitting.base_parameters import base_parameters
 from .fitting.constants import notes_on, settled, with_constants
 from .fitting.experiment import Experiment, load_experiments, scales, with_silence
@@ -98,8 +99,8 @@ def diagnose(
     if contradict(checks) and not anyway:
         return Answer(data_fault(model, checks, [*train, *locked]), given)
     base = base_parameters(body) if model.inertia == "free" else None
-    decided = decide(model, base, scales(train), train, locked, progress=progress, seed=seed)
-    final = decided.best.fit
+    decided = decide(ArmRecordings(model, base, scales(train), train, locked, seed), progress)
+    final = decided.best.last.fit
     final, inertia = physical(final, fitted(final.assembly, train))
     steps = _steps(decided, final, train, locked)
     diagnosis = report_on(model, decided, final, steps, train, locked)
@@ -125,7 +126,7 @@ def diagnose(
 
 
 def _steps(
-    decided: ArmDecision, final: Fit, train: Sequence[Experiment], locked: Sequence[Experiment]
+    decided: Decision[ArmFit], final: Fit, train: Sequence[Experiment], locked: Sequence[Experiment]
 ) -> tuple[Step, ...]:
     """Relative misfit after each effect is added, all parameters fitted again on the training recordings."""
 
@@ -134,11 +135,11 @@ def _steps(
         relative = [float(np.sqrt(np.mean((rms / measured) ** 2))) for rms, measured in pair]
         return Step(label, relative[0], relative[1])
 
-    steps = [line("model as given", decided.best.found.first)]
+    steps = [line("model as given", decided.found.first.fit)]
     names = list(dict.fromkeys(n.placed.effect.name for n in decided.best.names))
     for k, name in enumerate(names):
         later = [n.placed.key for n in decided.best.names if n.placed.effect.name in names[k + 1 :]]
-        own = without(final, later, train, decided.best.found.first) if later else final
+        own = without(final, later, train, decided.found.first.fit) if later else final
         at = [n.placed.at for n in decided.best.names if n.placed.effect.name == name]
         steps.append(line(f"+ {name} at {', '.join(at)}", own))
     return tuple(steps)

@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from ..models.empirical import NAME, placed_tables, read_along, tables_of
 from ..models.model import PlacedEffect
 from ..models.table import Table, read_words
+from .arms.blocks import blocks
+from .arms.kind import ArmFit
 from .deciding import GATE
-from .evidence.confirm import blocks
-from .evidence.diagnose import ArmDecision
+from .decision.decide import Decision
 from .evidence.gain import Remaining, scatter
 from .fitting.assembly import FreeParameter, TorqueModel
 from .fitting.experiment import Experiment
@@ -44,7 +45,7 @@ class EmpiricalLaw:
 
 
 def empirical_laws(
-    decided: ArmDecision, final: Fit, train: Sequence[Experiment], held: Sequence[Experiment]
+    decided: Decision[ArmFit], final: Fit, train: Sequence[Experiment], held: Sequence[Experiment]
 ) -> tuple[Fit, tuple[EmpiricalLaw, ...]]:
     """The fit with a table for each nameless curve that can be one and that the held-out recordings confirm."""
     carriers, joints = final.assembly.tree.carriers, final.assembly.tree.joints
@@ -70,7 +71,7 @@ def empirical_laws(
 
 
 def _tables(
-    decided: ArmDecision,
+    decided: Decision[ArmFit],
     final: Fit,
     train: Sequence[Experiment],
     c: int,
@@ -141,7 +142,7 @@ def _effect_of(of: FreeParameter) -> str:
 
 
 def _confirmed(
-    decided: ArmDecision, before: Fit, after: Fit, train: Sequence[Experiment], held: Sequence[Experiment], c: int
+    decided: Decision[ArmFit], before: Fit, after: Fit, train: Sequence[Experiment], held: Sequence[Experiment], c: int
 ) -> tuple[float, float]:
     """Log density that the held-out recordings gain on a channel, and that in its standard errors over blocks; of the
     samples for which the tables have data. Elsewhere they hold their end values, which is no prediction."""

@@ -11,9 +11,10 @@ from ..models.model import Model
 from ..models.table import UNITS
 from ..models.tree import Joint
 from .answer import channel_fits, moved, traces
+from .arms.kind import ArmFit
+from .decision.decide import Decision
 from .diagnosis import Diagnosis, EmpiricalTable, Finding, Step
 from .empirical import EmpiricalLaw
-from .evidence.diagnose import ArmDecision
 from .fitting.experiment import Experiment
 from .fitting.fit import Fit, channel_rms
 from .reliability import of_name
@@ -23,7 +24,7 @@ from .wording import from_to, listed
 def with_laws(
     diagnosis: Diagnosis,
     model: Model,
-    decided: ArmDecision,
+    decided: Decision[ArmFit],
     named: Fit,
     final: Fit,
     laws: Sequence[EmpiricalLaw],
@@ -68,7 +69,7 @@ def with_laws(
         for rms, measured in (channel_rms(final.assembly, e, final.theta) for e in (train, held))
     ]
     steps.append(Step(f"+ {NAME} at {', '.join(law.at for law in laws)}", relative[0], relative[1]))
-    first = decided.best.found.first
+    first = decided.best.found.first.fit
     return replace(
         diagnosis,
         sentence=" ".join([diagnosis.sentence, *sentences]),

@@ -18,7 +18,7 @@ from ..exit_status import status_of
 from ..identification.diagnosis import Estimate, Finding
 from ..identification.servo.source import Servos, plain, start
 from ..identification.sources.answer import estimates, finding, with_found
-from ..identification.sources.decide import Decision, decide
+from ..identification.sources.decide import SourceDecision, decide
 from ..identification.sources.own import settled
 from ..identification.sources.source import ModelPoint
 from ..identification.sources.stages import stages
@@ -78,14 +78,14 @@ def main() -> int:
     extra = {"steps": lines, "candidates": candidates(decided), "not_confirmed": [
         n.placed.effect.name for n in decided.rejected]}  # fmt: skip
     write_result("bam", quantities, time.monotonic() - begun, extra)
-    save(decided.best.train.at, found)
+    save(decided.train.at, found)
     print(f"{table(quantities)}\n\n{found}\nReport: {(FOLDER / 'bam' / 'report.html').resolve()}")
     return 0
 
 
 def decided_on(
     train: Sequence[BamRun], held: Sequence[BamRun], progress: Callable[[str], None] = lambda _: None
-) -> tuple[Servos, Decision]:
+) -> tuple[Servos, SourceDecision]:
     """What Coulomb and viscous friction, fitted first, leave out of the recordings."""
     model = load_model(MODEL)
     begin = start(JOINT, model.effects, START)
@@ -93,24 +93,24 @@ def decided_on(
     return source, decide(source, settled(source, model, begin, progress), progress)
 
 
-def estimated(source: Servos, decided: Decision) -> dict[str, dict[str, Estimate]]:
+def estimated(source: Servos, decided: SourceDecision) -> dict[str, dict[str, Estimate]]:
     """Every parameter with its deviation, by the effect's key."""
-    return estimates(source, decided.given, decided.best.train, covariances(decided.found.weighed))
+    return estimates(source, decided.given, decided.train, covariances(decided.found.weighed))
 
 
-def findings(source: Servos, decided: Decision) -> list[Finding]:
+def findings(source: Servos, decided: SourceDecision) -> list[Finding]:
     """The names with their probabilities."""
     own, found = estimated(source, decided), []
     for n in decided.best.names:
         with_, without = (
-            np.concatenate(x.residuals) for x in (decided.best.held, decided.best.missed[n.placed.key].held)
+            np.concatenate(x.residuals) for x in (decided.held, decided.best.missed[n.placed.key].fit.held)
         )
         share = max(0.0, 1 - float(np.mean(with_**2) / np.mean(without**2)))
         found.append(finding(decided, n, own[n.placed.key], n.placed.effect.sentence, share))
     return found
 
 
-def steps(source: Servos, decided: Decision) -> list[dict[str, Any]]:
+def steps(source: Servos, decided: SourceDecision) -> list[dict[str, Any]]:
     """Mean absolute position error [rad] after each law, fitted and held out."""
     train, held = ([source.runs[i] for i in some] for some in (source.train, source.held))
     return [
@@ -120,7 +120,7 @@ def steps(source: Servos, decided: Decision) -> list[dict[str, Any]]:
     ]
 
 
-def sentence(decided: Decision, lines: Sequence[Mapping[str, Any]]) -> str:
+def sentence(decided: SourceDecision, lines: Sequence[Mapping[str, Any]]) -> str:
     """The verdict."""
     before, after = (lines[k]["holdout"] for k in (0, -1))
     if not decided.best.names:
@@ -132,7 +132,7 @@ def sentence(decided: Decision, lines: Sequence[Mapping[str, Any]]) -> str:
     )
 
 
-def numbers(source: Servos, decided: Decision, lines: Sequence[Mapping[str, Any]]) -> list[Quantity]:
+def numbers(source: Servos, decided: SourceDecision, lines: Sequence[Mapping[str, Any]]) -> list[Quantity]:
     """Held-out position errors beside the check's, and what was named.
 
     The source was built with all recordings in sight: what was named counts as calibrated.
@@ -165,14 +165,14 @@ def numbers(source: Servos, decided: Decision, lines: Sequence[Mapping[str, Any]
     return quantities
 
 
-def candidates(decided: Decision) -> list[dict[str, Any]]:
+def candidates(decided: SourceDecision) -> list[dict[str, Any]]:
     """Each law by itself on top of Coulomb and viscous friction: log posterior odds, share of the whitened residual."""
     return [{"name": t.placed.effect.name, "log_odds": t.odds, "explained": t.explained} for t in decided.found.trials]
 
 
-def sections(held: Sequence[BamRun], decided: Decision) -> list[Section]:
+def sections(held: Sequence[BamRun], decided: SourceDecision) -> list[Section]:
     """What is drawn, and what was not named."""
-    before, after = (plain(x.at.all_values) for x in (decided.found.first, decided.best.train))
+    before, after = (plain(x.at.all_values) for x in (decided.found.first.train, decided.train))
     lines = [
         f"{t.placed.effect.name.replace('_', ' ').capitalize()}: log posterior odds {t.odds:.0f}."
         for t in decided.found.trials

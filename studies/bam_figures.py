@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..identification.sources.search import Trial
+from ..identification.decision.selection import Trial
 from ..models.servo_loop import simulate
 from ..report.drawing import AFTER, BEFORE, GREY, MEASURED, drawing, line, margins, svg
 from ..report.time_axes import over_time

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..diagnosis import Diagnosis, Estimate, Location, ParameterShift, Step, Trace
 from ..sources.answer import candidates, channel_fits, estimates, finding, limits, not_confirmed, rms
-from ..sources.decide import Decision
+from ..sources.decide import SourceDecision
 from ..sources.source import Linearisation, ModelPoint
 from ..sources.stages import stages
 from ..sources.weigh import covariances
@@ -27,16 +27,16 @@ LEAST = 0.01
 """Share of what changed below which a channel is not listed."""
 
 
-def report_on(source: Dockings, name: str, decided: Decision, seconds: float) -> Diagnosis:
+def report_on(source: Dockings, name: str, decided: SourceDecision, seconds: float) -> Diagnosis:
     """Put everything into words and numbers; ``name`` is the model's."""
     found, best, records = decided.found, decided.best, source.records
     own, locked = ([records[i] for i in some] for some in (source.train, source.held))
     sizes = source.sizes(source.train), source.sizes(source.held)
-    values = estimates(source, decided.given, best.train, covariances(found.weighed))
+    values = estimates(source, decided.given, decided.train, covariances(found.weighed))
     findings = []
     for n in best.names:
         p = n.placed
-        a, b, unit, channel = _worst(locked, best.missed[p.key].held, best.held, sizes[1])
+        a, b, unit, channel = _worst(locked, best.missed[p.key].fit.held, decided.held, sizes[1])
         what = p.effect.sentence
         evidence = (
             f"{what[:1].upper()}{what[1:]}: the recordings are e^{n.gain:.0f} times likelier with it. Without it, "
@@ -44,7 +44,7 @@ def report_on(source: Dockings, name: str, decided: Decision, seconds: float) ->
         )
         findings.append(finding(decided, n, values[p.key], evidence, max(0.0, 1 - (b / max(a, 1e-300)) ** 2)))
     units = [unit_of(c) for c in source.channels]
-    fits = channel_fits(decided, source.channels, units, *sizes, [float(n.white) for n in found.noises])
+    fits = channel_fits(decided, source.channels, units, *sizes, [float(n.white) for n in found.weighed.noises])
     worst = foremost(findings, fits)
     if findings:
         sentence = (
@@ -55,7 +55,7 @@ def report_on(source: Dockings, name: str, decided: Decision, seconds: float) ->
     else:
         sentence = "The model is adequate: these dockings show no named effect that it leaves out."
     notes = [f"{Path(r.path).name}: {note}" for r in records for note in r.notes] + not_confirmed(decided)
-    shifts = ", ".join(f"{k} {x:+.1f}" for k, x in zip(SHIFTS, best.train.at.shifts, strict=True) if abs(x) > 1)
+    shifts = ", ".join(f"{k} {x:+.1f}" for k, x in zip(SHIFTS, decided.train.at.shifts, strict=True) if abs(x) > 1)
     notes.append(
         f"numbers of the set-up moved within their tolerances, in deviations: {shifts or 'none by one or more'}"
     )
@@ -83,7 +83,7 @@ def _size(value: float, unit: str) -> str:
     return f"{factor * value:.3g} {word}"
 
 
-def _steps(source: Dockings, decided: Decision, sizes: tuple[Array, Array]) -> tuple[Step, ...]:
+def _steps(source: Dockings, decided: SourceDecision, sizes: tuple[Array, Array]) -> tuple[Step, ...]:
     return tuple(
         Step(label, *(float(np.sqrt(np.mean((rms(x) / s) ** 2))) for x, s in zip(fits, sizes, strict=True)))
         for label, *fits in stages(source, decided)
@@ -100,12 +100,12 @@ def _moved(given: ModelPoint, values: dict[str, dict[str, Estimate]]) -> tuple[P
     )
 
 
-def _locations(record: DockingRecording, decided: Decision) -> tuple[Location, ...]:
+def _locations(record: DockingRecording, decided: SourceDecision) -> tuple[Location, ...]:
     """Channels by the share of what the names changed, or of what is left, each in units of its noise."""
-    first, last, found = decided.found.first, decided.best.train, decided.found
+    first, last, found = decided.found.first.train, decided.train, decided.found
     named_any = len(last.at.placed) > len(first.at.placed)
     change = first.residuals[0] - last.residuals[0] if named_any else last.residuals[0]
-    noise = np.array([max(n.white, 1e-12) for n in found.noises])
+    noise = np.array([max(n.white, 1e-12) for n in found.weighed.noises])
     energy = np.sum((change / noise) ** 2, axis=0)
     total = float(energy.sum())
     made = []
@@ -141,12 +141,12 @@ def _windows(record: DockingRecording, change: Array) -> tuple[tuple[float, floa
 
 
 def _traces(
-    train: Sequence[DockingRecording], held: Sequence[DockingRecording], decided: Decision
+    train: Sequence[DockingRecording], held: Sequence[DockingRecording], decided: SourceDecision
 ) -> tuple[Trace, ...]:
     made = []
     sets: tuple[tuple[Literal["train", "holdout"], Sequence[DockingRecording], Linearisation, Linearisation], ...] = (
-        ("train", train, decided.found.first, decided.best.train),
-        ("holdout", held, decided.before, decided.best.held),
+        ("train", train, decided.found.first.train, decided.train),
+        ("holdout", held, decided.before, decided.held),
     )
     for role, records, before, after in sets:
         for r, a, b in zip(records, before.residuals, after.residuals, strict=True):

@@ -51,4 +51,4 @@ def diagnose_dockings(
     source = Dockings(model, recordings, several(holdout))
     decided = decide(source, settled(source, model, start(model), progress), progress)
     diagnosis = report_on(source, model.name, decided, time.monotonic() - begun)
-    return diagnosis, with_found(model, decided.best.train.at)
+    return diagnosis, with_found(model, decided.train.at)

@@ -53,6 +53,10 @@ class Hypothesis:
         return (self.prior, *self.more)[min(others, len(self.more))]
 
 
+Curves = Mapping[tuple[int, str], Item]
+"""Nameless curves by channel and words."""
+
+
 @dataclass
 class CandidateColumns:
     """Columns of all hypotheses, by recording and channel, numbered through.

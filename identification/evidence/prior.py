@@ -9,8 +9,7 @@ import numpy as np
 from ...models.model import PlacedEffect
 from ..deciding import ELSEWHERE, ODDS_OF_CURVES, ODDS_OF_NAMES
 from ..search.candidates import shifts
-from .hypotheses import Curves, parts_of
-from .pool import Hypothesis, Item
+from .pool import Curves, Hypothesis, Item
 
 
 def pool(
@@ -58,3 +57,9 @@ def log_share_of_places(k: int, n: int) -> float:
     """
     every = factorial(k) * factorial(n - k) / factorial(n + 1) * (n + 1) / n
     return float(np.log(ELSEWHERE * every + (1 - ELSEWHERE) * (k == 1) / n))
+
+
+def parts_of(p: PlacedEffect) -> frozenset[str]:
+    """Keys of the laws of which a whole law is another way to write the sum; none of any other law."""
+    whole = p.effect.at == "joint" and len(p.effect.contains) > 1
+    return frozenset(f"{x}.{p.at}" for x in p.effect.contains) if whole else frozenset()

@@ -7,10 +7,10 @@ import numpy as np
 
 from ..deciding import TOLERANCES
 from ..nuisance.noise import Noise
-from .arm import WeighedRecordings
 from .evidence import Evidence
 from .projected import ProjectedEvidence
 from .search import Member, MemberOdds, Search
+from .weighed import WeighedRecordings
 
 
 @dataclass(frozen=True)

@@ -51,7 +51,7 @@ def with_links(diagnosis: Diagnosis, model: Model, one: EncoderComparison) -> tu
         if diagnosis.verdict == "adequate":
             sentences = ["The torques show nothing that the model leaves out."]
         sentences = [said, *sentences] if first else [*sentences, said]
-    elif decided.left and both == "unknown_effect":
+    elif decided.left.curves and both == "unknown_effect":
         description = "; ".join(filter(None, [description, nameless(one)]))
         sentences = [f"Something is missing that no effect of the vocabulary explains: {description}."]
     steps, torques = _steps(one), diagnosis
@@ -70,7 +70,7 @@ def with_links(diagnosis: Diagnosis, model: Model, one: EncoderComparison) -> tu
         notes=(*torques.notes, *notes_of(one)),
         foremost=spoken_of,
     )
-    return answer, with_found(model, decided.best.train.at)
+    return answer, with_found(model, decided.train.at)
 
 
 def _told(fits: Sequence[ChannelFit]) -> list[float]:
@@ -129,7 +129,7 @@ def _location(diagnosis: Diagnosis, one: EncoderComparison, fits: Sequence[Chann
         if c not in named:
             continue
         loaded, changes = [], []
-        pairs = zip(decided.found.first.residuals, decided.best.train.residuals, strict=True)
+        pairs = zip(decided.found.first.train.residuals, decided.train.residuals, strict=True)
         for e, row, (before, after) in zip(one.train, links.rows, pairs, strict=False):
             tau, change = np.zeros_like(e.motion.tau), np.zeros((len(before), e.motion.tau.shape[1]))
             tau[:, row[c].joint], change[:, row[c].joint] = row[c].load, (before - after)[:, c]

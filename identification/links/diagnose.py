@@ -12,7 +12,7 @@ from ...models.rigid_body import RigidBody
 from ...recordings.part import several
 from ..fitting.assembly import TorqueModel
 from ..fitting.experiment import Experiment, Scales
-from ..sources.decide import Decision, decide
+from ..sources.decide import SourceDecision, decide
 from ..sources.stages import Stage, stages
 from .run import load_links
 from .source import Links, links_of, start
@@ -26,7 +26,7 @@ class EncoderComparison:
     recordings with link less motor position in place of torque."""
 
     links: Links
-    decided: Decision
+    decided: SourceDecision
     stages: tuple[Stage, ...]
     train: tuple[Experiment, ...]
 

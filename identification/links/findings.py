@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...report.words import percent
+from ..decision.selection import Naming
 from ..diagnosis import Estimate, Finding, Rival, Trace
 from ..sources.answer import estimates, finding, not_confirmed, rms
-from ..sources.search import Naming
 from ..sources.source import Linearisation
 from ..sources.weigh import covariances
 from .diagnose import EncoderComparison
@@ -33,7 +33,7 @@ def unit_of(links: Links, c: int) -> str:
 def findings_of(one: EncoderComparison) -> tuple[Finding, ...]:
     """Findings in order of held-out loss, the largest first; a constant difference comes last."""
     links, best = one.links, one.decided.best
-    values = estimates(links, one.decided.given, best.train, covariances(one.decided.found.weighed))
+    values = estimates(links, one.decided.given, one.decided.train, covariances(one.decided.found.weighed))
     order = sorted(best.names, key=lambda n: (links.still(n.placed), -best.missed[n.placed.key].gain))
     return tuple(_finding(one, n, values[n.placed.key]) for n in order)
 
@@ -42,14 +42,14 @@ def _finding(one: EncoderComparison, n: Naming, values: dict[str, Estimate]) -> 
     links, p = one.links, n.placed
     c = links.channel(p)
     unit, joint = unit_of(links, c), links.joints[c]
-    without, within = (float(rms(x)[c]) for x in (one.decided.best.missed[p.key].held, one.decided.best.held))
+    without, within = (float(rms(x)[c]) for x in (one.decided.best.missed[p.key].fit.held, one.decided.held))
     text = f"{p.effect.sentence[:1].upper()}{p.effect.sentence[1:]}: "
     if links.still(p):
         ((name, estimate),) = values.items()
-        zeros, own = (links.zeros(x.at)[list(y), c] for x, y in ((one.decided.best.held, links.held),
-                                                                 (one.decided.best.train, links.train)))  # fmt: skip
+        zeros, own = (links.zeros(x.at)[list(y), c] for x, y in ((one.decided.held, links.held),
+                                                                 (one.decided.train, links.train)))  # fmt: skip
         # The recordings' own zeros tell it as far as they agree.
-        spread = max(float(np.std(own, ddof=min(1, len(own) - 1))), float(rms(one.decided.best.train)[c]))
+        spread = max(float(np.std(own, ddof=min(1, len(own) - 1))), float(rms(one.decided.train)[c]))
         values = {name: replace(estimate, std=spread / np.sqrt(len(own)))}
         without, within = (float(np.sqrt(within**2 + np.mean((zeros + x) ** 2))) for x in (estimate.value, 0.0))
         text += (
@@ -75,7 +75,7 @@ def _twist(one: EncoderComparison, n: Naming) -> str:
     """How far a drive twists, beside what it does not explain."""
     if n.placed.effect.acts_on != "position":
         return ""
-    links, at = one.links, one.decided.best.train.at
+    links, at = one.links, one.decided.train.at
     c = links.channel(n.placed)
     twist = [links.rows[i][c].term(n.placed, at.of_effect(n.placed))[0] for i in links.train]
     return f" The drive twists over {length(float(np.ptp(np.concatenate(twist))), unit_of(links, c))} in all."
@@ -99,12 +99,12 @@ def noise_floor(links: Links, c: int) -> float:
 
 def nameless(one: EncoderComparison) -> str:
     """Nameless curves in words; empty if there are none."""
-    after = rms(one.decided.best.train)
+    after = rms(one.decided.train)
     return "; ".join(
         f"on {one.links.channels[r.channel]}, a smooth curve over {r.over} still explains {percent(r.explained)} of "
         f"the remaining difference between the encoders "
         f"({length(float(np.sqrt(r.explained) * after[r.channel]), unit_of(one.links, r.channel))})"
-        for r in one.decided.left
+        for r in one.decided.left.curves
     )
 
 
@@ -112,8 +112,8 @@ def traces_of(one: EncoderComparison) -> list[Trace]:
     """Difference of the encoders over time, measured, by the model as given and by the final one: for pictures."""
     links, decided = one.links, one.decided
     sets: tuple[tuple[Literal["train", "holdout"], Sequence[int], Linearisation, Linearisation], ...] = (
-        ("train", links.train, decided.found.first, decided.best.train),
-        ("holdout", links.held, decided.before, decided.best.held),
+        ("train", links.train, decided.found.first.train, decided.train),
+        ("holdout", links.held, decided.before, decided.held),
     )
     made: list[Trace] = []
     for c, channel in enumerate(links.channels):
@@ -132,8 +132,8 @@ def traces_of(one: EncoderComparison) -> list[Trace]:
 
 def notes_of(one: EncoderComparison) -> list[str]:
     """Zeros of every recording, and what was not named, in words."""
-    links, best, notes = one.links, one.decided.best, []
-    every = links.zeros(best.train.at)[list(links.train)], links.zeros(best.held.at)[list(links.held)]
+    links, notes = one.links, []
+    every = links.zeros(one.decided.train.at)[list(links.train)], links.zeros(one.decided.held.at)[list(links.held)]
     for c, joint in enumerate(links.joints):
         zeros = ", ".join(length(z, "").removesuffix(" m") for z in np.concatenate(every)[:, c])
         unit = unit_of(links, c)

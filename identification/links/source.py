@@ -18,8 +18,8 @@ from ...models.effects import effects, get_effect
 from ...models.hidden_state import reads
 from ...models.model import Model, PlacedEffect
 from ...recordings import JointKind
+from ..arms.blocks import FEWEST_BLOCKS
 from ..deciding import BLOCK, LEAST_LEVEL, SIZES
-from ..evidence.confirm import FEWEST_BLOCKS
 from ..fitting.assembly import TorqueModel
 from ..fitting.experiment import Experiment, Scales
 from ..nuisance.curve import Coordinates, family

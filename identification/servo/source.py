@@ -16,9 +16,9 @@ from ...models.effect import Effect, Parameter, written_unit
 from ...models.effects import get_effect
 from ...models.model import PlacedEffect
 from ...models.servo_loop import DRIVE, GRAVITY, LEAST, ROTOR, ServoRun, laws, simulate
+from ..arms.blocks import FEWEST_BLOCKS
 from ..deciding import BLOCK, LEAST_LEVEL, SETTLES, STICKS
-from ..evidence.confirm import FEWEST_BLOCKS
-from ..evidence.hypotheses import parts_of
+from ..evidence.prior import parts_of
 from ..fitting.experiment import Scales
 from ..nuisance.noise import NoiseChannel
 from ..sources.fit import changes, differences

@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 
 from ...models.model import Model
 from ...models.snare.setup import APPLIED, NUMBERS, SnareTree
+from ..decision.selection import Naming, Remainder
 from ..diagnosis import ChannelFit, Diagnosis, Estimate, Finding, ParameterShift, Step, Trace
-from ..evidence.selection import Remainder
 from ..sources.answer import candidates, channel_fits, estimates, finding, limits, not_confirmed, rms
 from ..sources.answer import with_found as with_effects
-from ..sources.decide import Decision
-from ..sources.search import Naming
+from ..sources.decide import SourceDecision
 from ..sources.source import Linearisation, ModelPoint
 from ..sources.stages import stages
 from ..sources.weigh import covariances
@@ -31,10 +30,10 @@ BAND = 1 / (2 * QUARTER)
 """[Hz] What means over a quarter of a second hold."""
 
 
-def report_on(source: Captures, decided: Decision, seconds: float) -> Diagnosis:
+def report_on(source: Captures, decided: SourceDecision, seconds: float) -> Diagnosis:
     """Put everything into words and numbers; ``seconds``: what the search took."""
     best, model = decided.best, source.model
-    values = estimates(source, decided.given, best.train, covariances(decided.found.weighed))
+    values = estimates(source, decided.given, decided.train, covariances(decided.found.weighed))
     fits = _fits(source, decided)
     findings = tuple(_finding(source, decided, n, values) for n in best.names if n.placed.effect.name in APPLIED)
     description = "" if findings else _left(source, decided)
@@ -47,7 +46,7 @@ def report_on(source: Captures, decided: Decision, seconds: float) -> Diagnosis:
     ]
     foremost_fit = _foremost(findings, fits)
     return Diagnosis(
-        verdict(findings, () if findings else decided.left),
+        verdict(findings, () if findings else decided.left.curves),
         _sentence(findings, foremost_fit, description) + _corrected(moved),
         description,
         model.name,
@@ -65,7 +64,7 @@ def report_on(source: Captures, decided: Decision, seconds: float) -> Diagnosis:
     )
 
 
-def _fits(source: Captures, decided: Decision) -> tuple[ChannelFit, ...]:
+def _fits(source: Captures, decided: SourceDecision) -> tuple[ChannelFit, ...]:
     units = [unit_of(name) for name in source.channels]
     noise = source.records[0].noise
     bodies = {sensor: body for body, sensor in source.records[0].sensors.items()}
@@ -74,9 +73,11 @@ def _fits(source: Captures, decided: Decision) -> tuple[ChannelFit, ...]:
     return tuple(every[c] for c in shown(source.channels))
 
 
-def _finding(source: Captures, decided: Decision, n: Naming, values: Mapping[str, Mapping[str, Estimate]]) -> Finding:
-    p, held = n.placed, decided.best.held
-    without, size = rms(decided.best.missed[p.key].held), source.sizes(source.held)
+def _finding(
+    source: Captures, decided: SourceDecision, n: Naming, values: Mapping[str, Mapping[str, Estimate]]
+) -> Finding:
+    p, held = n.placed, decided.held
+    without, size = rms(decided.best.missed[p.key].fit.held), source.sizes(source.held)
     within = rms(held)
     c = max(shown(source.channels), key=lambda c: (without[c] - within[c]) / size[c])
     channel, what = source.channels[c], p.effect.sentence
@@ -93,11 +94,11 @@ def _size(value: float, unit: str) -> str:
     return f"{1e3 * value:.3g} mm" if unit == "m" else f"{value:.3g} {unit}"
 
 
-def _left(source: Captures, decided: Decision) -> str:
+def _left(source: Captures, decided: SourceDecision) -> str:
     """What nameless curves say, in words."""
-    if not decided.left:
+    if not decided.left.curves:
         return ""
-    left = rms(decided.best.train)
+    left = rms(decided.train)
 
     def told(r: Remainder) -> str:
         name = source.channels[r.channel]
@@ -105,7 +106,7 @@ def _left(source: Captures, decided: Decision) -> str:
         size = f"a share of e^{left[r.channel]:.2g}" if unit == "1" else _size(left[r.channel], unit)
         return f"{size} of {name}, over {r.over}"
 
-    return f"{listed([told(r) for r in decided.left])} remain that no effect of a capture explains: check the " \
+    return f"{listed([told(r) for r in decided.left.curves])} remain that no effect of a capture explains: check the " \
         "set-up's sizes and masses"  # fmt: skip
 
 
@@ -140,7 +141,7 @@ def _corrected(moved: Sequence[ParameterShift]) -> str:
     return f" Numbers of the set-up that the model file does not give fit better as {', '.join(own)}."
 
 
-def _steps(source: Captures, decided: Decision) -> tuple[Step, ...]:
+def _steps(source: Captures, decided: SourceDecision) -> tuple[Step, ...]:
     def share(linear: Linearisation, numbers: Sequence[int]) -> float:
         """RMS over motion and force of what is left, each relative to all of its kind."""
         left, size = rms(linear) ** 2, source.sizes(numbers) ** 2
@@ -155,7 +156,7 @@ def _steps(source: Captures, decided: Decision) -> tuple[Step, ...]:
 
 
 def _moved(
-    source: Captures, decided: Decision, values: Mapping[str, Mapping[str, Estimate]]
+    source: Captures, decided: SourceDecision, values: Mapping[str, Mapping[str, Estimate]]
 ) -> tuple[ParameterShift, ...]:
     """Numbers of the set-up that were found to be others, then parameters that the model had."""
     made = []
@@ -171,11 +172,11 @@ def _moved(
     return tuple(made)
 
 
-def _traces(source: Captures, decided: Decision) -> tuple[Trace, ...]:
+def _traces(source: Captures, decided: SourceDecision) -> tuple[Trace, ...]:
     made = []
     sets: tuple[tuple[Literal["train", "holdout"], Sequence[int], Linearisation, Linearisation], ...] = (
-        ("train", source.train, decided.found.first, decided.best.train),
-        ("holdout", source.held, decided.before, decided.best.held),
+        ("train", source.train, decided.found.first.train, decided.train),
+        ("holdout", source.held, decided.before, decided.held),
     )
     for role, numbers, before, after in sets:
         for i, a, b in zip(numbers, before.residuals, after.residuals, strict=True):

@@ -49,4 +49,4 @@ def diagnose_captures(
         decided = decide(source, settled(source, model, start(model, len(source.records)), progress), progress)
         # What was named step by step is fitted again, while there are processes to simulate in.
         answer = report_on(source, decided, time.monotonic() - begun)
-    return answer, with_found(model, decided.best.train.at)
+    return answer, with_found(model, decided.train.at)

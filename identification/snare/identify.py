@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...models.model import Model
-from ..evidence.arm import WeighedRecordings
+from ..evidence.weighed import WeighedRecordings
 from ..parameter_list import parameter_list
 from ..sources.answer import estimates, rms
 from ..sources.fit import deviations, linearised

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from ...report.words import percent
 from ..diagnosis import Location
-from ..sources.decide import Decision
+from ..sources.decide import SourceDecision
 from .recording import CaptureRecording
 from .seen import QUARTER, shown, times
 from .source import Captures
@@ -19,9 +19,13 @@ TOUCH, STANDS_OUT = 0.5, 8.0
 MOST_WINDOWS = 6
 
 
-def locate_capture(source: Captures, decided: Decision) -> tuple[Location, ...]:
+def locate_capture(source: Captures, decided: SourceDecision) -> tuple[Location, ...]:
     """Channels of the first capture by the share of their own energy that is explained, or left without a name."""
-    capture, before, after = source.records[0], decided.found.first.residuals[0], decided.best.train.residuals[0]
+    capture, before, after = (
+        source.records[0],
+        decided.found.first.train.residuals[0],
+        decided.train.residuals[0],
+    )
     own = shown(source.channels)
     change = before - after if decided.best.names else after
     energy = np.zeros(len(source.channels))

@@ -7,13 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...models.model import Model
-from ..deciding import CLASS
+from ..decision.selection import Naming
 from ..diagnosis import Candidate, ChannelFit, Estimate, Finding, Limit, Misfit, Rival
 from ..reliability import of_name
 from ..wording import experiment_sentence, rejection
-from .decide import Decision
+from .decide import SourceDecision
 from .fit import Covariances, deviations
-from .search import Naming
 from .source import Linearisation, ModelPoint, Source
 
 Array = NDArray[np.float64]
@@ -37,7 +36,7 @@ def estimates(
 
 
 def finding(
-    decided: Decision,
+    decided: SourceDecision,
     n: Naming,
     values: Mapping[str, Estimate],
     sentence: str,
@@ -51,13 +50,12 @@ def finding(
     """
     p, sure = n.placed, decided.best.missed[n.placed.key].sure
     right = of_name(n.gain, sure, explained)
-    whole = n.share + sum(share for _, share in n.rivals if share >= CLASS)
+    whole = n.share + sum(r.probability for r in n.rivals if not r.separable)
     scale = right / max(whole, 1e-12) / (1 + len(either))
     rivals = [
-        Rival(r.effect.name, r.at, share * (right if share < CLASS else scale), share < CLASS,
-              experiment_sentence(p, r))
-        for r, share in n.rivals
-        if share >= 0.005
+        Rival(r.placed.effect.name, r.placed.at, r.probability * (right if r.separable else scale), r.separable,
+              experiment_sentence(p, r.placed))
+        for r in n.rivals
     ]  # fmt: skip
     rivals += [replace(r, probability=n.share * scale) for r in either]
     return Finding(p.effect.name, p.at, sure, n.share * scale, dict(values), sentence, tuple(rivals), n.gain)
@@ -75,7 +73,12 @@ def rms(linear: Linearisation) -> Array:
 
 
 def channel_fits(
-    decided: Decision, channels: Sequence[str], units: Sequence[str], train: Array, held: Array, floors: Sequence[float]
+    decided: SourceDecision,
+    channels: Sequence[str],
+    units: Sequence[str],
+    train: Array,
+    held: Array,
+    floors: Sequence[float],
 ) -> tuple[ChannelFit, ...]:
     """Errors of every channel before and after; ``train``, ``held``: what they are relative to (c,)."""
 
@@ -83,14 +86,20 @@ def channel_fits(
         a, b, size = float(rms(before)[c]), float(rms(after)[c]), float(sizes[c])
         return Misfit(a, b, a / size, b / size)
 
-    found, best = decided.found, decided.best
+    found = decided.found
     return tuple(
-        ChannelFit(name, unit, misfit(found.first, best.train, train, c), misfit(decided.before, best.held, held, c), f)
+        ChannelFit(
+            name,
+            unit,
+            misfit(found.first.train, decided.train, train, c),
+            misfit(decided.before, decided.held, held, c),
+            f,
+        )
         for c, (name, unit, f) in enumerate(zip(channels, units, floors, strict=True))
     )
 
 
-def candidates(decided: Decision) -> tuple[Candidate, ...]:
+def candidates(decided: SourceDecision) -> tuple[Candidate, ...]:
     """Every effect by itself on top of the model as given."""
     named = {n.placed.key for n in decided.best.names}
     return tuple(
@@ -99,7 +108,7 @@ def candidates(decided: Decision) -> tuple[Candidate, ...]:
     )
 
 
-def limits(source: Source, decided: Decision) -> tuple[Limit, ...]:
+def limits(source: Source, decided: SourceDecision) -> tuple[Limit, ...]:
     """What would have been named, had it been there."""
     named = {n.placed.key for n in decided.best.names}
     return tuple(
@@ -111,7 +120,7 @@ def limits(source: Source, decided: Decision) -> tuple[Limit, ...]:
     )
 
 
-def not_confirmed(decided: Decision) -> list[str]:
+def not_confirmed(decided: SourceDecision) -> list[str]:
     """Names that only the training recordings asked for, in words."""
     named = {n.placed.key for n in decided.best.names}
     return [rejection(n.placed) for n in decided.rejected if n.placed.key not in named]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ...models.model import Model
 from ..deciding import ROUNDS
-from ..evidence.arm import WeighedRecordings
+from ..evidence.weighed import WeighedRecordings
 from .fit import STILL, fit, kept_columns, linearised, sizes_of
 from .source import Linearisation, ModelPoint, Source
 from .weigh import covariances, weigh

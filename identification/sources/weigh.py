@@ -9,13 +9,12 @@ from numpy.typing import NDArray
 
 from ...models.model import PlacedEffect
 from ..deciding import DISCREPANCY, LAW_ERROR
-from ..evidence.arm import WeighedRecordings, principal
 from ..evidence.evidence import Evidence, ResidualChannel
-from ..evidence.nuisance_columns import NuisanceColumns
 from ..evidence.pool import CandidateColumns, Item
 from ..evidence.prior import pool
 from ..evidence.projected import ProjectedEvidence
 from ..evidence.search import Search
+from ..evidence.weighed import NuisanceColumns, WeighedRecordings, principal
 from ..nuisance.curve import SMALL
 from ..nuisance.noise import Noise, learn
 from .fit import Covariances, fit, priors
@@ -45,6 +44,7 @@ def weigh(
     search: bool,
     alone: Mapping[str, GridPoint] | None = None,
     only: Container[PointKey] | None = None,
+    nameless: Mapping[tuple[int, str], float] | None = None,
 ) -> WeighedRecordings:
     """Recordings under a fit.
 
@@ -65,13 +65,16 @@ def weigh(
         Laws that were fitted by themselves, by their key: a point more of their grid.
     only : container, optional
         Points of the effects' grids (`point_key`), where not all are wanted.
+    nameless : mapping of (channel, words) to float, optional
+        Sizes of nameless curves that stand beside every explanation.
     """
     columns, scale = CandidateColumns([len(r) for r in linear.residuals]), source.scale()
     named = _named(source, numbers, linear.at, columns, alone or {}, only) if search else {}
     spread = np.concatenate([_spread(source, given, linear.at), np.ones(len(linear.at.shifts))])
-    curves = {k: x for k, x in source.curves(numbers).items() if search or k[1] in SMALL}
+    nameless = nameless or {}
+    curves = {k: x for k, x in source.curves(numbers).items() if search or k[1] in SMALL or k in nameless}
     sizes = {k: _rms_of_curve(x[: len(source.train)]) for k, x in curves.items()}
-    small = {k: [x / sizes[k] for x in own] for k, own in curves.items() if k[1] in SMALL}
+    small = {k: [x / sizes[k] for x in own] for k, own in curves.items() if k[1] in SMALL or k in nameless}
     laws = [[columns.some(i, c, columns.of(i, c)[0]) for i in range(len(numbers))] for c in range(len(scale))]
 
     def could(c: int, named: bool) -> list[Array]:
@@ -105,10 +108,11 @@ def weigh(
         row, start = [], count
         for c in range(len(scale)):
             index, parts = [np.arange(count)], [x[:, c] * spread]
-            for (at, _), curve in small.items():
+            for (at, words), curve in small.items():
                 if at == c:
+                    size = np.hypot(wrong[c] if words in SMALL else 0.0, nameless.get((c, words), 0.0))
                     index.append(start + np.arange(curve[i].shape[1]))
-                    parts.append(curve[i] * wrong[c] * scale[c])
+                    parts.append(curve[i] * size * scale[c])
                     start += curve[i].shape[1]
             row.append((np.concatenate(index), np.concatenate(parts, axis=1)))
         beside.append(row)
@@ -127,6 +131,17 @@ def weigh(
     others = NuisanceColumns([], total, tolerant, [], spread, (1.0,))
     bare = functools.cache(lambda c: noise(c, could(c, False)))
     return WeighedRecordings(evidence, hypotheses, tuple(noises), others, scale, len(source.train), runs, bare)
+
+
+def opened(
+    source: Source, given: ModelPoint, here: Linearisation, known: WeighedRecordings | None = None
+) -> WeighedRecordings:
+    """The training recordings under a fit with every hypothesis; laws without amplitudes are fitted by themselves."""
+    weighed = weigh(source, source.train, given, here, known, search=True)
+    if not any(h.named and h.items[0].whole for h in weighed.pool):
+        return weighed
+    own = by_themselves(source, given, here, weighed)
+    return weigh(source, source.train, given, here, known or weighed, search=True, alone=own)
 
 
 def by_themselves(

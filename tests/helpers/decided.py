@@ -1,6 +1,7 @@
 """What the one evidence says of a model and the recordings in a folder."""
 
-from snarelab.identification.evidence.diagnose import decide
+from snarelab.identification.arms.kind import ArmRecordings
+from snarelab.identification.decision.decide import decide
 from snarelab.identification.fitting.experiment import load_experiments, scales, with_silence
 from snarelab.models.effects import effects
 from snarelab.models.hidden_state import prepare
@@ -12,7 +13,7 @@ def decided(model, folder):
     body = RigidBody(model.tree)
     train = with_silence(load_experiments(model, [folder / "train.csv"], body))
     held = with_silence(load_experiments(model, [folder / "hold.csv"], body, train[0].motion.band))
-    return decide(model, None, scales(train), train, held)
+    return decide(ArmRecordings(model, None, scales(train), train, held))
 
 
 def names(found):

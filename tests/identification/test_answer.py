@@ -10,12 +10,11 @@ from encoder_pairs import RATE, placed
 from small_answers import MODEL, NAMES, experiment, fit
 
 from snarelab.identification import answer
+from snarelab.identification.decision.confirm import Loss
+from snarelab.identification.decision.decide import Decision
+from snarelab.identification.decision.nameless import NamelessParts
+from snarelab.identification.decision.selection import Naming, Remainder, RivalOdds, Trial
 from snarelab.identification.diagnosis import ChannelFit, Finding, Misfit, Step
-from snarelab.identification.evidence.confirm import ArmLoss
-from snarelab.identification.evidence.diagnose import ArmDecision
-from snarelab.identification.evidence.nameless import NamelessParts
-from snarelab.identification.evidence.rival import RivalOdds
-from snarelab.identification.evidence.selection import ArmNaming, ArmTrial, Remainder
 from snarelab.identification.nuisance.bursts import Bursts
 from snarelab.identification.nuisance.noise import Noise
 
@@ -24,21 +23,21 @@ QUIET = Noise(0.1, 0.2, 0.3, 0.4, 8.0, 0.5)
 HEARD = "0.1 N·m from sample to sample, 0.2 N·m over 0.3 s, a wander of 0.4 N·m over 8 s and 5 N·m of the encoders"
 
 
-def name(effect, share=0.5, gain=30.0, rivals=(), channels=(0,)) -> ArmNaming:
-    return ArmNaming(effect, channels, gain, share, tuple(RivalOdds(*r) for r in rivals))
+def name(effect, share=0.5, gain=30.0, rivals=(), channels=(0,)) -> Naming:
+    return Naming(effect, channels, gain, share, tuple(RivalOdds(*r) for r in rivals))
 
 
-def trial(effect, explained=0.5, odds=3.0, smallest=()) -> ArmTrial:
-    return ArmTrial(effect, explained, odds, dict(smallest))
+def trial(effect, explained=0.5, odds=3.0, smallest=()) -> Trial:
+    return Trial(effect, explained, odds, dict(smallest))
 
 
 def curve(channel, over, explained) -> Remainder:
     return Remainder(channel, over, 20.0, explained, 3.0)
 
 
-def decided(*, names=(), rest=(), bursting=(), rejected=(), missed=None, **found) -> ArmDecision:
+def decided(*, names=(), rest=(), bursting=(), rejected=(), missed=None, **found) -> Decision[Any]:
     best: Any = SimpleNamespace(names=tuple(names), missed=missed or {}, found=SimpleNamespace(**found))
-    return ArmDecision(best, NamelessParts(tuple(rest), dict(bursting)), tuple(rejected))
+    return Decision(best, NamelessParts(tuple(rest), dict(bursting)), tuple(rejected))
 
 
 @pytest.fixture
@@ -69,7 +68,7 @@ def reported(monkeypatch):
             rejected=rejected,
             trials=trials,
             weighed=weighed,
-            first=fit([1, 1, 1]),
+            first=SimpleNamespace(fit=fit([1, 1, 1])),
         )
         train = train or [experiment(np.ones((4, 3)))]
         return answer.report_on(MODEL, told, fit([3, 5, 7]), (Step("s", 1, 1),), train, held)
@@ -200,8 +199,11 @@ def found(monkeypatch, right, share, rivals) -> Finding:
     final = fit([1, 2, 3], std=[0.1, 0.2, 0.3], at_bound=np.array([True, False, True]),
                 assembly={"slots": slots, "index_of": lambda p: [1, 2]})  # fmt: skip
     own = name(COULOMB, share, rivals=rivals, channels=(2, 0))
-    told = decided(names=[own], missed={COULOMB.key: ArmLoss(5.0, 2.0, 0.08, (0.02, 0.08), 0.9375, cast(Any, None))})
-    return answer._finding(own, told, final, ["tau.a", "tau.b", "tau.c"])
+    told = decided(names=[own], missed={COULOMB.key: Loss(5.0, 2.0, 0.08, 0, None)})
+    monkeypatch.setattr(answer, "_trial", lambda *_: (0.02, 0.08))
+    monkeypatch.setattr(answer, "_share_of_energy", lambda *_: 0.9375)
+    cast(Any, told.best).last = SimpleNamespace(fit=final)
+    return answer._finding(own, told, final, [], ["tau.a", "tau.b", "tau.c"])
 
 
 def test_an_effect_and_what_cannot_be_told_from_it_share_how_often_such_a_name_was_right(monkeypatch):

@@ -1,15 +1,16 @@
 """Numbers of the answer, halved and doubled: what is confirmed, and what cannot be told apart."""
 
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
 from explained import Explained
 from moved_numbers import FACTORS, move, planted
 
-from snarelab.identification.evidence import confirm as confirming
-from snarelab.identification.evidence import rounds
+from snarelab.identification.arms.blocks import blocks
+from snarelab.identification.decision import confirm as confirming
+from snarelab.identification.decision import names
 from snarelab.identification.evidence.pool import Hypothesis, Item
 from snarelab.identification.evidence.projected import ProjectedEvidence
 from snarelab.identification.evidence.search import Search
@@ -19,14 +20,10 @@ from snarelab.models.model import PlacedEffect
 
 def confirmed(monkeypatch, sure: float) -> bool:
     name: Any = SimpleNamespace(placed=PlacedEffect(get_effect("sensor_bias"), "tau.joint1"))
-    monkeypatch.setattr(confirming, "forecast", lambda *_: None)
-    monkeypatch.setattr(confirming, "known_to", lambda fit, _: fit)
-    monkeypatch.setattr(confirming, "_without", lambda model, _: model)
-    monkeypatch.setattr(
-        confirming, "_missed", lambda *_: confirming.ArmLoss(sure, 1.0, 0.2, (0.1, 0.2), 0.75, cast(Any, None))
-    )
-    found: Any = SimpleNamespace(names=(name,), model=None, fit=None, nameless={})
-    return bool(confirming.confirm(found, [], [], {}, lambda _: None).names)
+    monkeypatch.setattr(confirming, "loss", lambda *_: confirming.Loss(sure, 1.0, 0.2, 0, None))
+    kind: Any = SimpleNamespace(forecast=lambda *_: None, known=lambda *_: None)
+    found: Any = SimpleNamespace(names=(name,), last=None)
+    return bool(confirming.confirm(kind, found).names)
 
 
 def test_a_name_is_confirmed_from_two_standard_errors_on(monkeypatch):
@@ -41,11 +38,11 @@ def test_a_name_is_confirmed_from_two_standard_errors_on(monkeypatch):
 def test_blocks_of_time(monkeypatch):
     run: Any = SimpleNamespace(motion=SimpleNamespace(band=50.0))
     x = np.ones(3000)
-    assert len(confirming.blocks(run, x)) == 20
+    assert len(blocks(run, x)) == 20
     for factor, count in zip(FACTORS, (40, 10), strict=True):
         with monkeypatch.context() as patch:
             move(patch, "BLOCK", factor)
-            assert len(confirming.blocks(run, x)) == count
+            assert len(blocks(run, x)) == count
 
 
 def rivals(share: float, cosine: float) -> list[bool]:
@@ -60,7 +57,7 @@ def rivals(share: float, cosine: float) -> list[bool]:
     run = Search(ProjectedEvidence(made.evidence(), (0,)), several)
     (slot,) = run.answer()
     object.__setattr__(slot, "shares", np.array([1 - share, share, 0.0]))
-    return [r.separable for r in rounds._rivals(run, slot, np.ones(1))]
+    return [r.separable for r in names.rivals(run, slot, np.ones(1))]
 
 
 def test_a_rival_with_a_tenth_of_the_shares_is_not_told_apart(monkeypatch):
@@ -97,7 +94,7 @@ def test_a_whole_law_of_two_names_is_a_rival_of_each_though_it_stands_beside_nei
     run = Search(ProjectedEvidence(made.evidence(), (0,)), several, barred)
     slot = next(s for s in run.answer() if s.taken.hypothesis == 0)
     object.__setattr__(slot, "odds", np.array([slot.odds[0], -np.inf, -np.inf]))
-    assert [r.placed.effect.name for r in rounds._rivals(run, slot, np.ones(1))] == found
+    assert [r.placed.effect.name for r in names.rivals(run, slot, np.ones(1))] == found
 
 
 def becomes(alike: float) -> bool:
@@ -112,7 +109,7 @@ def becomes(alike: float) -> bool:
     run = Search(ProjectedEvidence(made.evidence(), (0,)), several)
     slots = run.answer()
     assert [s.taken.hypothesis for s in slots] == [0]
-    return rounds.as_names(run, slots)[0].taken.hypothesis == 1
+    return names.as_names(run, slots)[0].taken.hypothesis == 1
 
 
 def test_a_curve_becomes_the_name_that_it_nearly_is(monkeypatch):

@@ -8,10 +8,11 @@ import pytest
 from explained import Explained
 from moved_numbers import FACTORS, about, move, planted, smallest
 
-from snarelab.identification.evidence import nuisance_columns, tolerant
+from snarelab.identification.arms import nuisance_columns
+from snarelab.identification.evidence import tolerant
 from snarelab.identification.evidence.evidence import ResidualChannel
-from snarelab.identification.evidence.nuisance_columns import NuisanceColumns
 from snarelab.identification.evidence.pool import Hypothesis
+from snarelab.identification.evidence.weighed import NuisanceColumns
 from snarelab.models.effects import get_effect
 from snarelab.models.model import PlacedEffect
 

@@ -9,7 +9,7 @@ from loud_windows import windows
 from moved_numbers import FACTORS, about, move
 from near_rest_of import near_rest
 
-from snarelab.identification.evidence import arm
+from snarelab.identification.arms import weigh as arm
 from snarelab.identification.nuisance import rest
 from snarelab.identification.nuisance.bursts import bursts
 from snarelab.identification.nuisance.noise import NoiseChannel, learn

@@ -8,7 +8,7 @@ import pytest
 from explained import Explained, hypotheses, white
 from moved_numbers import FACTORS, about, move, odds_of, planted, searched, smallest
 
-from snarelab.identification.evidence import hypotheses as hypothesising
+from snarelab.identification.arms import hypotheses as hypothesising
 from snarelab.identification.evidence.evidence import Evidence, ResidualChannel
 from snarelab.identification.evidence.members import Members
 from snarelab.identification.evidence.pool import CandidateColumns, Item

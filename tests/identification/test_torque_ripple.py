@@ -32,7 +32,7 @@ def test_a_ripple_is_named_with_its_period(tmp_path, order):
     found = decided(rippled(tmp_path, 1, {"joint2": Ripple(1.0, order, 0.4)}), tmp_path)
     assert names(found) == ["torque_ripple.joint2"]
     # One element: a wave more in the travel.
-    assert waves(found.best.fit) == pytest.approx(order, abs=2 * np.pi / travel(tmp_path))
+    assert waves(found.best.last.fit) == pytest.approx(order, abs=2 * np.pi / travel(tmp_path))
 
 
 def test_two_ripples_at_one_joint_are_both_found(tmp_path):
@@ -41,7 +41,7 @@ def test_two_ripples_at_one_joint_are_both_found(tmp_path):
     found = decided(rippled(tmp_path, 1, {"joint2": both}), tmp_path)
     assert names(found) == ["torque_ripple.joint2", "torque_ripple_2.joint2"]
     element = 2 * np.pi / travel(tmp_path)
-    orders = [waves(found.best.fit, f"{key}.period") for key in names(found)]
+    orders = [waves(found.best.last.fit, f"{key}.period") for key in names(found)]
     assert sorted(orders) == [pytest.approx(x, abs=element) for x in (23.23, ORDER)]
 
 

@@ -54,13 +54,13 @@ def test_three_axes_have_two_encoders(found):
 @pytest.mark.parametrize("number", range(3))
 def test_time_skew_leads_and_the_bar_is_met(found, number):
     one, key = found[0], f"sensor_delay.q_link.axis{number + 1}"
-    before, after = (float(MDEG * rms(x)[number]) for x in (one.decided.before, one.decided.best.held))
+    before, after = (float(MDEG * rms(x)[number]) for x in (one.decided.before, one.decided.held))
     assert before == pytest.approx(CHECK["nothing"][number], rel=0.01)
     assert after <= 3.5
     own = [n for n in one.decided.best.names if n.channels == (number,)]
     assert own[0].placed.key == key
-    assert MDEG * rms(one.decided.best.missed[key].held)[number] > 4 * after
-    assert one.decided.best.train.at.all_values[f"{key}.delay"] == pytest.approx(0.003, rel=0.05)
+    assert MDEG * rms(one.decided.best.missed[key].fit.held)[number] > 4 * after
+    assert one.decided.train.at.all_values[f"{key}.delay"] == pytest.approx(0.003, rel=0.05)
 
 
 @pytest.mark.parametrize("number", range(3))
@@ -68,9 +68,9 @@ def test_elasticity_is_little(found, number):
     """Of the makers' order of size where it is named, and a small share of what the encoders differ by."""
     best, axis = found[0].decided.best, f"joint_elasticity.axis{number + 1}"
     if axis in best.missed:
-        stiffness = best.train.at.all_values[f"{axis}.stiffness"]
+        stiffness = best.last.train.at.all_values[f"{axis}.stiffness"]
         assert 0.7 < stiffness / STIFFNESS[number] < 2.5
-        without, within = (rms(x)[number] for x in (best.missed[axis].held, best.held))
+        without, within = (rms(x)[number] for x in (best.missed[axis].fit.held, best.last.held))
         assert without**2 - within**2 < 0.02 * rms(found[0].decided.before)[number] ** 2
 
 

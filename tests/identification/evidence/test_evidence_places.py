@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from explained import white
 
-from snarelab.identification.evidence import hypotheses as module
+from snarelab.identification.arms import hypotheses as module
 from snarelab.identification.evidence.pool import Hypothesis
 from snarelab.identification.evidence.prior import log_share_of_places, pool
 from snarelab.models.effects import get_effect

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from explained import Explained, explained, hypotheses, white
 
+from snarelab.identification.decision.names import likeness, share_of_residual
 from snarelab.identification.evidence.members import Members
 from snarelab.identification.evidence.pool import Hypothesis, Item
 from snarelab.identification.evidence.projected import ProjectedEvidence
-from snarelab.identification.evidence.rounds import likeness, share_of_residual
 from snarelab.identification.evidence.search import Search
 
 DECOYS = 30

@@ -85,7 +85,7 @@ def named(one, at="joint2"):
 
 
 def parameters(one, name, at="joint2"):
-    values = one.decided.best.train.at.all_values
+    values = one.decided.train.at.all_values
     return {k.rpartition(".")[2]: v for k, v in values.items() if k.startswith(f"{name}.") and f"{at}." in k}
 
 
@@ -100,8 +100,8 @@ def test_alike_encoders_are_left_alone(rigid, tmp_path):
     for seed in range(2):
         one = links_of(folder, write(tmp_path, recordings, seed))
         assert [named(one, j) for j in JOINTS] == [[], []]
-        assert np.all(rms(one.decided.best.held) < NOISE)
-        assert one.decided.left == ()
+        assert np.all(rms(one.decided.held) < NOISE)
+        assert one.decided.left.curves == ()
 
 
 SLOW = pytest.mark.slow
@@ -128,7 +128,7 @@ def test_a_sensor_fault_is_named_with_its_size(rigid, tmp_path, change, key, par
     one = links_of(folder, write(tmp_path, recordings, change=change))
     assert named(one, "joint1") == []
     assert named(one) == [key]
-    assert one.decided.left == ()
+    assert one.decided.left.curves == ()
     assert parameters(one, key.partition(".")[0])[parameter] == pytest.approx(value, rel=within)
 
 

@@ -9,12 +9,13 @@ import pytest
 from diagnoses import spelt
 from encoder_pairs import SCALES, links, motion, placed, run
 
+from snarelab.identification.decision.nameless import NamelessParts
 from snarelab.identification.diagnosis import ChannelFit, Estimate, Finding, Location, Misfit, Step
 from snarelab.identification.fitting.experiment import Experiment
 from snarelab.identification.links import answer
 from snarelab.identification.links.diagnose import EncoderComparison
 from snarelab.identification.links.source import Links
-from snarelab.identification.sources.decide import Decision
+from snarelab.identification.sources.decide import SourceDecision
 from snarelab.identification.sources.source import Linearisation, ModelPoint
 
 NONE = cast(Any, None)
@@ -45,8 +46,9 @@ def test_a_misfit_is_relative_to_the_link_encoders_own_reading():
     runs = [run(np.full(64, 3.0), np.ones(64)), run(np.full(64, -3.0), -np.ones(64)), run(np.zeros(64), np.full(64, 2))]
     one = links(*runs, kind="prismatic", n_train=2)
     decided: Any = SimpleNamespace(
-        found=SimpleNamespace(first=left([2, -2], [2])),
-        best=SimpleNamespace(train=left([1, 1], [1]), held=left([0.5])),
+        found=SimpleNamespace(first=SimpleNamespace(train=left([2, -2], [2]))),
+        train=left([1, 1], [1]),
+        held=left([0.5]),
         before=left([1, -1]),
     )
     (made,) = answer._fits(EncoderComparison(one, decided, (), ()))
@@ -104,9 +106,11 @@ def answered(monkeypatch, torques, found=(), told=(1, 1), nameless=""):
     monkeypatch.setattr(answer, "_location", lambda *_: ("places",))
     monkeypatch.setattr(answer, "with_found", lambda model, at: (model, at))
     names = [SimpleNamespace(placed=placed(f.name, f.at)) for f in found]
-    best = SimpleNamespace(names=names, train=SimpleNamespace(at="values"))
+    best = SimpleNamespace(names=names, last=SimpleNamespace(train=SimpleNamespace(at="values")))
     none: Any = None
-    decided = Decision(none, none, cast(Any, best), (), cast(Any, tuple(filter(None, [nameless]))), none)
+    decided = SourceDecision(
+        cast(Any, best), NamelessParts(cast(Any, tuple(filter(None, [nameless]))), {}), (), none, none
+    )
     source: Any = SimpleNamespace(still=lambda p: p.effect.name == "sensor_bias")
     return answer.with_links(torques, cast(Any, "model"), EncoderComparison(source, decided, (), ()))
 
@@ -192,8 +196,10 @@ def test_places_stand_by_the_share_that_is_told_of_each_channel(monkeypatch):
     runs = [replace(run(m.q, m.tau, joint=1, joints=names), load=np.arange(len(m.time)) + 5.0) for m in motions]
     rows: Any = [[None, r] for r in runs]
     source: Any = SimpleNamespace(rows=rows, channels=("q_link.joint1", "q_link.joint2"))
-    best = SimpleNamespace(names=[SimpleNamespace(channels=(1,))], train=left([1, 1, 1], [1, 1], channels=2))
-    decided: Any = SimpleNamespace(found=SimpleNamespace(first=left([1, 2, 3], [4, 5], channels=2)), best=best)
+    best = SimpleNamespace(names=[SimpleNamespace(channels=(1,))])
+    first = SimpleNamespace(train=left([1, 2, 3], [4, 5], channels=2))
+    after = left([1, 1, 1], [1, 1], channels=2)
+    decided: Any = SimpleNamespace(found=SimpleNamespace(first=first), best=best, train=after)
     train = tuple(Experiment(m, NONE) for m in motions)
     places = tuple(Location(f"tau.joint{k}", 0.5, (), "") for k in (2, 1, 3))
     said = replace(TORQUES, location=places)

@@ -64,16 +64,16 @@ def test_noise_and_steps_of_the_encoders_alone_have_no_name(step):
 
     found = decided(steps, seed=7, noise=NOISE if not step else 0.1 * step)
     assert named(found) == []
-    assert found.left == ()
+    assert found.left.curves == ()
 
 
 def test_a_spring_is_named_with_its_stiffness_and_leaves_the_noise():
     found = decided(lambda t, q, number: -twist(t, lambda at: torque(at, number), 3000.0, 40.0, 0.0))
     assert named(found) == ["joint_elasticity.joint1"]
-    values = found.best.train.at.all_values
+    values = found.best.last.train.at.all_values
     assert values["joint_elasticity.joint1.stiffness"] == pytest.approx(3000.0, rel=0.01)
-    assert rms(found.best.held)[0] == pytest.approx(NOISE, rel=0.15)
-    assert found.left == ()
+    assert rms(found.best.last.held)[0] == pytest.approx(NOISE, rel=0.15)
+    assert found.left.curves == ()
 
 
 def test_play_is_named_with_its_gap_beside_its_spring():
@@ -81,14 +81,14 @@ def test_play_is_named_with_its_gap_beside_its_spring():
     found = decided(lambda t, q, number: -twist(t, lambda at: torque(at, number), 3000.0, 60.0, 1e-3))
     assert "backlash.joint1" in named(found)
     assert set(named(found)) <= {"backlash.joint1", "joint_elasticity.joint1"}
-    assert found.best.train.at.all_values["backlash.joint1.gap"] == pytest.approx(1e-3, rel=0.05)
+    assert found.best.last.train.at.all_values["backlash.joint1.gap"] == pytest.approx(1e-3, rel=0.05)
 
 
 def test_gain_and_drift_are_both_named_with_their_sizes():
     """And a zero that is another in each recording has no name."""
     found = decided(lambda t, q, number: 0.002 * q - 3e-5 * t + 0.01 * number - 0.004)
     assert named(found) == ["sensor_drift.q_link.joint1", "sensor_gain.q_link.joint1"]
-    values = found.best.train.at.all_values
+    values = found.best.last.train.at.all_values
     assert values["sensor_gain.q_link.joint1.error"] == pytest.approx(0.002, rel=0.01)
     assert values["sensor_drift.q_link.joint1.rate"] == pytest.approx(-3e-5, rel=0.05)
 
@@ -103,5 +103,5 @@ def test_what_has_no_law_is_a_curve_over_what_it_runs_over():
     """A wave of the gear over the joint's position."""
     found = decided(lambda t, q, number: 2e-4 * np.cos(40 * q))
     assert named(found) == []
-    assert "position" in found.left[0].over
-    assert found.left[0].explained > 0.5
+    assert "position" in found.left.curves[0].over
+    assert found.left.curves[0].explained > 0.5

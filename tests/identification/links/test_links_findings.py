@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from encoder_pairs import RATE, links, placed, run
 
+from snarelab.identification.decision.nameless import NamelessParts
+from snarelab.identification.decision.selection import Naming, RivalOdds
 from snarelab.identification.diagnosis import Estimate
 from snarelab.identification.links import findings
 from snarelab.identification.links.diagnose import EncoderComparison
 from snarelab.identification.sources import answer
-from snarelab.identification.sources.search import Naming
 from snarelab.identification.sources.source import Linearisation, ModelPoint
 
 GAIN, DELAY = placed("sensor_gain", "q_link.joint1"), placed("sensor_delay", "q_link.joint1")
@@ -47,12 +48,20 @@ def compared(one, names, values=None, shifts=None, missed=(), rejected=(), curve
     """A decision by which these names stand; each is missed from ``within`` to 4 mrad unless said otherwise."""
     at = ModelPoint.of([n.placed for n in names], values or {}, one.n_shifts)
     at = at if shifts is None else replace(at, shifts=np.array(shifts, float))
-    told = {n.placed.key: SimpleNamespace(gain=g, sure=3.0, held=left(at, w)) for n, (g, w) in
+    told = {n.placed.key: SimpleNamespace(gain=g, sure=3.0, fit=SimpleNamespace(held=left(at, w))) for n, (g, w) in
             zip(names, missed or [(9.0, 4e-3)] * len(names), strict=True)}  # fmt: skip
-    best = SimpleNamespace(names=tuple(names), missed=told, train=left(at, within), held=left(at, within))
-    found = SimpleNamespace(weighed=None, first=left(at, 1.0))
+    last = SimpleNamespace(train=left(at, within), held=left(at, within))
+    best = SimpleNamespace(names=tuple(names), missed=told, last=last)
+    found = SimpleNamespace(weighed=None, first=SimpleNamespace(train=left(at, 1.0)))
     decided: Any = SimpleNamespace(
-        given=None, best=best, found=found, rejected=rejected, left=curves, before=left(at, 1.0)
+        given=None,
+        best=best,
+        found=found,
+        rejected=rejected,
+        left=NamelessParts(tuple(curves), {}),
+        before=left(at, 1.0),
+        train=last.train,
+        held=last.held,
     )
     return EncoderComparison(one, decided, (), ())
 
@@ -67,8 +76,8 @@ def test_lengths_are_told_in_thousandths_of_the_joints_unit():
 
 
 def test_an_effect_shares_its_probability_with_those_it_cannot_be_told_from():
-    """Shares of 0.75 and of 0.25 with a rival that is as likely as not: 0.8 times these; of a small one not."""
-    rivals = ((SPRING, 0.25), (GAIN, 0.01), (BIAS, 0.001))
+    """Shares of 0.75 and of 0.25 with a rival that is as likely as not: 0.8 times these; one apart has its own."""
+    rivals = (RivalOdds(SPRING, 0.25, False), RivalOdds(GAIN, 0.01, True))
     values = {f"{DELAY.key}.delay": 0.003}
     (found,) = findings.findings_of(compared(links(run(WAVE, WAVE)), [name(DELAY, 0.75, rivals)], values))
     assert found.probability == pytest.approx(0.6)
@@ -163,9 +172,10 @@ def test_traces_show_the_difference_as_measured_as_given_and_after():
         return Linearisation(at, (np.array(values, float)[:, None],), ())
 
     decided: Any = SimpleNamespace(
-        found=SimpleNamespace(first=columns(1, 2, 3)),
+        found=SimpleNamespace(first=SimpleNamespace(train=columns(1, 2, 3))),
         before=columns(6),
-        best=SimpleNamespace(train=columns(0.1, 0.2, 0.3), held=columns(0.6)),
+        train=columns(0.1, 0.2, 0.3),
+        held=columns(0.6),
     )
     a, c = findings.traces_of(EncoderComparison(one, decided, (), ()))
     assert (a.recording, a.role, a.channel, a.unit) == ("a.csv", "train", "q_link.joint1", "rad")

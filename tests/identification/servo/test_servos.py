@@ -145,7 +145,7 @@ def test_a_concealed_law_is_named_and_a_clean_servo_is_adequate(law, name, value
     found = decide(source, settled(source, NO_FILE, GIVEN))
     assert [n.placed.effect.name for n in found.best.names] == ([name] if name else [])
     if value:
-        values = plain(found.best.train.at.all_values)
+        values = plain(found.best.last.train.at.all_values)
         assert values[f"{name}.{value[0]}"] == pytest.approx(value[1], rel=0.15)
-        before, after = (np.std(np.concatenate(x.residuals)) for x in (found.before, found.best.held))
+        before, after = (np.std(np.concatenate(x.residuals)) for x in (found.before, found.best.last.held))
         assert after < 0.2 * before

@@ -50,9 +50,10 @@ def decided(source, before, after, names=()) -> Any:
     def linear(left, numbers):
         return Linearisation(AT, tuple(np.asarray(left, float) for _ in numbers), ())
 
-    best = SimpleNamespace(names=names, train=linear(after, source.train), held=linear(after, source.held))
-    found = SimpleNamespace(first=linear(before, source.train))
-    return SimpleNamespace(found=found, best=best, before=linear(before, source.held))
+    train, held = linear(after, source.train), linear(after, source.held)
+    best = SimpleNamespace(names=names, last=SimpleNamespace(train=train, held=held))
+    found = SimpleNamespace(first=SimpleNamespace(train=linear(before, source.train)))
+    return SimpleNamespace(found=found, best=best, before=linear(before, source.held), train=train, held=held)
 
 
 def pushed(x=0.4):

@@ -69,7 +69,7 @@ def test_what_was_left_out_is_named_with_its_value_and_saved():
     assert said.location[0].channel == "pos.target.y"
     assert [(t.recording, t.role) for t in said.traces[::3]] == [("0.csv", "train"), ("1.csv", "holdout")]
     assert "captures were simulated in 3 s" in said.notes[-1]
-    after = with_found(source.model, found.best.train.at)
+    after = with_found(source.model, found.best.last.train.at)
     assert [p.key for p in after.effects] == [FRICTION.key]
     assert after.values[key_of(FRICTION)] == value.value
 
@@ -97,7 +97,7 @@ def test_a_contact_that_gives_way_is_named_with_its_stiffness():
     """Between the points where it is tried, 2e6 and 3e5."""
     _, found = decided({key_of(STIFFNESS): 7e5})
     assert [n.placed.key for n in found.best.names] == [STIFFNESS.key]
-    assert found.best.train.at.all_values[key_of(STIFFNESS)] == pytest.approx(7e5, rel=0.05)
+    assert found.best.last.train.at.all_values[key_of(STIFFNESS)] == pytest.approx(7e5, rel=0.05)
 
 
 def test_a_held_out_capture_is_simulated_with_what_was_named_only():
@@ -111,7 +111,7 @@ def test_a_held_out_capture_is_simulated_with_what_was_named_only():
 def test_two_effects_are_both_named():
     _, found = decided({key_of(FRICTION): 0.15, key_of(PRETENSION): 600.0})
     assert {n.placed.key for n in found.best.names} == {FRICTION.key, PRETENSION.key}
-    assert found.best.train.at.all_values[key_of(PRETENSION)] == pytest.approx(600.0, rel=0.1)
+    assert found.best.last.train.at.all_values[key_of(PRETENSION)] == pytest.approx(600.0, rel=0.1)
 
 
 def test_motion_that_no_effect_explains_is_told_as_such():
@@ -141,7 +141,7 @@ def test_a_number_that_the_file_does_not_give_is_corrected_and_is_no_missing_phy
     assert (moved.name, moved.unit, moved.before) == ("capture.mass", "kg", said_mass)
     assert moved.after == pytest.approx(said_mass + 5.0, abs=3 * moved.std + 0.1)
     assert "Numbers of the set-up that the model file does not give fit better as mass = " in said.sentence
-    after = with_found(source.model, found.best.train.at)
+    after = with_found(source.model, found.best.last.train.at)
     assert after.effects == ()
     assert setup_of(after).target.mass == moved.after
     assert setup_of(after).given["mass"] == moved.after

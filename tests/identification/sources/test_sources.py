@@ -125,7 +125,7 @@ def test_each_name_is_a_stage_and_every_other_is_fitted_again():
         "model as given",
         *(f"+ {p.effect.name} at joint1" for p in names),
     ]
-    assert second[1].at.keys == found.best.train.at.keys[:1]
+    assert second[1].at.keys == found.best.last.train.at.keys[:1]
     for _, train, held in (second, third):
         left = slide.measured(2) - slide.predicted(2, train.at)
         np.testing.assert_allclose(held.residuals[0], left)
@@ -184,16 +184,16 @@ def named(found):
 def test_noise_and_a_shift_within_its_deviation_have_no_name(bias):
     found = decide(Slide(((0.0, 0.0, bias),) * 3), NONE)
     assert named(found) == []
-    assert 0.1 * found.best.train.at.shifts[0] == pytest.approx(bias, abs=0.02)
+    assert 0.1 * found.best.last.train.at.shifts[0] == pytest.approx(bias, abs=0.02)
 
 
 def test_what_is_there_is_named_with_its_size_beside_the_shift():
     found = decide(Slide(((2.0, 0.7, 0.1),) * 3), NONE)
     assert named(found) == ["coulomb_friction", "viscous_friction"]
-    values = found.best.train.at.all_values
+    values = found.best.last.train.at.all_values
     assert values["viscous_friction.joint1.coefficient"] == pytest.approx(2.0, rel=0.02)
     assert values["coulomb_friction.joint1.level"] == pytest.approx(0.7, rel=0.02)
-    assert rms(found.best.held)[0] == pytest.approx(0.05, rel=0.1)
+    assert rms(found.best.last.held)[0] == pytest.approx(0.05, rel=0.1)
 
 
 @dataclass

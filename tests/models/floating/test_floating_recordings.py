@@ -8,9 +8,9 @@ import xarray as xr
 
 from bench.drake_servicer import model
 from snarelab.errors import InputError
+from snarelab.identification.arms.nuisance_columns import regressor_columns
+from snarelab.identification.arms.whole_mass import by_mass
 from snarelab.identification.diagnose import diagnose
-from snarelab.identification.evidence.nuisance_columns import regressor_columns
-from snarelab.identification.evidence.whole_mass import by_mass
 from snarelab.identification.fitting.assembly import TorqueModel
 from snarelab.identification.fitting.experiment import load_experiments, scales
 from snarelab.identification.identify import identify

@@ -1,7 +1,6 @@
 """Columns that stand beside every explanation: the baseline's parameters, the tolerance of the masses, small curves."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,42 +8,18 @@ from numpy.typing import NDArray
 from ...models.model import PlacedEffect
 from ...models.regressor import OWN
 from ..deciding import BASELINE, BASELINE_OWN, BASELINE_SHAPE, BENDS, DISCREPANCY, LAW_ERROR
+from ..evidence.pool import CandidateColumns, Curves
+from ..evidence.weighed import NuisanceColumns, Part
 from ..fitting.assembly import TorqueModel
 from ..fitting.experiment import Experiment
 from ..fitting.fit import Fit
 from ..fitting.problem import gather
 from ..nuisance.curve import SMALL, over_decades
 from ..search.refit import carry
-from .hypotheses import ColumnSource, Curves, coordinate, lagging, remembers, starts
-from .pool import CandidateColumns
+from .hypotheses import ColumnSource, coordinate, lagging, remembers, starts
 from .whole_mass import by_mass
 
 Array = NDArray[np.float64]
-Part = tuple[NDArray[np.int_], Array]
-"""Positions (p,) among all that stands beside, and columns (n, p) in units of their prior deviation."""
-
-
-@dataclass(frozen=True)
-class NuisanceColumns:
-    """``parts[i][c]`` are those of recording i and channel c; ``tolerant`` is the position of the masses' tolerance in
-    them.
-    """
-
-    parts: list[list[Part]]
-    count: int
-    tolerant: slice
-    baseline: list[list[Part]]
-    """The baseline's own columns, in units of the parameters."""
-    spread: Array
-    """Prior deviation of each of the baseline's parameters about its fit (P,), the first columns' unit."""
-    more: tuple[float, ...] = ()
-    """Tolerances beyond `TOLERANCES` that may be chosen."""
-
-    def weight(self, tolerance: float) -> Array:
-        """Factors on the prior deviations (count,) for masses that are known to a share."""
-        weight = np.ones(self.count)
-        weight[self.tolerant] = tolerance
-        return weight
 
 
 def beside(

@@ -9,16 +9,12 @@ from decided import decided
 from decided import names as named
 from pendulum import record, recorded
 
-from snarelab.identification.evidence import confirm as module
-from snarelab.identification.evidence.confirm import (
-    FEWEST_BLOCKS,
-    ArmLoss,
-    PredictiveDensity,
-    along_instruments,
-    blocks,
-    confirm,
-    known_to,
-)
+from snarelab.identification.arms import kind as arms
+from snarelab.identification.arms.blocks import FEWEST_BLOCKS, blocks
+from snarelab.identification.arms.forecast import along_instruments, known_to
+from snarelab.identification.decision import confirm as module
+from snarelab.identification.decision.confirm import Loss, confirm
+from snarelab.identification.decision.kind import Forecast
 from snarelab.identification.fitting.fit import Fit
 from snarelab.models.effects import get_effect
 from snarelab.models.model import PlacedEffect
@@ -32,8 +28,8 @@ def names(n=N):
                  for k, x in enumerate(NAMES[:n]))  # fmt: skip
 
 
-def missed_by(gain, fit=None, scatter_=1.0) -> ArmLoss:
-    return ArmLoss(gain, scatter_, 0.2, (0.1, 0.2), 0.75, cast(Any, fit))
+def missed_by(gain, fit=None, scatter_=1.0) -> Loss[Any]:
+    return Loss(gain, scatter_, 0.2, 0, fit)
 
 
 def eager(rise) -> set[int]:
@@ -47,18 +43,17 @@ def eager(rise) -> set[int]:
     return left
 
 
+def forecast(density: float) -> Forecast:
+    return Forecast(density, (), np.zeros(0), np.zeros((0, 0)))
+
+
 def confirmed(monkeypatch, some, missed, told=None):
     """`confirm` with a fit that is the set of names it has, and what is missed of each given by a function."""
     densities = iter(range(100))
-    nothing = np.zeros(0), np.zeros((0, 0))
-    monkeypatch.setattr(module, "forecast", lambda *_: PredictiveDensity(float(next(densities)), (), *nothing))
-    monkeypatch.setattr(module, "known_to", lambda fit, _: fit)
-    monkeypatch.setattr(module, "_missed", missed)
-    model: Any = SimpleNamespace(effects=tuple(n.placed for n in some))
-    monkeypatch.setattr(module, "_without", lambda m, key: SimpleNamespace(
-        effects=tuple(p for p in m.effects if p.key != key)))  # fmt: skip
-    found: Any = SimpleNamespace(names=some, model=model, fit=frozenset(n.number for n in some), nameless={})
-    return confirm(found, [], [], {}, (told if told is not None else []).append)
+    kind: Any = SimpleNamespace(forecast=lambda *_: forecast(float(next(densities))), known=lambda _, fit, whole: fit)
+    monkeypatch.setattr(module, "loss", lambda _, __, name, final, ___: missed(name, final))
+    found: Any = SimpleNamespace(names=some, last=frozenset(n.number for n in some))
+    return confirm(kind, found, (told if told is not None else []).append)
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -72,23 +67,22 @@ def test_trying_few_again_rules_out_what_trying_all_again_would(seed, monkeypatc
     def rise(number: int, left) -> float:
         return float(alone[number] + sum(stands_in[number, k] for k in range(N) if k not in left))
 
-    def missed(name: Any, _model: Any, final: Any, *_: Any) -> ArmLoss:
+    def missed(name: Any, final: Any) -> Loss[Any]:
         tried.append(name.number)
         return missed_by(rise(name.number, final), final - {name.number})
 
     done: Any = confirmed(monkeypatch, names(), missed)
     left = {n.number for n in done.names}
-    assert left == eager(rise) == done.fit
+    assert left == eager(rise) == done.last
     assert {n.number for n in done.rejected} == set(range(N)) - left
     assert set(done.missed) == {n.placed.key for n in done.names}
     assert set(done.weak) == {n.placed.key for n in done.rejected}
-    assert {p.key for p in done.model.effects} == set(done.missed)
     gone = len(done.rejected)
     assert len(tried) <= N + sum(range(N - gone, N))  # no more than trying all again
 
 
 def test_of_two_twins_one_stays(monkeypatch):
-    def missed(name: Any, _model: Any, final: Any, *_: Any) -> ArmLoss:
+    def missed(name: Any, final: Any) -> Loss[Any]:
         return missed_by(0.4 if len(final) == 2 else 5.0, final - {name.number})
 
     done = confirmed(monkeypatch, names(2), missed)
@@ -101,7 +95,7 @@ def test_of_a_law_and_its_special_case_the_law_goes_first(monkeypatch):
     some = tuple(cast(Any, SimpleNamespace(placed=PlacedEffect(get_effect(x), "joint1"), number=k))
                  for k, x in enumerate(("coulomb_friction", "stribeck_friction", "backlash")))  # fmt: skip
 
-    def missed(name: Any, _model: Any, final: Any, *_: Any) -> ArmLoss:
+    def missed(name: Any, final: Any) -> Loss[Any]:
         return missed_by(5.0 if len(final) == 2 else (0.2, 0.4, 0.6)[name.number], final - {name.number})
 
     done = confirmed(monkeypatch, some, missed)
@@ -113,7 +107,7 @@ def test_a_name_stays_if_it_is_missed_by_more_than_its_scatter(monkeypatch, gain
     told = []
     done: Any = confirmed(monkeypatch, names(1), lambda *_: missed_by(gain, "fit without", scattered), told)
     assert (len(done.names), len(done.rejected)) == ((1, 0) if stays else (0, 1))
-    assert done.fit == (frozenset([0]) if stays else "fit without")
+    assert done.last == (frozenset([0]) if stays else "fit without")
     assert done.forecast.density == (0.0 if stays else 1.0)  # what is left predicts anew
     assert len(told) == (1 if stays else 2)
 
@@ -151,7 +145,7 @@ def test_deviations_are_about_the_reported_value():
     """Those of a posterior that is 0.3 and -0.4 off the fit; what the fit cannot determine stays so, and what the
     evidence holds, the fourth, is known as well as the fit knows it."""
     mean, variance = np.array([0.3, -0.4, 0.0, 0.0]), np.diag([0.16, 0.09, 0.01, 0.0])
-    told = PredictiveDensity(0.0, (), mean, variance)
+    told = Forecast(0.0, (), mean, variance)
     own = np.diag([0.01, 81.0, 0.0, 4.0])
     at_bound, std = np.zeros(4, bool), np.array([0.1, 9.0, np.inf, 2.0])
     fit = Fit(cast(Any, None), np.ones(4), std, own, np.ones(1), 1.0, at_bound, 1, 1)
@@ -166,7 +160,7 @@ def test_a_law_at_its_bound_predicts_nothing_of_the_wrong_sign(tmp_path):
     model = recorded(tmp_path, 3, stribeck=-1.5, speed=0.3)
     there = model.with_effects([PlacedEffect(get_effect("stribeck_friction"), "joint1")], {})
     found = decided(there, tmp_path).best
-    fit = found.fit
+    fit = found.last.fit
     level = [(s.effect, s.name) for s in fit.assembly.slots].index(("stribeck_friction", "level"))
     assert fit.theta[level] == 0.0
     assert fit.at_bound[level]
@@ -196,31 +190,43 @@ def test_what_a_disturbance_moves_says_nothing_for_a_law():
 
 def test_a_name_is_tried_along_the_instrument_motion(monkeypatch):
     """Fits that leave -theta times a motion: 1 with the name, 2 without. Instruments are ten times the motions."""
-    asked, nothing = [], (np.zeros(0), np.zeros((0, 0)))
+    asked = []
 
     def fitted(theta) -> Any:
         return SimpleNamespace(theta=theta, assembly=SimpleNamespace(residual=lambda x, own: (-own * x, [])))
 
-    def forecast(*given: Any) -> PredictiveDensity:
-        asked.append(given[6:])
-        return PredictiveDensity(0.0, (), *nothing)
+    def told(*given: Any) -> Forecast:
+        asked.append(given[5:])
+        return forecast(0.0)
 
-    for name, stand_in in {
-        "without": fitted(2.0),
-        "channel_rms": (np.ones(1), np.ones(1)),
-        "_apart": np.ones(1),
-        "_explained": 0.0,
-        "scatter": 1.0,
-        "_without": None,
-    }.items():
-        monkeypatch.setattr(module, name, lambda *_, x=stand_in: x)
-    monkeypatch.setattr(module, "without_its_curves", lambda found, *_: found)
-    monkeypatch.setattr(module, "forecast", forecast)
-    found: Any = SimpleNamespace(first=None, instruments=[10.0, 20.0])
-    (name,) = names(1)
-    name.channels = (0,)
-    whole = PredictiveDensity(1.0, (), *nothing)
-    train, held = [cast(Any, 1.0)], [cast(Any, 2.0)]
-    missed = module._missed(name, cast(Any, None), fitted(1.0), whole, found, train, held, {})
-    assert missed.gain == 1.0
+    monkeypatch.setattr(arms, "forecast", told)
+    found: Any = SimpleNamespace(last=SimpleNamespace(instruments=[10.0, 20.0]))
+    own, rest = (cast(Any, SimpleNamespace(model=None, fit=fitted(x))) for x in (1.0, 2.0))
+    nothing: Any = None
+    arm = arms.ArmRecordings(nothing, None, {}, cast(Any, [1.0]), cast(Any, [2.0]))
+    arm.forecast_without(found, nothing, own, rest)
     assert asked == [([-1.0 - 10.0, -2.0 - 20.0],)]
+
+
+def test_what_is_missed_is_told_where_the_two_models_differ_most(monkeypatch):
+    """Of the name's own channels, 0 and 2; its curves do not stand in for it."""
+    rows = iter([forecast(7.0), forecast(4.0)])
+    kind: Any = SimpleNamespace(
+        without=lambda found, fit, key: (fit, key),
+        forecast=lambda found, fit: next(rows),
+        forecast_without=lambda found, name, fit, rest: next(rows),
+        apart=lambda one, other: np.array([0.1, 0.9, 0.3]),
+        held=range(0),
+    )
+    monkeypatch.setattr(module, "without_its_curves", lambda *_: "without its curves")
+    monkeypatch.setattr(module, "scatter", lambda *_: 1.5)
+    (name,) = names(1)
+    name.channels = (0, 2)
+    missed = module.loss(kind, cast(Any, "with its curves"), name, cast(Any, "fit"), forecast(100.0))
+    assert (missed.gain, missed.sure, missed.size, missed.channel) == (3.0, 2.0, 0.3, 2)
+    assert missed.fit == ("fit", name.placed.key)
+
+
+@pytest.mark.parametrize(("size", "told"), [(0.0005, False), (0.002, True)])
+def test_what_is_smaller_than_any_models_error_is_not_told(size, told):
+    assert Loss(42.0, 1.0, size, 0, None).told is told

@@ -1,23 +1,32 @@
-"""What a search found: names with their rivals, and curves that no name explains."""
+"""What a search found: names with their rivals, and the last search with its curves that no name explains."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.model import Model, PlacedEffect
-from ..fitting.experiment import Experiment
-from ..fitting.fit import Fit
-from .arm import WeighedRecordings
-from .rival import RivalOdds
-from .search import MemberOdds, Search
+from ...models.model import PlacedEffect
+from ..evidence.search import MemberOdds, Search
+from ..evidence.weighed import WeighedRecordings
 
 Array = NDArray[np.float64]
+F = TypeVar("F")
+"""A fit of a kind of recording: a model with its values, and what the kind keeps beside them."""
 
 
 @dataclass(frozen=True)
-class ArmNaming:
+class RivalOdds:
+    """A rival of an effect: its posterior share in the same place, and whether recordings can tell the two apart."""
+
+    placed: PlacedEffect
+    probability: float
+    separable: bool
+
+
+@dataclass(frozen=True)
+class Naming:
     """An effect that the search named.
 
     ``gain`` is its log Bayes factor on the training recordings, ``share`` its posterior share among all possible
@@ -45,9 +54,9 @@ class Remainder:
 
 
 @dataclass(frozen=True)
-class ArmTrial:
-    """What one effect at one place explains by itself on top of the baseline: share of the residual energy of its
-    channels [0 to 1], and log posterior odds; ``smallest`` holds, by parameter, what would have been named."""
+class Trial:
+    """What one effect at one place explains by itself on top of a fit: share of the residual energy of its channels
+    [0 to 1], and log posterior odds; ``smallest`` holds, by parameter, what would have been named."""
 
     placed: PlacedEffect
     explained: float
@@ -56,35 +65,28 @@ class ArmTrial:
 
 
 @dataclass(frozen=True)
-class ArmSelection:
-    """The baseline's fit, the model with all names and its fit, and the recordings under these fits."""
+class Selection(Generic[F]):
+    """The fit of the model as given, the fit with all names, and the recordings under these fits."""
 
-    first: Fit
-    model: Model
-    fit: Fit
-    names: tuple[ArmNaming, ...]
-    trials: tuple[ArmTrial, ...]
+    first: F
+    last: F
+    names: tuple[Naming, ...]
+    trials: tuple[Trial, ...]
     """Before anything was found ..."""
-    closing: tuple[ArmTrial, ...]
+    closing: tuple[Trial, ...]
     """... and beside all that was."""
     opening: WeighedRecordings
     """The recordings under the first fit ..."""
     weighed: WeighedRecordings
-    """... and under the last."""
+    """... and under that of the last search, ``searched``."""
+    searched: F
+    search: Search
     slots: tuple[MemberOdds, ...]
     """Of the last search."""
-    search: Search
-    instruments: tuple[Experiment, ...]
     tolerance: float
-    tuned: Mapping[str, Array]
-    """Parameters of every law that rings, by its key, fitted by itself."""
 
     @property
     def nameless(self) -> dict[tuple[int, str], float]:
         """Sizes of the nameless curves of the last search, by channel and words."""
         pool = self.weighed.pool
-        return {
-            (pool[s.taken.hypothesis].label[0], pool[s.taken.hypothesis].label[1].words): s.taken.size
-            for s in self.slots
-            if not pool[s.taken.hypothesis].named
-        }
+        return {pool[s.taken.hypothesis].label: s.taken.size for s in self.slots if not pool[s.taken.hypothesis].named}

@@ -7,11 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from snarelab.identification.evidence import nearly
-from snarelab.identification.evidence.nearly import without_its_curves
+from snarelab.identification.decision import nearly
+from snarelab.identification.decision.nearly import without_its_curves
 
 SHAPE = np.array([[3.0, 4.0, 0.0], [0.0, 0.0, 5.0]])
 """What a name adds along three samples, and what it cannot."""
+
+KIND: Any = SimpleNamespace(residuals=lambda fit: [fit])
+"""One whose fit is what it leaves of one recording."""
 
 
 @dataclass(frozen=True)
@@ -28,9 +31,8 @@ def found(beside, own=1.0, channel=0) -> tuple[Found, Any, Any]:
     pool = [SimpleNamespace(named=False, label=(channel, None)), SimpleNamespace(named=True, label=None)]
     slots = tuple(SimpleNamespace(taken=SimpleNamespace(hypothesis=k, item=k, size=1.0)) for k in (0, 1))
     leaves = [np.stack([x * SHAPE[0], np.zeros(3)], 1) for x in (0.0, own)]
-    fits = [SimpleNamespace(theta=None, assembly=SimpleNamespace(residual=lambda *_, x=x: (x, []))) for x in leaves]
     search = SimpleNamespace(on=SimpleNamespace(added=lambda *_: beside))
-    return Found(SimpleNamespace(evidence=evidence, pool=pool), search, slots), fits[0], fits[1]
+    return Found(SimpleNamespace(evidence=evidence, pool=pool), search, slots), leaves[0], leaves[1]
 
 
 @pytest.fixture(autouse=True)
@@ -49,16 +51,16 @@ def amplitudes(monkeypatch):
 )
 def test_a_curve_goes_where_the_name_is_nearly_all(beside, kept):
     made, final, rest = found(beside)
-    left: Any = without_its_curves(made, (0,), final, rest, ["a recording"])  # pyright: ignore[reportArgumentType]
+    left: Any = without_its_curves(KIND, made, (0,), final, rest)  # pyright: ignore[reportArgumentType]
     assert [s.taken.hypothesis for s in left.slots] == ([0, 1] if kept else [1])
     assert (left is made) is kept
 
 
 def test_curves_of_other_channels_stay():
     made, final, rest = found(0.2 * SHAPE[0], channel=1)
-    assert without_its_curves(made, (0,), final, rest, ["a recording"]) is made  # pyright: ignore[reportArgumentType]
+    assert without_its_curves(KIND, made, (0,), final, rest) is made  # pyright: ignore[reportArgumentType]
 
 
 def test_a_name_that_adds_nothing_is_no_part_of_a_curve():
     made, final, rest = found(SHAPE[1], own=0.0)
-    assert without_its_curves(made, (0,), final, rest, ["a recording"]) is made  # pyright: ignore[reportArgumentType]
+    assert without_its_curves(KIND, made, (0,), final, rest) is made  # pyright: ignore[reportArgumentType]

@@ -1,8 +1,8 @@
 """The evidence of recordings of an arm: residuals along the motion as measured, columns along the instrument motion."""
 
 import functools
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,10 @@ from ...models.axes import neighbours, place
 from ...models.model import Model, PlacedEffect
 from ...recordings.condition import Motion
 from ..deciding import LEAST_LEVEL, TOLERANCES
+from ..evidence.evidence import Evidence, ResidualChannel
+from ..evidence.pool import CandidateColumns, Curves, Item
+from ..evidence.prior import pool
+from ..evidence.weighed import NuisanceColumns, WeighedRecordings, principal
 from ..fitting.assembly import TorqueModel
 from ..fitting.experiment import Experiment, Scales
 from ..fitting.fit import Fit
@@ -19,12 +23,9 @@ from ..nuisance.encoder import encoder_noise
 from ..nuisance.noise import Noise, NoiseChannel, learn
 from ..nuisance.rest import SETTLES, STICKS, share
 from ..search.candidates import library
-from .evidence import Evidence, ResidualChannel
-from .hypotheses import ColumnSource, Curves, curves, names
-from .nuisance_columns import NuisanceColumns, beside, regressor_columns
+from .hypotheses import ColumnSource, curves, names
+from .nuisance_columns import beside, regressor_columns
 from .periods import Periods, rough_noise
-from .pool import CandidateColumns, Hypothesis, Item
-from .prior import pool
 
 Array = NDArray[np.float64]
 
@@ -36,26 +37,6 @@ STILL = 0.03
 
 STRONGEST = 40
 """Directions of all that could explain a channel beside which its noise is learnt."""
-
-
-@dataclass(frozen=True)
-class WeighedRecordings:
-    """Recordings under a fit, ready to be searched: the training recordings come first."""
-
-    evidence: Evidence
-    pool: tuple[Hypothesis, ...]
-    noises: tuple[Noise, ...]
-    beside: NuisanceColumns
-    scale: Array
-    n_train: int
-    runs: list[list[NoiseChannel]]
-    bare: Callable[[int], Noise]
-    """A channel's noise where nothing is missing."""
-
-    def with_noise(self, c: int, noise: Noise, alone: Evidence) -> "WeighedRecordings":
-        """These recordings with another noise of one channel; ``alone`` is the channel's evidence under that noise."""
-        noises = tuple(noise if k == c else x for k, x in enumerate(self.noises))
-        return replace(self, evidence=self.evidence.with_channel(c, alone), noises=noises)
 
 
 def torque_scale(train: Sequence[Experiment]) -> Array:
@@ -251,13 +232,3 @@ def _noise(
     own = [row[channel] for row in runs[:n]]
     left = [r[:, channel] for r in residuals[:n]]
     return learn(left, beside_all([*laws, *small]), own, freely=bool(named), channels=len(runs[0]))
-
-
-def principal(parts: Sequence[Array], most: int) -> list[Array]:
-    """Principal directions of columns that are scaled to unit RMS; the directions have unit RMS too."""
-    whole = np.concatenate(list(parts))
-    size = np.sqrt(np.mean(whole**2, axis=0))
-    use = size > 1e-9 * size.max(initial=1e-300)
-    u, d, _ = np.linalg.svd(whole[:, use] / size[use], full_matrices=False)
-    kept = u[:, (np.arange(len(d)) < most) & (d > 1e-3 * d.max(initial=0.0))] * np.sqrt(len(u))
-    return np.split(kept, np.cumsum([len(p) for p in parts])[:-1])

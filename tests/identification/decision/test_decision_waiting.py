@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 from explained import Explained, white
 
-from snarelab.identification.evidence import hypotheses, rounds
+from snarelab.identification.arms import hypotheses
+from snarelab.identification.decision.search import _taken_out
 from snarelab.identification.evidence.evidence import ResidualChannel
 from snarelab.identification.evidence.pool import CandidateColumns
 
 
-def weighed(residual: float, n_train=1) -> Any:
-    """One channel of unit white noise and the same residual everywhere, in two recordings."""
+def weighed(n_train: int) -> tuple[Any, int]:
+    """One channel of unit white noise in two recordings."""
     made = white(np.random.default_rng(0), 1, {})
     own = made.pieces[0][0]
-    n = len(own.residual)
-    piece = ResidualChannel(np.full(n, residual), own.covariance, own.index, own.columns)
+    piece, n = ResidualChannel(own.residual, own.covariance, own.index, own.columns), len(own.residual)
     columns = CandidateColumns([n, n])
     columns.add({0: [np.ones((n, 1))] * 2})
     evidence = Explained([[piece], [piece]], columns, made.items, 0).evidence()
@@ -26,10 +26,10 @@ def weighed(residual: float, n_train=1) -> Any:
 
 @pytest.mark.parametrize("n_train", [1, 2])
 def test_laws_took_half_the_energy_that_they_took_out_in_units_of_the_noise(n_train):
-    before, n = weighed(3.0, n_train)
-    now, _ = weighed(1.0, n_train)
-    assert rounds._error_of_laws(before, now) == pytest.approx(0.5 * (9 - 1) * n * n_train)
-    assert rounds._error_of_laws(now, before) == pytest.approx(0.0)  # a fit that leaves more took nothing
+    made, n = weighed(n_train)
+    kind: Any = Made(residuals=lambda left: [np.full((n, 1), left)] * n_train)
+    assert _taken_out(kind, 3.0, 1.0, made) == pytest.approx(0.5 * (9 - 1) * n * n_train)
+    assert _taken_out(kind, 1.0, 3.0, made) == pytest.approx(0.0)  # a fit that leaves more took nothing
 
 
 def test_a_late_law_is_told_by_its_derivatives():

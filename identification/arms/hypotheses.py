@@ -13,17 +13,17 @@ from ...errors import InputError
 from ...models.effect import Effect
 from ...models.model import Model, PlacedEffect
 from ..deciding import BENDS, SLOPE
+from ..evidence.pool import CandidateColumns, Curves, Item
+from ..evidence.prior import parts_of
 from ..fitting.assembly import TorqueEvaluation, TorqueModel
 from ..fitting.experiment import Experiment, Scales
 from ..fitting.periodogram import Peaks
 from ..nuisance.curve import SMALL, Coordinates, family
 from ..nuisance.start import free_responses, springs_back
 from ..search.candidates import MOST_OF_WHOLE, EffectVariant, candidate_columns, library, reduced, variants
-from .pool import CandidateColumns, Item
 from .whole_mass import by_mass
 
 Array = NDArray[np.float64]
-Curves = Mapping[tuple[int, str], Item]
 
 MOST_GRID = 16
 """Points of a grid over several shapes, or of a law with hidden state, that are tried."""
@@ -81,7 +81,7 @@ def curves(
             k = own[0].shape[1]
             size = float(np.sqrt(np.mean(np.concatenate([(x**2).sum(axis=1) for x in own[:n]])))) or 1.0
             spread = np.full(k, along.scale[c] / size)
-            found[c, curve.words] = Item(columns.add({c: own}), spread, np.zeros(k, bool), label=(c, curve))
+            found[c, curve.words] = Item(columns.add({c: own}), spread, np.zeros(k, bool), label=(c, curve.words))
     return found
 
 
@@ -103,12 +103,6 @@ def names(
         if items:
             found[p.key] = (p, items)
     return found
-
-
-def parts_of(p: PlacedEffect) -> frozenset[str]:
-    """Keys of the laws of which a whole law is another way to write the sum; none of any other law."""
-    whole = p.effect.at == "joint" and len(p.effect.contains) > 1
-    return frozenset(f"{x}.{p.at}" for x in p.effect.contains) if whole else frozenset()
 
 
 def _items(along: ColumnSource, p: PlacedEffect, by_words: Curves, columns: CandidateColumns) -> list[Item]:

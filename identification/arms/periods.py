@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from ...models.model import PlacedEffect
+from ..evidence.weighed import NuisanceColumns
 from ..fitting.periodogram import Peaks
 from ..fitting.wave_lengths import wave_peaks
 from ..nuisance.covariance import Covariance
 from ..nuisance.noise import Noise, NoiseChannel
 from .hypotheses import ColumnSource
-from .nuisance_columns import NuisanceColumns
 
 Array = NDArray[np.float64]
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from snarelab.identification.arms import nuisance_columns
 from snarelab.identification.deciding import LAW_ERROR
-from snarelab.identification.evidence import nuisance_columns
 from snarelab.identification.fitting.assembly import TorqueModel
 from snarelab.identification.fitting.experiment import Experiment, scales
 from snarelab.identification.nuisance.curve import TURNING, Coordinates, over_decades
