@@ -42,7 +42,8 @@ def left(folder: Path, model: Path, band: float, *, refit: bool) -> dict[str, fl
     folder : Path
         Of the case: ``train.csv`` and ``third.csv``.
     model : Path
-        Its file; without ``refit`` every parameter has its value there, and they are used as they are.
+        Its file. Without ``refit`` its values are used as they are, if every parameter has one: where the recordings
+        are at fault nothing was fitted, and the model is the one as given.
     band : float
         [Hz]
     refit : bool
@@ -53,7 +54,7 @@ def left(folder: Path, model: Path, band: float, *, refit: bool) -> dict[str, fl
     train = load_experiments(read, [folder / "train.csv"], body, band)
     last = load_experiments(read, [folder / NAME], body, train[0].motion.band)
     assembly = TorqueModel(read.tree, read.effects, None, scales(train), read.values)
-    if refit:
+    if refit or any(s.key not in read.values for s in assembly.slots):
         theta: NDArray = fit(assembly, fitted(assembly, train)).theta
     else:
         theta = np.array([read.values[s.key] for s in assembly.slots])
