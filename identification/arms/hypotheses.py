@@ -333,3 +333,9 @@ def _reads(effect: Effect) -> set[str]:
     parameters = {p.name: ca.SX.sym(f"parameter {p.name}") for p in effect.parameters}
     laws = [effect.law(signals, parameters), *(effect.rate(signals, parameters) if effect.rate else ())]
     return {x.name() for law in laws for x in ca.symvar(law)}
+
+
+def shapes(assembly: TorqueModel) -> NDArray[np.bool_]:
+    """Parameters that the torque is not linear in (P,)."""
+    shapes = {(p.effect.name, p.at, x.name) for p in assembly.placed for x in p.effect.parameters if x.grid}
+    return np.array([(s.effect, s.at, s.name) in shapes for s in assembly.slots], bool)

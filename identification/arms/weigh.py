@@ -24,7 +24,7 @@ from ..nuisance.noise import Noise, NoiseChannel, learn
 from ..nuisance.rest import SETTLES, STICKS, share
 from ..search.candidates import library
 from .hypotheses import ColumnSource, curves, names
-from .nuisance_columns import beside, regressor_columns
+from .nuisance_columns import columns_beside
 from .periods import Periods, rough_noise
 
 Array = NDArray[np.float64]
@@ -92,7 +92,7 @@ def weigh(
     columns = CandidateColumns([len(e.measured) for e in experiments])
     nameless = nameless or {}
     by_words = curves(along, columns, small=not search, more={words for _, words in nameless})
-    others = beside(along, found, by_words, columns, nameless)
+    others = columns_beside(along, found, by_words, columns, nameless)
     residuals = residuals or [assembly.residual(e, found.theta)[0] for e in experiments]
     if runs is None:
         runs = _runs(model, found, experiments, residuals, n_train, along.scale)
@@ -222,10 +222,8 @@ def _noise(
 
     def beside_all(chosen: Sequence[int]) -> list[Array]:
         parts = []
-        for i, e in enumerate(along.instruments[:n]):
-            own = [others.baseline[i][channel][1], columns.some(i, channel, np.array(chosen, int))]
-            if along.assembly.base is None:
-                own.append(regressor_columns(e, channel)[1])
+        for i in range(n):
+            own = [others.noise_beside[i][channel], columns.some(i, channel, np.array(chosen, int))]
             parts.append(np.concatenate(own, axis=1))
         return principal(parts, STRONGEST)
 

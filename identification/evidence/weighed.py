@@ -24,8 +24,8 @@ class NuisanceColumns:
     parts: list[list[Part]]
     count: int
     tolerant: slice
-    baseline: list[list[Part]]
-    """The baseline's own columns, in units of the parameters."""
+    noise_beside: list[list[Array]]
+    """Columns (n, k) of recording i and channel c beside which the noise is learnt, of any size."""
     spread: Array
     """Prior deviation of each of the baseline's parameters about its fit (P,), the first columns' unit."""
     more: tuple[float, ...] = ()

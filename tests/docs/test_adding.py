@@ -1,4 +1,4 @@
-"""The guides "Add an effect" and "Add a participant": one new file each, as the page has it, and no edit."""
+"""The guides "Add an effect", "... a nuisance", "... a participant": one new file each, as the page has it, no edit."""
 
 import json
 import os
@@ -103,6 +103,37 @@ def test_an_effect_is_one_file(copied, tmp_path):
     if not compiler:
         pytest.skip("no C compiler: the effect in an FMU was not tried")
     assert fmu_torque(tmp_path / "new.fmu", truth) == pytest.approx(truth["tau"], abs=0.01 * size)
+
+
+def shaken(path, sines, seed, phase):
+    """The turntable with Coulomb friction of 0.06 N·m, and a pump that shakes it at 7 Hz with 0.3 N·m."""
+    record(path, sines, seed)
+    table = pd.read_csv(path)
+    t, q = table["time"], table["q.yaw"]
+    pump = 0.3 * np.sin(2 * np.pi * 7.0 * t + phase)
+    table["tau.yaw"] += 0.06 * np.tanh(np.gradient(q, t) / 1e-3) - 0.8 * q**3 + pump
+    table.to_csv(path, index=False)
+
+
+def test_a_nuisance_is_one_file(copied, tmp_path):
+    """As it is, the package takes the pump for noise that hides the friction; with the guide's file it does not."""
+    package, run = copied
+    (source,) = blocks("adding-a-nuisance.md", "python")
+    (tmp_path / "table.urdf").write_text(TURNTABLE)
+    (tmp_path / "table.toml").write_text('urdf = "table.urdf"\neffects = ["viscous_friction"]\n')
+    shaken(tmp_path / "train.csv", [(0.9, 0.7), (0.5, 2.3), (0.1, 7.0)], 1, 0.3)
+    shaken(tmp_path / "hold.csv", [(0.7, 1.1), (0.6, 1.9), (0.15, 5.0)], 2, 2.1)
+
+    def told() -> tuple[str, dict[str, float]]:
+        run(["diagnose", "table.toml", "train.csv", "--holdout", "hold.csv", "--json", "found.json"])
+        found = json.loads((tmp_path / "found.json").read_text())
+        return found["verdict"], {e["name"]: e["parameters"]["level"]["value"] for e in found["effects"]}
+
+    assert told() == ("adequate", {})
+    (package / "identification" / "arms" / "beside" / "pump.py").write_text(source, encoding="utf-8")
+    verdict, levels = told()
+    assert verdict == "missing_physics"
+    assert levels == {"coulomb_friction": pytest.approx(0.06, abs=0.01)}
 
 
 def fmu_torque(path, motion):

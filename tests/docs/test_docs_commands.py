@@ -42,6 +42,7 @@ NOT_RUN_PYTHON = {
     "cluster.md": "needs a cluster",
     "tolerance.md": "simulate stands for the reader's own",
     "adding-an-effect.md": "test_adding.py puts it into a package",
+    "adding-a-nuisance.md": "test_adding.py puts it into a package",
     "adding-a-participant.md": "test_adding.py",
     "study-free-floating.md": "the robot is the reader's own",
     "study-orbit.md": "a minute of co-simulation",

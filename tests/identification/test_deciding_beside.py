@@ -9,6 +9,7 @@ from explained import Explained
 from moved_numbers import FACTORS, about, move, planted, smallest
 
 from snarelab.identification.arms import nuisance_columns
+from snarelab.identification.arms.beside import curves
 from snarelab.identification.evidence import tolerant
 from snarelab.identification.evidence.evidence import ResidualChannel
 from snarelab.identification.evidence.pool import Hypothesis
@@ -20,7 +21,7 @@ from snarelab.models.model import PlacedEffect
 def spread(monkeypatch, theta=2.0, shape=False) -> float:
     """Prior deviation of a parameter that makes a tenth of its channel's torque a unit."""
     found: Any = SimpleNamespace(theta=np.array([theta]), assembly=None)
-    monkeypatch.setattr(nuisance_columns, "_shapes", lambda _: np.array([shape]))
+    monkeypatch.setattr(nuisance_columns, "shapes", lambda _: np.array([shape]))
     baseline = [[(np.zeros(1, int), np.ones((5, 1)))]]
     return float(nuisance_columns._spread(found, baseline, np.array([10.0]))[0])
 
@@ -48,7 +49,7 @@ def small(own_share: float) -> dict[tuple[int, str], float]:
         placed=(placed,), index_of=lambda _: [0], joint_of=lambda _: 0, slots=[
             SimpleNamespace(effect="viscous_friction", at="joint1", name="coefficient")])  # fmt: skip
     found: Any = SimpleNamespace(theta=np.array([own_share]), assembly=assembly)
-    return nuisance_columns._small(found, [[(np.zeros(1, int), 10 * np.ones((5, 1)))]], np.array([10.0]))
+    return curves._sizes(found, [[(np.zeros(1, int), 10 * np.ones((5, 1)))]], np.array([10.0]))
 
 
 def test_small_curves_stand_beside_everything(monkeypatch):

@@ -55,7 +55,7 @@ def test_odds_of_a_wander_are_those_of_all_channels_together(monkeypatch, count)
     monkeypatch.setattr(arm, "learn", lambda *_, channels, **__: channels)
     motion: Any = SimpleNamespace(assembly=SimpleNamespace(base="free"), instruments=["a recording"], n_train=1)
     column = np.ones((4, 1))
-    others: Any = SimpleNamespace(baseline=[[(None, column)] * count])
+    others: Any = SimpleNamespace(noise_beside=[[column] * count])
     columns: Any = SimpleNamespace(some=lambda *_: column)
     runs: Any = [["a channel"] * count]
     assert arm._noise(0, motion, [np.zeros((4, count))], runs, others, {}, {}, columns) == count

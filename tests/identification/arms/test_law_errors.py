@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from snarelab.identification.arms import nuisance_columns
+from snarelab.identification.arms.beside.force import error_of_force
 from snarelab.identification.deciding import LAW_ERROR
 from snarelab.identification.fitting.assembly import TorqueModel
 from snarelab.identification.fitting.experiment import Experiment, scales
@@ -57,7 +57,7 @@ def test_error_of_a_slide_s_friction_is_felt_before_the_slide_in_proportion(turn
     bare = TorqueModel(turning.body.tree, [], None, scales([turning]), {})
     law = assembly.torque(turning, assembly.start) - bare.torque(turning, bare.start)
     along: Any = SimpleNamespace(instruments=[turning], n_train=1, coordinates=lambda c: [coordinates(turning, c)])
-    (errors,) = nuisance_columns._error_of_force(along, found, placed)
+    (errors,) = error_of_force(along, found, placed)
     assert [c for c, _ in errors] == [0, 2, 3]
     rms = np.sqrt(np.mean(turning.motion.to_band(law)[:, JOINT] ** 2))
     for c, x in errors:

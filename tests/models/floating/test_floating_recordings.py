@@ -8,7 +8,7 @@ import xarray as xr
 
 from bench.drake_servicer import model
 from snarelab.errors import InputError
-from snarelab.identification.arms.nuisance_columns import regressor_columns
+from snarelab.identification.arms.beside.masses import regressor_columns
 from snarelab.identification.arms.whole_mass import by_mass
 from snarelab.identification.diagnose import diagnose
 from snarelab.identification.fitting.assembly import TorqueModel
