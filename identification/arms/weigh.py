@@ -20,7 +20,8 @@ from ..fitting.experiment import Experiment, Scales
 from ..fitting.fit import Fit
 from ..nuisance.curve import SMALL
 from ..nuisance.encoder import encoder_noise
-from ..nuisance.noise import Noise, NoiseChannel, learn
+from ..nuisance.learn import learn
+from ..nuisance.noise import Noise, NoiseChannel
 from ..nuisance.rest import SETTLES, STICKS, share
 from ..search.candidates import library
 from .hypotheses import ColumnSource, curves, names

@@ -16,7 +16,8 @@ from ..evidence.projected import ProjectedEvidence
 from ..evidence.search import Search
 from ..evidence.weighed import NuisanceColumns, WeighedRecordings, principal
 from ..nuisance.curve import SMALL
-from ..nuisance.noise import Noise, learn
+from ..nuisance.learn import learn
+from ..nuisance.noise import Noise
 from .fit import Covariances, fit, priors
 from .source import GridPoint, Linearisation, ModelPoint, Source
 

@@ -12,7 +12,8 @@ from near_rest_of import near_rest
 from snarelab.identification.arms import weigh as arm
 from snarelab.identification.nuisance import rest
 from snarelab.identification.nuisance.bursts import bursts
-from snarelab.identification.nuisance.noise import NoiseChannel, learn
+from snarelab.identification.nuisance.learn import learn
+from snarelab.identification.nuisance.noise import NoiseChannel
 from snarelab.identification.nuisance.rest import Zone
 
 

@@ -1,7 +1,7 @@
 """What stands beside every explanation of an arm's torques, one file each, found by folder.
 
-A module here whose name does not start with an underscore ends in a function ``blocks(context)``: columns that may be in
-the residual whatever is missing, in units of their prior deviation. A new nuisance is a new file; nothing else lists
+A module here whose name does not start with an underscore ends in a function ``blocks(context)``: columns that may be
+in the residual whatever is missing, in units of their prior deviation. A new nuisance is a new file; nothing else lists
 it.
 """
 

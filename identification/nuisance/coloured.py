@@ -1,0 +1,48 @@
+"""White noise and noise of first order, beside the settling near rest: what is fast, learnt from a stretch.
+
+    K = w² I + a² e^(-|d|/τ)
+
+Sensors, quantisation, cogging of a motor and structures that ring leave a residual that remembers milliseconds.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..deciding import WANDER_TIMES
+from .likelihood import cost, lowest, side_by_side
+from .noise import Noise, NoiseChannel
+
+Array = NDArray[np.float64]
+
+STRETCH = 800
+"""Samples that the fast scales are learnt from."""
+
+
+def fast_scales(
+    residuals: Sequence[Array], columns: Sequence[Array], runs: Sequence[NoiseChannel], freely: bool
+) -> Noise:
+    """Scales of the fast noise, without a wander; arguments as in `learn.learn`."""
+    whole = np.concatenate(list(residuals))
+    size, most = float(np.std(whole)) + 1e-12, float(np.sqrt(np.mean(whole**2))) + 1e-12
+    stretch = [slice(0, min(len(r), max(STRETCH // len(runs), 100))) for r in residuals]
+    parts = [
+        # Whatever is slow there is no matter of the fast scales.
+        (side_by_side(r[rows], c[rows]), replace(run.some(rows), wanders=1.0))
+        for r, c, run, rows in zip(residuals, columns, runs, stretch, strict=True)
+    ]
+
+    def fast(x: Array) -> tuple[Noise, float]:
+        white, coloured, time, settling, slow = np.exp(x[:5])
+        scales = float(white) + 1e-3 * size, float(coloured), float(time), float(slow), WANDER_TIMES[-1]
+        return Noise(*scales, float(settling)), most if freely else float(np.exp(x[5]))
+
+    start = np.log([0.3 * size, 0.3 * size, 0.1, 0.2 * size, size, 0.1 * size])
+    wide = np.array([1.5, 1.5, 1.0, 2.0, 2.0, 2.0])
+    low, high = start - 6, start + np.array([2.0, 2.0, 1.6, 3.0, 2.0, 3.0])
+    low[2] = np.log(0.02)
+    own = slice(0, 5 if freely else 6)
+    found, _ = fast(lowest(lambda x: cost(fast(x), parts), start[own], wide[own], low[own], high[own]))
+    return found
