@@ -37,19 +37,18 @@ def search(
     progress : callable
         Told in a few words what is under way.
     """
-    first = here = kind.first(progress) if before is None else before.first
-    opening = None if before is None else before.opening
-    changed = set() if opening is None else _reached_by(opening, barred)
+    first = here = under = kind.first(progress) if before is None else before.first
+    weighed = opening = None if before is None else before.opening
+    changed = set() if weighed is None else _reached_by(weighed, barred)
     names: list[Naming] = []
     tried: tuple[Trial, ...] = () if before is None else before.trials
-    weighed: WeighedRecordings | None = None
     barred = set(barred)
     for number in range(1, ROUNDS + 1):
         progress(f"round {number}: comparing each effect at each place")
-        known, under = weighed, here
-        weighed = opening if opening is not None and known is None else kind.weighed(here, known, anew=True)
-        if before is None or known is not None:
+        if weighed is None or number > 1:
+            known, weighed = weighed, kind.weighed(here, weighed, anew=True)
             changed |= {c for c, x in enumerate(weighed.noises) if known is None or x is not known.noises[c]}
+        under = here
         weighed, made, slots, tolerance = searched(weighed, kind.train, barred, changed)
         opening = opening or weighed
         tried = tried or trials(kind, made)
