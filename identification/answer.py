@@ -51,7 +51,7 @@ def report_on(
     ----------
     model : Model
         Baseline.
-    decided : ArmDecision
+    decided : Decision
         Verdict, names, nameless curves, and what was not confirmed.
     final : Fit
         With the confirmed effects.

@@ -248,7 +248,7 @@ class Diagnosis:
     model : str
         Model's name.
     effects : tuple of Finding
-        Of torques in order of what the held-out recordings lose without each; otherwise in the search's order.
+        Ordered by how much of the held-out recordings each explains.
     location : tuple of Location
     fit : tuple of ChannelFit
     steps : tuple of Step

@@ -11,7 +11,7 @@ from ...models.model import PlacedEffect
 from ..deciding import TOLERANCES
 from ..decision.kind import Chosen, Forecast
 from ..decision.selection import Naming, Selection
-from ..evidence.evidence import Item
+from ..evidence.pool import Item
 from ..evidence.projected import ProjectedEvidence
 from ..evidence.search import MemberOdds, Search
 from ..evidence.weighed import WeighedRecordings
@@ -32,7 +32,14 @@ Array = NDArray[np.float64]
 class SourceFit:
     """A model fitted to the training recordings, and the held-out ones linearised about it.
 
-    ``shifted``: the shifts' columns that all fits keep; ``like``: a fit whose columns of the held-out recordings serve.
+    Parameters
+    ----------
+    source : Source
+    train : Linearisation
+    shifted : list of array (n, c, S), or None
+        The shifts' columns of the training recordings, where all fits keep those of the first.
+    like : SourceFit, optional
+        One whose shifts' columns of the held-out recordings this fit keeps.
     """
 
     source: Source
@@ -56,7 +63,7 @@ class SourceFit:
 
 @dataclass(frozen=True, eq=False)
 class SourceRecordings:
-    """Recordings of a source; ``given``: the model as given."""
+    """Recordings of a source, and the model as ``given``."""
 
     source: Source
     given: ModelPoint
