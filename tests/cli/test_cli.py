@@ -173,8 +173,8 @@ def test_every_holdout_of_diagnose_is_held_out_and_the_same_again_is_refused(cap
     table(3).to_csv("third.csv", index=False)
     seen = []
 
-    def decide(model, base, scales, train, held, **_):
-        seen.append([Path(e.motion.path).name for e in held])
+    def decide(recordings, _):
+        seen.append([Path(e.motion.path).name for e in recordings.held_out])
         raise InputError("far enough")
 
     monkeypatch.setattr(diagnosing, "decide", decide)
