@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from ...models.model import Model, PlacedEffect
 from ..deciding import DRIVEN
 from ..decision.kind import Chosen, Forecast
-from ..decision.search import all_large
 from ..decision.selection import Naming, Selection
 from ..evidence.members import log_bayes
 from ..evidence.projected import ProjectedEvidence
@@ -25,8 +24,9 @@ from ..search.refit import assemble, refitted, without
 from ..search.rest import fitted
 from .blocks import blocks
 from .bursts import bursts_of
+from .choice import together
 from .forecast import along_instruments, forecast, known_to
-from .hypotheses import remembers, rings
+from .hypotheses import rings
 from .weigh import weigh
 
 Array = NDArray[np.float64]
@@ -140,16 +140,8 @@ class ArmRecordings:
         return weigh(fit.model, fit.fit, self.every, fit.instruments, n, self.scales, noises, tuned=fit.tuned)
 
     def chosen(self, made: Search, slots: Sequence[MemberOdds], large: Sequence[MemberOdds]) -> list[Chosen]:
-        """All large names together, for torques are linear in most; but what rings or lags explains little before its
-        frequency is fitted: nothing is judged beside it."""
-        news = all_large(made, slots, large)
-        if not news:
-            return []
-        alone = made.scan([]).odds
-        leading = max(news, key=lambda s: alone[s.taken.hypothesis])
-        if remembers(made.pool[leading.taken.hypothesis].label):
-            news = [leading]
-        return [(s, slots) for s in news]
+        """All large names together."""
+        return together(made, slots, large)
 
     def started(
         self, fit: ArmFit, made: Search, slot: MemberOdds, amplitudes: Array

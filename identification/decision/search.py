@@ -1,6 +1,6 @@
 """Search, fit what was found jointly, and search again for what is still missing."""
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,13 +101,3 @@ def _reached_by(weighed: WeighedRecordings, keys: Collection[str]) -> set[int]:
     """Channels that some hypotheses reach."""
     evidence = weighed.evidence
     return {c for h in weighed.pool if h.key in keys for x in h.items for c in evidence.reached(x)}
-
-
-def all_large(made: Search, slots: Sequence[MemberOdds], large: Sequence[MemberOdds]) -> list[MemberOdds]:
-    """The names that add more than the error of the laws that are not fitted yet; else all the large ones.
-
-    What adds less waits until these are.
-    """
-    least = LAW_ERROR**2 * made.members([s.taken for s in slots]).value
-    named = [s for s in large if made.pool[s.taken.hypothesis].named]
-    return [s for s in named if s.gain >= least] or named
