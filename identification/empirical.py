@@ -57,16 +57,15 @@ def empirical_laws(
         at = joints[c].name
         if any(p.effect.name == NAME and p.at == at for p in final.assembly.placed):
             continue
-        # Tables that are not confirmed together may be without the least of them.
-        while wanted:
-            tables, values = _tables(decided, final, train, c, wanted, named)
+        # Tables that are not confirmed together may be without the least of them, or by themselves.
+        for some in (*(wanted[:k] for k in range(len(wanted), 0, -1)), *([x] for x in wanted[1:])):
+            tables, values = _tables(decided, final, train, c, some, named)
             other = _refitted(final, placed_tables(at, tables), values, train, named)
             gain, sure = _confirmed(decided, final, other, train, held, c)
             if sure > GATE:
                 final = other
                 found.append(EmpiricalLaw(at, tables, values, gain, sure))
                 break
-            wanted.pop()
     return final, tuple(found)
 
 

@@ -62,7 +62,7 @@ def noise_words(unit: str, noise: Noise, encoders: Sequence[NDArray[np.float64]]
     heard = float(np.sqrt(np.mean(np.concatenate(encoders) ** 2)))
     parts = [
         f"{noise.white:.2g} {u} from sample to sample",
-        f"{noise.coloured:.2g} {u} over {noise.coloured_time:.2g} s",
+        f"{noise.coloured:.2g} {u} over {noise.coloured_time:.2g} s{' (smooth)' if noise.order == 2 else ''}",
         f"a wander of {noise.wander:.2g} {u} over {noise.wander_time:.2g} s",
         f"{heard:.2g} {u} of the encoders",
     ]

@@ -1,8 +1,10 @@
-"""White noise and noise of first order, beside the settling near rest: what is fast, learnt from a stretch.
+"""White noise and noise of first or second order, beside the settling near rest: what is fast, learnt from a stretch.
 
-    K = w² I + a² e^(-|d|/τ)
+    K = w² I + a² e^(-|d|/τ)    or    w² I + a² (1 + |d|/τ) e^(-|d|/τ), approximately
 
-Sensors, quantisation, cogging of a motor and structures that ring leave a residual that remembers milliseconds.
+Of sensors, quantisation and cogging a residual remembers milliseconds, and is rough. Structures, and disturbances that
+reach a drive through a structure or a servo, leave one without high frequencies: it is smooth. Noise of first order
+would take a smooth one for a walk without an end, which wander and physics then share. The likelier order is taken.
 """
 
 from collections.abc import Sequence
@@ -16,6 +18,9 @@ from .likelihood import cost, lowest, side_by_side
 from .noise import Noise, NoiseChannel
 
 Array = NDArray[np.float64]
+
+ORDERS = (1, 2)
+"""Lags in a row."""
 
 STRETCH = 800
 """Samples that the fast scales are learnt from."""
@@ -34,15 +39,19 @@ def fast_scales(
         for r, c, run, rows in zip(residuals, columns, runs, stretch, strict=True)
     ]
 
-    def fast(x: Array) -> tuple[Noise, float]:
+    def fast(x: Array, order: int) -> tuple[Noise, float]:
         white, coloured, time, settling, slow = np.exp(x[:5])
         scales = float(white) + 1e-3 * size, float(coloured), float(time), float(slow), WANDER_TIMES[-1]
-        return Noise(*scales, float(settling)), most if freely else float(np.exp(x[5]))
+        return Noise(*scales, float(settling), order=order), most if freely else float(np.exp(x[5]))
 
     start = np.log([0.3 * size, 0.3 * size, 0.1, 0.2 * size, size, 0.1 * size])
     wide = np.array([1.5, 1.5, 1.0, 2.0, 2.0, 2.0])
     low, high = start - 6, start + np.array([2.0, 2.0, 1.6, 3.0, 2.0, 3.0])
-    low[2] = np.log(0.02)
     own = slice(0, 5 if freely else 6)
-    found, _ = fast(lowest(lambda x: cost(fast(x), parts), start[own], wide[own], low[own], high[own]))
-    return found
+    tried = []
+    for order in ORDERS:
+        # What is smooth may be faster, as two lags take more away, and slower, as it is no wander.
+        low[2], high[2] = np.log(0.02 / order), np.log(0.5 * order)
+        x = lowest(lambda x, order=order: cost(fast(x, order), parts), start[own], wide[own], low[own], high[own])
+        tried.append((cost(fast(x, order), parts), order, fast(x, order)[0]))
+    return min(tried, key=lambda t: t[:2])[2]

@@ -1,12 +1,13 @@
 """Covariance of a channel's residual: independent noise, processes that remember, and noise of a second derivative.
 
-    K = diag(variance) + sum_s level_s² exp(-|t - t'| / time_s) + diag(b) T diag(b)
+    K = diag(variance) + sum_s level_s² c_s(|t - t'| / time_s) + diag(b) T diag(b)
 
-with T the covariance of (e_t - 2 e_t-1 + e_t-2) / √6.
+with c(x) = e^(-x) of a first-order lag, (1 + x) e^(-x) of two in a row (Matérn 3/2; Rasmussen and Williams 2006,
+chapter 4), and T the covariance of (e_t - 2 e_t-1 + e_t-2) / √6.
 
-Every remembering process is an autoregression of first order on the band's even clock, so that with the hidden values
-x (all processes and e, sample by sample) K = D + H Q⁻¹ H' with a banded precision Q (Särkkä and Solin 2019, chapter
-12). By Woodbury's identity K⁻¹ and log det K then cost O(n), not O(n³).
+Every remembering process is an autoregression of first or second order on the band's even clock, so that with the
+hidden values x (all processes and e, sample by sample) K = D + H Q⁻¹ H' with a banded precision Q (Särkkä and Solin
+2019, chapter 12). By Woodbury's identity K⁻¹ and log det K then cost O(n), not O(n³).
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -26,12 +27,13 @@ _FACTORISE, _DIVIDE, _DIVIDE_BY_ROOT = get_lapack_funcs(("pbtrf", "pbtrs", "tbtr
 
 
 @dataclass(frozen=True)
-class FirstOrderNoise:
-    """A process of first order: standard deviation ``level``, one number or one a sample (n,), and correlation
-    ``time`` [s]."""
+class LaggedNoise:
+    """White noise through a lag, or through two in a row (``order`` 2; its spectrum falls with f⁴): standard deviation
+    ``level``, one number or one a sample (n,), and the lag's ``time`` [s]."""
 
     level: "float | Array"
     time: float
+    order: int = 1
 
 
 class Covariance:
@@ -41,7 +43,7 @@ class Covariance:
     ----------
     variance : array (n,)
         Of what is independent from sample to sample; positive.
-    processes : sequence of FirstOrderNoise
+    processes : sequence of LaggedNoise
     derivative : array (n,) or None
         Standard deviation b of noise that is a second difference; None or zeros: there is none.
     step : float
@@ -53,7 +55,7 @@ class Covariance:
     def __init__(
         self,
         variance: Array,
-        processes: Sequence[FirstOrderNoise],
+        processes: Sequence[LaggedNoise],
         derivative: Array | None,
         step: float,
         segments: Sequence[slice],
@@ -66,20 +68,30 @@ class Covariance:
         times = [p.time for p in there]
         has = derivative is not None and bool(np.any(derivative > 0))
         self._width = width = (len(self._levels) + has) * bool(n)
+        self._orders = [p.order for p in there]
         self._log_det = float(np.sum(np.log(self._variance)))
         self._derivative = self._lagged(np.asarray(derivative, float), segments) if has else None
         if not width:
             return
-        first = np.zeros(n, bool)
+        first, second = np.zeros(n, bool), np.zeros(n, bool)
         first[[s.start for s in segments if s.stop > s.start]] = True
+        second[[s.start + 1 for s in segments if s.stop > s.start + 1]] = True
         self._first, self._decays = first, np.exp(-step / np.array(times))
-        band = np.zeros(((2 * width if has else width) + 1, n * width))
-        for s, time in enumerate(times):
-            decay = np.where(first, 0.0, np.exp(-step / time))  # from the sample before
-            news = 1 / (1 - decay**2)
+        band = np.zeros(((2 * width if has or 2 in self._orders else width) + 1, n * width))
+        for s, (decay, order) in enumerate(zip(self._decays, self._orders, strict=True)):
+            a, b, variance = _recursion(decay, order)
+            one, two = np.full(n, a), np.full(n, b)  # from the sample before, and from the one before that
+            news = np.full(n, 1 / variance)
+            begins = a / (1 - b)
+            one[second], two[second], news[second] = begins, 0.0, 1 / (1 - begins**2)
+            one[first], two[first], news[first] = 0.0, 0.0, 1.0
             band[0, s::width] += news
-            band[0, s::width][:-1] += (decay**2 * news)[1:]
-            band[width, s::width][:-1] -= (decay * news)[1:]
+            band[0, s::width][:-1] += (one**2 * news)[1:]
+            band[width, s::width][:-1] -= (one * news)[1:]
+            if order == 2:
+                band[0, s::width][:-2] += (two**2 * news)[2:]
+                band[width, s::width][:-2] += (one * two * news)[2:]
+                band[2 * width, s::width][:-2] -= (two * news)[2:]
             self._log_det -= float(np.sum(np.log(news)))
         if has:
             band[0, width - 1 :: width] += 1.0
@@ -191,11 +203,19 @@ class Covariance:
         """Maps (n, m + 1, m + 1) from what is predicted of m hidden values, and a sample, to what is predicted
         next, and the sample's innovation."""
         n, s = len(self._variance), len(self._levels)
-        weights = np.stack([*self._levels, *(self._derivative or ())], axis=1)
+        smooth = [k for k, order in enumerate(self._orders) if order == 2]
+        before = [np.zeros(n)] * len(smooth)
+        weights = np.stack([*self._levels, *before, *(self._derivative or ())], axis=1)
         d = weights.shape[1]
-        forward, start = np.zeros((d, d)), np.eye(d)
-        forward[:s, :s] = np.diag(self._decays)
-        news = np.diag(np.concatenate([1 - self._decays**2, np.zeros(d - s)]))
+        forward, start, news = np.zeros((d, d)), np.eye(d), np.zeros((d, d))
+        for k, (decay, order) in enumerate(zip(self._decays, self._orders, strict=True)):
+            a, b, news[k, k] = _recursion(decay, order)
+            forward[k, k] = a
+            if order == 2:
+                then = s + smooth.index(k)
+                forward[k, then], forward[then, k] = b, 1.0
+                start[k, then] = start[then, k] = a / (1 - b)
+        s += len(smooth)
         if d > s:  # e_t is new; the two before it move on
             forward[s + 1, s] = forward[s + 2, s + 1] = news[s, s] = 1.0
             start[s + 1 :, s + 1 :] = 0.0
@@ -217,3 +237,11 @@ class Covariance:
         """K itself (n, n); for tests."""
         n = len(self._variance)
         return np.asarray(np.linalg.inv(self.solve(np.eye(n))), float)
+
+
+def _recursion(decay: float, order: int) -> tuple[float, float, float]:
+    """Of a process of unit variance: its factors of the sample before and of the one before that, and the variance of
+    what is new."""
+    if order == 1:
+        return decay, 0.0, 1 - decay**2
+    return 2 * decay, -(decay**2), (1 - decay**2) ** 3 / (1 + decay**2)

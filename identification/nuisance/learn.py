@@ -43,5 +43,5 @@ def learn(
     odds = ODDS_OF_CURVES / channels
     size = float(np.std(np.concatenate(list(residuals)))) + 1e-12
     found = fast_scales(residuals, columns, runs, freely)
-    wander, time = level_and_time(residuals, columns, runs, freely, odds)
+    wander, time = level_and_time(residuals, columns, runs, found, freely, odds)
     return replace(found, wander=wander, wander_time=time, unit=size, odds=odds)

@@ -1,6 +1,6 @@
 """The noise of one channel: white, coloured, wandering, of the encoders, and of sticking near rest.
 
-    K = w² I + a² e^(-|d|/τa) + m v e^(-|d|/τv) v m + encoders + s F (I + e^(-|d|/τh)) s F + diag((s' g)²)
+    K = w² I + a² c(|d|/τa) + m v e^(-|d|/τv) v m + encoders + s F (I + e^(-|d|/τh)) s F + diag((s' g)²)
 
 Of white and coloured noise (`coloured`), of a level that wanders (`wander`), of the encoders (`encoder`), and of joints
 that stick and settle (`rest`). `learn` finds the scales.
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..deciding import ODDS_OF_CURVES, WANDER_PRIOR
-from .covariance import Covariance, FirstOrderNoise
+from .covariance import Covariance, LaggedNoise
 
 Array = NDArray[np.float64]
 
@@ -59,6 +59,8 @@ class Noise:
     """RMS of the residual that they were learnt from [T]."""
     width: int = 0
     """Which of the widths near rest."""
+    order: int = 1
+    """Of the coloured noise."""
     odds: float = ODDS_OF_CURVES
     """Prior odds that it wanders."""
 
@@ -71,10 +73,10 @@ class Noise:
         """K of a recording."""
         sticks = run.sticks[self.width]
         variance = self.white**2 + (run.level * sticks) ** 2 + (self.settling * run.settles) ** 2
-        held = FirstOrderNoise(run.level * sticks, HELD)
+        held = LaggedNoise(run.level * sticks, HELD)
         processes = [
-            FirstOrderNoise(self.coloured, self.coloured_time),
-            FirstOrderNoise(self.wander * run.wanders, self.wander_time),
+            LaggedNoise(self.coloured, self.coloured_time, self.order),
+            LaggedNoise(self.wander * run.wanders, self.wander_time),
             held,
         ]
         heard = np.any(run.encoder**2 >= NEGLIGIBLE * variance)

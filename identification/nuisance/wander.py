@@ -7,6 +7,7 @@ It is learnt from means over blocks of time: what is faster is white there.
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,10 +23,15 @@ AVERAGED = 0.25
 
 
 def level_and_time(
-    residuals: Sequence[Array], columns: Sequence[Array], runs: Sequence[NoiseChannel], freely: bool, odds: float
+    residuals: Sequence[Array],
+    columns: Sequence[Array],
+    runs: Sequence[NoiseChannel],
+    fast: Noise,
+    freely: bool,
+    odds: float,
 ) -> tuple[float, float]:
-    """Level [T] and correlation time [s] of a wander, zero where none is likelier; ``odds`` are its prior odds, other
-    arguments as in `learn.learn`."""
+    """Level [T] and correlation time [s] of a wander beside the ``fast`` noise, zero where none is likelier; ``odds``
+    are its prior odds, other arguments as in `learn.learn`."""
     whole = np.concatenate(list(residuals))
     size, most = float(np.std(whole)) + 1e-12, float(np.sqrt(np.mean(whole**2))) + 1e-12
     means = [averaged_over(r, c, run) for r, c, run in zip(residuals, columns, runs, strict=True)]
@@ -33,7 +39,7 @@ def level_and_time(
     start, wide = np.log(np.array([0.3, 0.1]) * size)[: 1 if freely else 2], np.array([1.5, 2.0])[: 1 if freely else 2]
 
     def still(x: Array) -> float:
-        noise = Noise(float(np.exp(x[0])) + 1e-3 * size, 0.0, 1.0, 0.0, WANDER_TIMES[0], 0.0)
+        noise = replace(fast, white=float(np.exp(x[0])) + 1e-3 * size, wander=0.0, settling=0.0)
         return cost((noise, most if freely else float(np.exp(x[1]))), means)
 
     x = lowest(still, start, wide, start - 6, start + 3)
@@ -43,7 +49,8 @@ def level_and_time(
         def slow(x: Array, time: float = time) -> tuple[Noise, float]:
             white, wander = np.exp(x[:2])
             spread = most if freely else float(np.exp(x[2]))
-            return Noise(float(white) + 1e-3 * size, 0.0, 1.0, float(wander), time, 0.0), spread
+            scales = {"white": float(white) + 1e-3 * size, "wander": float(wander), "wander_time": time}
+            return replace(fast, settling=0.0, **scales), spread
 
         def penalised(x: Array, slow: Callable[[Array], tuple[Noise, float]] = slow) -> float:
             return cost(slow(x), means) + WANDER_PRIOR * float(np.exp(x[1])) / size

@@ -10,7 +10,7 @@ from scipy.stats import multivariate_normal
 
 from snarelab.identification.evidence.evidence import Evidence, ResidualChannel
 from snarelab.identification.evidence.pool import CandidateColumns, Hypothesis, Item
-from snarelab.identification.nuisance.covariance import Covariance, FirstOrderNoise
+from snarelab.identification.nuisance.covariance import Covariance, LaggedNoise
 
 STEP = 0.02
 
@@ -61,7 +61,7 @@ class Explained:
 
 def covariance(rng, n) -> Covariance:
     """Of unequal samples, coloured and wandering noise, and encoders'."""
-    processes = [FirstOrderNoise(0.4, 0.1), FirstOrderNoise(0.3, 8.0)]
+    processes = [LaggedNoise(0.4, 0.1), LaggedNoise(0.3, 8.0)]
     return Covariance(rng.uniform(0.5, 1.5, n), processes, rng.uniform(0.1, 0.6, n), STEP, (slice(0, n),))
 
 

@@ -25,13 +25,14 @@ def record(
     stops=False,
     knocks=(),
     wander=0.0,
+    edges=(0.3, 12.0),
     law=None,
 ):
     """A pendulum under a PD servo; friction of 3 N·m, rounded over ``rounding`` [rad/s] or sharp.
 
     It swings, or goes from point to point and ``stops`` there; something shakes it at the ``knocks`` [s]. Its
-    disturbance is in a band or, where ``wander`` is above zero, a random walk of that RMS [N·m] about its mean. A
-    ``law`` of position [rad] takes a torque [N·m] that no name stands for.
+    disturbance is between two ``edges`` [Hz] or, where ``wander`` is above zero, a random walk of that RMS [N·m] about
+    its mean. A ``law`` of position [rad] takes a torque [N·m] that no name stands for.
     """
     rng = np.random.default_rng(seed)
     steps, fine = int(1000 * seconds), 4
@@ -47,7 +48,7 @@ def record(
         target = points[at] + way * (points[at + 1] - points[at])
     wanted = np.gradient(target, 1e-3)
     ahead = INERTIA * np.gradient(wanted, 1e-3) + MASS * GRAVITY * LENGTH * np.cos(target)
-    push = np.asarray(sosfilt(butter(2, (0.3, 12.0), "bandpass", fs=1000, output="sos"), rng.normal(size=steps)))
+    push = np.asarray(sosfilt(butter(2, edges, "bandpass", fs=1000, output="sos"), rng.normal(size=steps)))
     push *= 0.3 / np.sqrt(np.mean(push**2))
     if wander:
         push = np.cumsum(rng.normal(size=steps))

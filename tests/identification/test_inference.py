@@ -34,6 +34,17 @@ def test_a_torque_that_wanders_is_no_physics(tmp_path, seed):
     assert not names(found)
 
 
+@pytest.mark.parametrize("seed", [31, 32, 33])
+def test_a_disturbance_without_high_frequencies_is_noise_with_its_size(tmp_path, seed):
+    """0.3 N·m between 0.1 and 1 Hz, shaken at the joint inside its servo; noise of first order left it to physics."""
+    found = decided(recorded(tmp_path, seed, edges=(0.1, 1.0)), tmp_path)
+    assert not names(found)
+    assert found.verdict == "adequate"
+    (noise,) = found.found.weighed.noises
+    assert noise.order == 2
+    assert noise.coloured == pytest.approx(0.3, rel=0.25)
+
+
 def relative(fit, folder):
     """What a fit leaves of the held-out torque [share of it]."""
     model = load_model(folder / "motor.toml")

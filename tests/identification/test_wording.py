@@ -155,6 +155,7 @@ def test_what_a_noise_is_made_of_is_told_with_sizes_and_times():
     assert told == (
         "0.012 N·m from sample to sample, 0.2 N·m over 0.34 s, a wander of 4 N·m over 40 s and 1.2 N·m of the encoders"
     )
+    assert "0.2 N·m over 0.34 s (smooth), a wander" in noise_words("N*m", replace(noise, order=2), [np.zeros(5)])
 
 
 @pytest.mark.parametrize(

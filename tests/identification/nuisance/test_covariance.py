@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from snarelab.identification.nuisance.covariance import Covariance, FirstOrderNoise
+from snarelab.identification.nuisance.covariance import Covariance, LaggedNoise
 
 STEP = 0.02
 PARTS = (slice(0, 37), slice(40, 41), slice(41, 90))
@@ -21,7 +21,10 @@ def dense(variance, processes, derivative, segments):
     t = STEP * np.arange(n)
     same = run[:, None] == run[None, :]
     for p in processes:
-        k += p.level**2 * same * np.exp(-np.abs(t[:, None] - t) / p.time)
+        lags, decay = np.abs(t[:, None] - t) / STEP, np.exp(-STEP / p.time)
+        # Two lags in a row: the sum of the products of their impulse responses, k ρ^k, in closed form.
+        twice = lags * (1 - decay**2) / (1 + decay**2) if p.order == 2 else 0.0
+        k += p.level**2 * same * decay**lags * (1 + twice)
     if derivative is not None:
         difference = np.zeros((n, n))
         for s in segments:
@@ -40,10 +43,13 @@ def some(seed, n=90):
 
 KINDS = {
     "independent": ((), False),
-    "coloured": ((FirstOrderNoise(0.7, 0.1),), False),
-    "coloured and wandering": ((FirstOrderNoise(0.7, 0.1), FirstOrderNoise(2.0, 8.0)), False),
+    "coloured": ((LaggedNoise(0.7, 0.1),), False),
+    "coloured and wandering": ((LaggedNoise(0.7, 0.1), LaggedNoise(2.0, 8.0)), False),
     "encoders": ((), True),
-    "all": ((FirstOrderNoise(0.7, 0.1), FirstOrderNoise(0.0, 1.0), FirstOrderNoise(2.0, 8.0)), True),
+    "smooth": ((LaggedNoise(0.7, 0.1, 2),), False),
+    "smooth and wandering": ((LaggedNoise(2.0, 8.0), LaggedNoise(0.7, 0.1, 2)), False),
+    "smooth, wandering, encoders": ((LaggedNoise(0.7, 0.1, 2), LaggedNoise(2.0, 8.0)), True),
+    "all": ((LaggedNoise(0.7, 0.1), LaggedNoise(0.0, 1.0), LaggedNoise(2.0, 8.0)), True),
 }
 
 
@@ -77,7 +83,7 @@ def test_columns_made_white_have_the_products_of_the_dense_inverse(kind, segment
 
 def test_a_process_of_no_level_and_no_derivative_are_none():
     variance, _, x = some(4)
-    found = Covariance(variance, [FirstOrderNoise(0.0, 1.0)], np.zeros(90), STEP, PARTS)
+    found = Covariance(variance, [LaggedNoise(0.0, 1.0)], np.zeros(90), STEP, PARTS)
     np.testing.assert_allclose(found.solve(x), x / variance[:, None], rtol=1e-14)
     assert found.log_det == pytest.approx(np.log(variance).sum(), rel=1e-14)
 
@@ -92,8 +98,20 @@ def test_noise_that_was_drawn_has_unit_variance_once_it_is_whitened():
     b = 1 + 0.5 * np.sin(np.arange(n) / 50)
     encoders = b * np.convolve(rng.normal(size=n), [1.0, -2.0, 1.0])[:n] / np.sqrt(6)
     r = 0.5 * rng.normal(size=n) + 1.2 * coloured + encoders
-    own = Covariance(np.full(n, 0.25), [FirstOrderNoise(1.2, 0.1)], b, STEP, (slice(0, n),))
+    own = Covariance(np.full(n, 0.25), [LaggedNoise(1.2, 0.1)], b, STEP, (slice(0, n),))
     assert r @ own.solve(r) / n == pytest.approx(1.0, abs=4 * np.sqrt(2 / n))
     white = Covariance(np.full(n, float(np.var(r))), [], None, STEP, (slice(0, n),))
     likelihood = [-0.5 * (r @ k.solve(r) + k.log_det) for k in (own, white)]
     assert likelihood[0] > likelihood[1] + 500
+
+
+def test_a_smooth_process_is_white_noise_through_two_lags():
+    """Drawn by a filter: variance, and the covariance a few samples on, are those of K."""
+    n, time = 200_000, 0.1
+    decay = np.exp(-STEP / time)
+    drawn = lfilter([1.0], [1.0, -2 * decay, decay**2], np.random.default_rng(5).normal(size=n))[1000:]
+    drawn /= np.std(drawn)
+    k = Covariance(np.full(90, 1e-6), [LaggedNoise(1.0, time, 2)], None, STEP, (slice(0, 90),)).dense()
+    for lag in (1, 3, 8):
+        assert k[40, 40 + lag] == pytest.approx(np.mean(drawn[lag:] * drawn[:-lag]), abs=0.02)
+    assert k[40, 43] == pytest.approx((1 + 0.6) * np.exp(-0.6), rel=0.01)  # nearly (1 + d / τ) e^(-d / τ)

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.linalg import block_diag, cholesky, toeplitz
+from scipy.signal import butter, sosfilt
 from scipy.stats import multivariate_normal
 
 from snarelab.identification.nuisance.learn import learn
@@ -64,6 +65,28 @@ def test_coloured_noise_has_its_level_and_its_time(seed):
     assert 0.05 < found.coloured_time < 0.25
     assert found.white < 0.25
     assert found.wander < 0.2
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("edge", [0.5, 1.0, 2.5])
+def test_noise_below_an_edge_is_smooth(seed, edge):
+    """White noise below a Butterworth edge, as of structures and of what a servo lets through: no lag of first order
+    has its spectrum, and what would be left of it is none of the physics'."""
+    rng = np.random.default_rng(15 + seed)
+    drawn: np.ndarray = sosfilt(butter(2, edge, fs=1 / STEP, output="sos"), rng.normal(size=N + 800))[800:]
+    residual = 0.5 * drawn / np.std(drawn) + 0.01 * rng.normal(size=N)
+    found = learnt(residual, run())
+    assert found.order == 2
+    assert found.wander == 0.0
+    assert found.coloured == pytest.approx(0.5, rel=0.4)
+    white = found.covariance(run()).white(residual[:, None])
+    assert np.mean(white**2) == pytest.approx(1.0, rel=0.3)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_noise_of_first_order_is_not_smooth(seed):
+    rng = np.random.default_rng(10 + seed)
+    assert learnt(process(rng, 0.7, 0.1) + 0.1 * rng.normal(size=N), run()).order == 1
 
 
 @pytest.mark.parametrize("seed", range(3))
