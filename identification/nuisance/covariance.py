@@ -73,15 +73,15 @@ class Covariance:
         self._derivative = self._lagged(np.asarray(derivative, float), segments) if has else None
         if not width:
             return
-        first, second = np.zeros(n, bool), np.zeros(n, bool)
+        first, second = np.zeros((2, n), bool)
         first[[s.start for s in segments if s.stop > s.start]] = True
         second[[s.start + 1 for s in segments if s.stop > s.start + 1]] = True
         self._first, self._decays = first, np.exp(-step / np.array(times))
         band = np.zeros(((2 * width if has or 2 in self._orders else width) + 1, n * width))
         for s, (decay, order) in enumerate(zip(self._decays, self._orders, strict=True)):
-            a, b, variance = _recursion(decay, order)
+            a, b, fresh = _recursion(decay, order)
             one, two = np.full(n, a), np.full(n, b)  # from the sample before, and from the one before that
-            news = np.full(n, 1 / variance)
+            news = np.full(n, 1 / fresh)
             begins = a / (1 - b)
             one[second], two[second], news[second] = begins, 0.0, 1 / (1 - begins**2)
             one[first], two[first], news[first] = 0.0, 0.0, 1.0

@@ -109,7 +109,7 @@ def test_a_smooth_process_is_white_noise_through_two_lags():
     """Drawn by a filter: variance, and the covariance a few samples on, are those of K."""
     n, time = 200_000, 0.1
     decay = np.exp(-STEP / time)
-    drawn = lfilter([1.0], [1.0, -2 * decay, decay**2], np.random.default_rng(5).normal(size=n))[1000:]
+    drawn = np.asarray(lfilter([1.0], [1.0, -2 * decay, decay**2], np.random.default_rng(5).normal(size=n)))[1000:]
     drawn /= np.std(drawn)
     k = Covariance(np.full(90, 1e-6), [LaggedNoise(1.0, time, 2)], None, STEP, (slice(0, 90),)).dense()
     for lag in (1, 3, 8):

@@ -73,7 +73,7 @@ def test_noise_below_an_edge_is_smooth(seed, edge):
     """White noise below a Butterworth edge, as of structures and of what a servo lets through: no lag of first order
     has its spectrum, and what would be left of it is none of the physics'."""
     rng = np.random.default_rng(15 + seed)
-    drawn: np.ndarray = sosfilt(butter(2, edge, fs=1 / STEP, output="sos"), rng.normal(size=N + 800))[800:]
+    drawn = np.asarray(sosfilt(butter(2, edge, fs=1 / STEP, output="sos"), rng.normal(size=N + 800)))[800:]
     residual = 0.5 * drawn / np.std(drawn) + 0.01 * rng.normal(size=N)
     found = learnt(residual, run())
     assert found.order == 2
