@@ -4,7 +4,8 @@
 
 Of sensors, quantisation and cogging a residual remembers milliseconds, and is rough. Structures, and disturbances that
 reach a drive through a structure or a servo, leave one without high frequencies: it is smooth. Noise of first order
-would take a smooth one for a walk without an end, which wander and physics then share. The likelier order is taken.
+would take a smooth one for a walk without an end, which wander and physics then share. The likelier order is taken;
+what is smooth looks like physics without a name, and has its prior odds.
 """
 
 from collections.abc import Sequence
@@ -27,9 +28,10 @@ STRETCH = 800
 
 
 def fast_scales(
-    residuals: Sequence[Array], columns: Sequence[Array], runs: Sequence[NoiseChannel], freely: bool
+    residuals: Sequence[Array], columns: Sequence[Array], runs: Sequence[NoiseChannel], freely: bool, odds: float
 ) -> Noise:
-    """Scales of the fast noise, without a wander; arguments as in `learn.learn`."""
+    """Scales of the fast noise, without a wander; ``odds`` are the prior odds that it is smooth, other arguments as in
+    `learn.learn`."""
     whole = np.concatenate(list(residuals))
     size, most = float(np.std(whole)) + 1e-12, float(np.sqrt(np.mean(whole**2))) + 1e-12
     stretch = [slice(0, min(len(r), max(STRETCH // len(runs), 100))) for r in residuals]
@@ -49,9 +51,9 @@ def fast_scales(
     low, high = start - 6, start + np.array([2.0, 2.0, 1.6, 3.0, 2.0, 3.0])
     own = slice(0, 5 if freely else 6)
     tried = []
-    for order in ORDERS:
+    for order, prior in zip(ORDERS, (1.0, odds), strict=True):
         # What is smooth may be faster, as two lags take more away, and slower, as it is no wander.
         low[2], high[2] = np.log(0.02 / order), np.log(0.5 * order)
         x = lowest(lambda x, order=order: cost(fast(x, order), parts), start[own], wide[own], low[own], high[own])
-        tried.append((cost(fast(x, order), parts), order, fast(x, order)[0]))
+        tried.append((cost(fast(x, order), parts) - float(np.log(prior)), order, fast(x, order)[0]))
     return min(tried, key=lambda t: t[:2])[2]

@@ -38,10 +38,10 @@ def learn(
         Whether the columns may explain as much as they can. Otherwise their amplitudes have a common prior deviation,
         estimated beside the noise: where nothing is missing it is small, and nothing of the noise is lost to them.
     channels : int
-        How many share the prior odds that something wanders, which are those of nameless physics.
+        How many share the prior odds that something wanders, or is smooth, which are those of nameless physics.
     """
     odds = ODDS_OF_CURVES / channels
     size = float(np.std(np.concatenate(list(residuals)))) + 1e-12
-    found = fast_scales(residuals, columns, runs, freely)
+    found = fast_scales(residuals, columns, runs, freely, odds)
     wander, time = level_and_time(residuals, columns, runs, found, freely, odds)
     return replace(found, wander=wander, wander_time=time, unit=size, odds=odds)

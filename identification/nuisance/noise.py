@@ -62,12 +62,14 @@ class Noise:
     order: int = 1
     """Of the coloured noise."""
     odds: float = ODDS_OF_CURVES
-    """Prior odds that it wanders."""
+    """Prior odds that it wanders, and that it is smooth."""
 
     @property
     def log_prior(self) -> float:
-        """Log prior of its wander."""
-        return float(np.log(self.odds)) - WANDER_PRIOR * self.wander / self.unit if self.wander else 0.0
+        """Log prior of its wander, and of its being smooth."""
+        odds = float(np.log(self.odds))
+        wanders = odds - WANDER_PRIOR * self.wander / self.unit if self.wander else 0.0
+        return wanders + (odds if self.order > 1 else 0.0)
 
     def covariance(self, run: NoiseChannel) -> Covariance:
         """K of a recording."""
