@@ -89,6 +89,16 @@ def test_noise_of_first_order_is_not_smooth(seed):
     assert learnt(process(rng, 0.7, 0.1) + 0.1 * rng.normal(size=N), run()).order == 1
 
 
+def test_what_too_few_samples_cannot_tell_is_of_first_order():
+    """Of first order, 100 samples; with even odds 13 of 30 are called smooth."""
+    own, smooth = run(n=100), 0
+    for seed in range(30):
+        rng = np.random.default_rng(40 + seed)
+        residual = process(rng, 0.7, 0.1)[:100] + 0.1 * rng.normal(size=100)
+        smooth += learnt(residual, own).order == 2
+    assert smooth <= 3
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_a_level_that_wanders_is_found_beside_what_it_could_be_taken_for(seed):
     """As loud as all else and over 8 s, in 40 s: the level of the few stretches that there are scatters by a third."""
