@@ -111,7 +111,10 @@ def weigh(
         along = replace(along, peaks=periods.of(library(model)))
         named = names(along, by_words, columns)
     if noises is None:
-        noises = [_noise(c, along, residuals, runs, others, by_words, named, columns) for c in range(J)]
+        noises = [
+            _noise(c, along, [r[:, c] for r in residuals[:n_train]], runs, others, by_words, named, columns)
+            for c in range(J)
+        ]
     channels = [
         [ResidualChannel(r[:, c], noises[c].covariance(own[c]), *part[c]) for c in range(J)]
         for r, own, part in zip(residuals, runs, others.parts, strict=True)
@@ -125,10 +128,16 @@ def weigh(
 
     @functools.cache
     def bare(c: int) -> Noise:
-        return _noise(c, along, residuals, runs, others, by_words, {}, columns)
+        return noise_of_rest(c, [np.zeros(len(r)) for r in residuals[:n_train]])
+
+    def noise_of_rest(c: int, missing: Sequence[Array]) -> Noise:
+        left = [r[:, c] - x for r, x in zip(residuals, missing, strict=False)]
+        return _noise(c, along, left, runs, others, by_words, {}, columns)
 
     evidence = Evidence(channels, columns, items, others.count)
-    return WeighedRecordings(evidence, found_pool, tuple(noises), others, along.scale, n_train, runs, bare)
+    return WeighedRecordings(
+        evidence, found_pool, tuple(noises), others, along.scale, n_train, runs, bare, noise_of_rest
+    )
 
 
 def _runs(
@@ -209,7 +218,8 @@ def _noise(
     named: Mapping[str, tuple[PlacedEffect, list[Item]]],
     columns: CandidateColumns,
 ) -> Noise:
-    """Scales of a channel's noise, beside the baseline, the masses, small curves and the middle of every law."""
+    """Scales of a channel's noise from its training residuals (n,), beside the baseline, the masses, small curves and
+    the middle of every law."""
     laws: list[int] = []
     for p, items in named.values():
         middle = items[len(items) // 2]
@@ -229,5 +239,4 @@ def _noise(
         return principal(parts, STRONGEST)
 
     own = [row[channel] for row in runs[:n]]
-    left = [r[:, channel] for r in residuals[:n]]
-    return learn(left, beside_all([*laws, *small]), own, freely=bool(named), channels=len(runs[0]))
+    return learn(residuals, beside_all([*laws, *small]), own, freely=bool(named), channels=len(runs[0]))

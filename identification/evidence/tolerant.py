@@ -4,13 +4,17 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..deciding import TOLERANCES
 from ..nuisance.noise import Noise
 from .evidence import Evidence
+from .members import Members
 from .projected import ProjectedEvidence
 from .search import Member, MemberOdds, Search
 from .weighed import WeighedRecordings
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -30,8 +34,8 @@ def searched(
 
     Chosen before the search, a wide tolerance would take a payload in; without any, it would be named a payload. So
     with the noise: beside all that could be missing, a torque that wanders is taken for some of it; beside nothing,
-    what is missing is taken for a wander. Where something is found, both are tried; and everywhere that nothing
-    wanders. ``channels`` are those of which that may have changed.
+    what is missing is taken for a wander. Where something is found, both are tried, and the noise of what it
+    leaves; and everywhere that nothing wanders. ``channels`` are those of which that may have changed.
     """
     masses = weighed.beside.tolerant
     tolerances = (*TOLERANCES, *weighed.beside.more) if masses.stop > masses.start else TOLERANCES[:1]
@@ -48,7 +52,7 @@ def _chosen(
     weighed: WeighedRecordings, c: int, best: _Best, recordings: Sequence[int], barred: Collection[str]
 ) -> WeighedRecordings:
     """The noise of one channel that is likeliest beside the best set of explanations of that channel by itself."""
-    changes = _others(weighed, c, best)
+    changes = _others(weighed, c, best, recordings)
     if not changes:
         return weighed
     alone, pool, always = weighed.evidence.alone(c, weighed.pool)
@@ -70,17 +74,31 @@ def _chosen(
     return weighed.with_noise(c, own, alone) if most > first else weighed
 
 
-def _others(weighed: WeighedRecordings, c: int, best: _Best) -> list[Callable[[Noise], Noise]]:
+def _others(
+    weighed: WeighedRecordings, c: int, best: _Best, recordings: Sequence[int]
+) -> list[Callable[[Noise], Noise]]:
     """Changes of a channel's noise that are worth a try, one after the other."""
     own, evidence = weighed.noises[c], weighed.evidence
     changes: list[Callable[[Noise], Noise]] = [lambda x: replace(x, wander=0.0)] if own.wander else []
     sticks = [np.concatenate([row[c].sticks[k] for row in weighed.runs]) for k in range(len(weighed.runs[0][c].sticks))]
     others = [k for k, x in enumerate(sticks) if not np.array_equal(x, sticks[own.width])]
     changes += [lambda x, k=k: replace(x, width=k) for k in others]
-    if any(c in evidence.reached(evidence.items[t.item]) for t in best.taken):
-        bare = weighed.bare(c)
-        changes.append(lambda x: replace(bare, width=x.width))
+    found = [t for t in best.taken if c in evidence.reached(evidence.items[t.item])]
+    if found:
+        learnt = (weighed.bare(c), weighed.noise_of_rest(c, _added(weighed, c, best, found, recordings)))
+        changes += [lambda x, other=other: replace(other, width=x.width) for other in learnt]
     return changes
+
+
+def _added(
+    weighed: WeighedRecordings, c: int, best: _Best, found: Sequence[Member], recordings: Sequence[int]
+) -> list[Array]:
+    """What explanations add to a channel of each recording (n,)."""
+    evidence, members = weighed.evidence, Members(best.search.on, [(t.item, t.size) for t in best.taken])
+    return [
+        np.sum([evidence.contribution(i, c, evidence.items[t.item], members.of(t.item)) for t in found], axis=0)
+        for i in recordings
+    ]
 
 
 def _best(weighed: WeighedRecordings, recordings: Sequence[int], barred: Collection[str], tolerance: float) -> _Best:

@@ -51,6 +51,8 @@ class WeighedRecordings:
     runs: list[list[NoiseChannel]]
     bare: Callable[[int], Noise]
     """A channel's noise where nothing is missing."""
+    noise_of_rest: Callable[[int, Sequence[Array]], Noise]
+    """A channel's noise where nothing is missing but these parts (n,) of the training recordings' residuals."""
 
     def with_noise(self, c: int, noise: Noise, alone: Evidence) -> "WeighedRecordings":
         """These recordings with another noise of one channel; ``alone`` is the channel's evidence under that noise."""

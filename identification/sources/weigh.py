@@ -88,10 +88,11 @@ def weigh(
     beside_laws = [could(c, True) for c in range(len(scale))] if known is None else []
     runs = source.noise_channels(numbers, linear, beside_laws) if known is None else known.runs
 
-    def noise(c: int, beside: Sequence[Array]) -> Noise:
+    def noise(c: int, beside: Sequence[Array], missing: Sequence[Array] = ()) -> Noise:
         n = len(source.train)
-        own = [row[c] for row in runs[:n]]
-        return learn([r[:, c] for r in linear.residuals[:n]], beside[:n], own, channels=len(runs[0]))
+        own, left = [row[c] for row in runs[:n]], [r[:, c] for r in linear.residuals[:n]]
+        left = [r - x for r, x in zip(left, missing, strict=True)] if missing else left
+        return learn(left, beside[:n], own, channels=len(runs[0]))
 
     noises = [noise(c, x) for c, x in enumerate(beside_laws)] if known is None else known.noises
     by_words = {}
@@ -130,8 +131,17 @@ def weigh(
     evidence = Evidence(channels, columns, items, total)
     tolerant = slice(placed.start, placed.stop if source.anew else placed.start)
     others = NuisanceColumns([], total, tolerant, [], spread, (1.0,))
-    bare = functools.cache(lambda c: noise(c, could(c, False)))
-    return WeighedRecordings(evidence, hypotheses, tuple(noises), others, scale, len(source.train), runs, bare)
+
+    @functools.cache
+    def bare(c: int) -> Noise:
+        return noise(c, could(c, False))
+
+    def noise_of_rest(c: int, missing: Sequence[Array]) -> Noise:
+        return noise(c, could(c, False), missing)
+
+    return WeighedRecordings(
+        evidence, hypotheses, tuple(noises), others, scale, len(source.train), runs, bare, noise_of_rest
+    )
 
 
 def opened(
