@@ -131,7 +131,7 @@ def weigh(
         return noise_of_rest(c, [np.zeros(len(r)) for r in residuals[:n_train]])
 
     def noise_of_rest(c: int, missing: Sequence[Array]) -> Noise:
-        left = [r[:, c] - x for r, x in zip(residuals, missing, strict=False)]
+        left = [r[:, c] - x for r, x in zip(residuals[:n_train], missing, strict=True)]
         return _noise(c, along, left, runs, others, by_words, {}, columns)
 
     evidence = Evidence(channels, columns, items, others.count)

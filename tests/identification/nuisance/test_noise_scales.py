@@ -89,6 +89,14 @@ def test_noise_of_first_order_is_not_smooth(seed):
     assert learnt(process(rng, 0.7, 0.1) + 0.1 * rng.normal(size=N), run()).order == 1
 
 
+def test_that_noise_is_smooth_has_the_prior_odds_of_nameless_physics():
+    rough = Noise(0.1, 0.2, 0.1, 0.0, 2.0, 0.0, odds=0.05)
+    assert rough.log_prior == 0.0
+    assert replace(rough, order=2).log_prior == pytest.approx(np.log(0.05))
+    wanders = replace(rough, wander=0.3)
+    assert replace(wanders, order=2).log_prior == pytest.approx(wanders.log_prior + np.log(0.05))
+
+
 def test_what_too_few_samples_cannot_tell_is_of_first_order():
     """Of first order, 100 samples; with even odds 13 of 30 are called smooth."""
     own, smooth = run(n=100), 0
