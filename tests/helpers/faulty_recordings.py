@@ -14,6 +14,8 @@ from bench.arm import random_arm
 from bench.motion import fourier_motion
 
 SECONDS, RATE = 12.0, 200.0
+HELD_OUT = 700
+"""What the seed of a held-out recording is higher by."""
 
 
 @dataclass
@@ -249,12 +251,19 @@ def axis_reversed(made, seed):
     return [replace(run, q=q, tau=tau)], "geometry", {run.joints[k]}
 
 
-def cut_off(made, seed):
+def cut_off(made, seed, share=0.65):
+    """The range ends at a share of the largest torque; that of a held-out recording where the other one ends."""
     run, k = record(made, seed), seed % len(made.viscous)
     tau = run.tau.copy()
-    level = 0.65 * np.abs(tau[:, k]).max()
+    level = share * np.abs(record(made, seed % HELD_OUT).tau[:, k]).max()
     tau[:, k] = np.clip(tau[:, k], -level, level)
     return [replace(run, tau=tau)], "saturation", {f"tau.{run.joints[k]}"}
+
+
+def cut_off_anew(made, seed):
+    """The same motion twice, and between the two the sensor's range was set anew."""
+    (runs, *told), (again, *_) = cut_off(made, seed), cut_off(made, seed, 0.55)
+    return [*runs, *again], *told
 
 
 def bursting_clock(made, seed):
@@ -303,6 +312,7 @@ MISTAKES = [
     zero_off,
     axis_reversed,
     cut_off,
+    cut_off_anew,
     bursting_clock,
     standing,
     zero_moved,

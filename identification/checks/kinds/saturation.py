@@ -27,9 +27,9 @@ def find(case: CheckCase) -> list[CheckFinding]:
         return []
     found, tau = [], case.samples.tau
     for c, joint in enumerate(case.joints):
-        levels = _levels(np.concatenate([d[f"tau.{joint}"].to_numpy() for d in case.datasets if f"tau.{joint}" in d]))
+        levels = _levels(case, f"tau.{joint}")
         # filters smear the edges: what comes near the level may have been cut, too
-        near = [(level, tau[:, c] / level > 0.9) for level, _ in levels]
+        near = [(level, of & (tau[:, c] / level > 0.9)) for level, _, of in levels]
         cut = np.any([at for _, at in near], axis=0) if near else np.zeros(len(tau), bool)
         if cut.sum() < 5 or np.mean(~cut) < REST or case.grounds.counted[c] == 0:
             continue
@@ -38,10 +38,11 @@ def find(case: CheckCase) -> list[CheckFinding]:
         fitted = case.grounds.fit(as_read(len(case.joints)), without=without)
         missed = fitted.residual[:, c] * np.sqrt(np.mean(tau[:, c] ** 2))
         elsewhere = np.sqrt(np.mean(missed[~cut] ** 2))
-        over = np.concatenate([-np.sign(level) * missed[tau[:, c] / level > 0.99] for level, _ in levels])
+        over = np.concatenate([-np.sign(level) * missed[of & (tau[:, c] / level > 0.99)] for level, _, of in levels])
         if len(over) < 5 or np.mean(over > 0) < BEYOND or np.mean(over) < CLEARLY * elsewhere:
             continue
-        level, share = max(abs(level) for level, _ in levels), sum(share for _, share in levels)
+        # of recordings with a level each, the lowest leaves out what is cut off in all of them
+        level, share = min(abs(level) for level, *_ in levels), sum(share for _, share, _ in levels)
         effort = case.tree.joints[c].effort
         limit = f"; the URDF's effort limit is {effort:g}" if np.isfinite(effort) else ""
         text = (
@@ -53,13 +54,19 @@ def find(case: CheckCase) -> list[CheckFinding]:
     return found
 
 
-def _levels(tau: np.ndarray) -> list[tuple[float, float]]:
-    """Largest and smallest value, where `LEAST` of the samples and three in a row stand at it; and their share."""
-    tau, found = tau[np.isfinite(tau)], []
-    for level in (float(tau.max(initial=0.0)), float(tau.min(initial=0.0))):
-        at = np.abs(tau - level) <= 1e-6 * abs(level)
-        if level != 0 and np.mean(at) > LEAST and (at[2:] & at[1:-1] & at[:-2]).any():
-            found.append((level, float(np.mean(at))))
+def _levels(case: CheckCase, channel: str) -> list[tuple[float, float, np.ndarray]]:
+    """Largest and smallest value of a channel in each recording, where `LEAST` of its samples and three in a row stand
+    at it; their share of all recordings' samples; and which of the case's samples are that recording's."""
+    found, paths = [], [str(e.motion.path) for e in case.experiments]
+    columns = {str(d.attrs["path"]): d[channel].to_numpy() for d in case.datasets if channel in d}
+    whole = sum(map(len, columns.values()))
+    for path, column in columns.items():
+        own = np.isin(case.samples.run, [k for k, other in enumerate(paths) if other == path])
+        tau = column[np.isfinite(column)]
+        for level in (float(tau.max(initial=0.0)), float(tau.min(initial=0.0))):
+            at = np.abs(tau - level) <= 1e-6 * abs(level)
+            if level != 0 and np.mean(at) > LEAST and (at[2:] & at[1:-1] & at[:-2]).any():
+                found.append((level, float(np.sum(at)) / whole, own))
     return found
 
 

@@ -1,4 +1,4 @@
-"""The bank: 190 recordings with a mistake each, named, placed and mended in 9 of 10; 60 sound ones without any."""
+"""The bank: 200 recordings with a mistake each, named, placed and mended in 9 of 10; 60 sound ones without any."""
 
 import faulty_recordings as bank
 import numpy as np
@@ -13,8 +13,6 @@ pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("each_diagnosis_once")]
 DRAWN = 10
 MISSED = 0.1
 ARMS = 3
-HELD_OUT = 700
-"""What the seed of a held-out recording is higher by."""
 
 
 def cases(tmp_path, seed, mistake):
@@ -90,9 +88,9 @@ def test_a_mend_gives_the_verdict_of_the_sound_recording(tmp_path, mistake):
         if not any(f.name == name for f in found):
             continue
         kept = [run for path, run in zip(paths, runs, strict=True) if path in left(paths, found)]
-        held = mistake(made, seed + HELD_OUT)[0][:1]
+        held = mistake(made, seed + bank.HELD_OUT)[0][:1]
         as_it_should_be, lines = bank.sound(mistake, made, seed)
-        sound_held, _ = bank.sound(mistake, made, seed + HELD_OUT)
+        sound_held, _ = bank.sound(mistake, made, seed + bank.HELD_OUT)
         verdict, names = diagnosed(folder, made, mended(MODEL, found), kept, held)
         sound_verdict, sound_names = diagnosed(folder, made, lines + MODEL, as_it_should_be, sound_held[:1])
         assert verdict != "data_fault"
