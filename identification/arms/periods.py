@@ -79,8 +79,8 @@ class Periods:
                     found[p.key] = at
         return found
 
-    def _weighed(self, i: int, c: int) -> tuple[Array, Callable[[Array], Array]]:
-        return self._divided_of(c)[i], self._covariances[i][c].gram
+    def _weighed(self, i: int, c: int) -> tuple[Array, Callable[[Array, Array], Array]]:
+        return self._divided_of(c)[i], self._covariances[i][c].pair_grams
 
     def _divided_of(self, c: int) -> list[Array]:
         """S⁻¹ r of each recording (n,), S = K + A A' with the columns A that stand beside."""

@@ -26,12 +26,12 @@ TOGETHER = 32
 @dataclass(frozen=True)
 class SampledSignal:
     """One channel of one recording: the signal (n,), and how columns (n, k) of it are seen (n_seen, k); K⁻¹ r (n_seen,)
-    and the map of columns C to C'K⁻¹C."""
+    and the map of cosines and sines, both (n_seen, k), to C'K⁻¹C of each pair C (k, 2, 2)."""
 
     signal: Array
     seen: Callable[[Array], Array]
     divided: Array
-    gram: Callable[[Array], Array]
+    grams: Callable[[Array, Array], Array]
 
 
 @dataclass(frozen=True)
@@ -43,6 +43,11 @@ class Peaks:
     step: float
     trials: int
     best: int = 0
+
+
+def pair_products(left: Sequence[Array], right: Sequence[Array]) -> Array:
+    """Products x_k' y_k (k, 2, 2) between the two of ``left`` and the two of ``right``, each (n, k)."""
+    return np.stack([[np.einsum("nk,nk->k", x, y) for y in right] for x in left]).transpose(2, 0, 1)
 
 
 def trial_waves(signals: Sequence[Array], shortest: float, longest: float) -> Array:
@@ -72,8 +77,7 @@ def periodogram(waves: Array, runs: Sequence[SampledSignal]) -> Array:
             turned = on[:, :n] * np.exp(2j * np.pi * waves[start] * run.signal[:, None])
             columns = np.asfortranarray(run.seen(np.concatenate([turned.real, turned.imag], axis=1)))
             score[own] += (run.divided @ columns).reshape(2, n).T
-            at = np.arange(n)
-            matrix[own] += run.gram(columns).reshape(2, n, 2, n)[:, at, :, at]
+            matrix[own] += run.grams(columns[:, :n], columns[:, n:])
     trace = np.trace(matrix, axis1=1, axis2=2)
     apart = np.linalg.det(matrix) > 1e-9 * trace**2
     power = np.zeros(len(waves))

@@ -20,6 +20,7 @@ from ...models.rig.rig import Rig
 from .assembly import Block, TorqueModel
 from .experiment import Experiment
 from .least_squares import NormalEquations, Objective, Solution
+from .periodogram import pair_products
 from .projection import minimise_projected, project
 from .rig_places import PLACES
 from .wave_lengths import wave_peaks
@@ -85,10 +86,10 @@ class Problem:
         residuals = [e.measured - e.all_to_band(s.tau) for e, s in zip(self.experiments, states, strict=True)]
         levels = dict(zip(map(int, self.channels), sigma, strict=True))
 
-        def weighed(i: int, c: int) -> tuple[Array, Callable[[Array], Array]] | None:
+        def weighed(i: int, c: int) -> tuple[Array, Callable[[Array, Array], Array]] | None:
             if c not in levels:
                 return None
-            return residuals[i][:, c] / levels[c] ** 2, lambda columns: columns.T @ columns / levels[c] ** 2
+            return residuals[i][:, c] / levels[c] ** 2, lambda x, y: pair_products([x, y], [x, y]) / levels[c] ** 2
 
         found = wave_peaks(self.assembly, p, x, self.experiments, states, weighed)
         return usual if found is None else 1 / found.waves

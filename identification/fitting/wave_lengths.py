@@ -14,8 +14,9 @@ from .periodogram import Peaks, SampledSignal, peaks, periodogram, trial_waves
 
 Array = NDArray[np.float64]
 
-Weighed = Callable[[int, int], tuple[Array, Callable[[Array], Array]] | None]
-"""Of recording i and channel c: K⁻¹ r (n_band,), and the map of columns C to C'K⁻¹C; None leaves the channel out."""
+Weighed = Callable[[int, int], tuple[Array, Callable[[Array, Array], Array]] | None]
+"""Of recording i and channel c: K⁻¹ r (n_band,), and the map of cosines and sines to C'K⁻¹C of each pair, as in
+`SampledSignal`; None leaves the channel out."""
 
 
 def wave_peaks(

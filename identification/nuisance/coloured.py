@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..deciding import WANDER_TIMES
-from .likelihood import cost, lowest, side_by_side
+from .likelihood import Cost, lowest, side_by_side
 from .noise import Noise, NoiseChannel
 
 Array = NDArray[np.float64]
@@ -35,11 +35,13 @@ def fast_scales(
     whole = np.concatenate(list(residuals))
     size, most = float(np.std(whole)) + 1e-12, float(np.sqrt(np.mean(whole**2))) + 1e-12
     stretch = [slice(0, min(len(r), max(STRETCH // len(runs), 100))) for r in residuals]
-    parts = [
-        # Whatever is slow there is no matter of the fast scales.
-        (side_by_side(r[rows], c[rows]), replace(run.some(rows), wanders=1.0))
-        for r, c, run, rows in zip(residuals, columns, runs, stretch, strict=True)
-    ]
+    cost = Cost(
+        [
+            # Whatever is slow there is no matter of the fast scales.
+            (side_by_side(r[rows], c[rows]), replace(run.some(rows), wanders=1.0))
+            for r, c, run, rows in zip(residuals, columns, runs, stretch, strict=True)
+        ]
+    )
 
     def fast(x: Array, order: int) -> tuple[Noise, float]:
         white, coloured, time, settling, slow = np.exp(x[:5])
@@ -54,6 +56,6 @@ def fast_scales(
     for order, prior in zip(ORDERS, (1.0, odds), strict=True):
         # What is smooth may be faster, as two lags take more away, and slower, as it is no wander.
         low[2], high[2] = np.log(0.02 / order), np.log(0.5 * order)
-        x = lowest(lambda x, order=order: cost(fast(x, order), parts), start[own], wide[own], low[own], high[own])
-        tried.append((cost(fast(x, order), parts) - float(np.log(prior)), order, fast(x, order)[0]))
+        x = lowest(lambda x, order=order: cost(*fast(x, order)), start[own], wide[own], low[own], high[own])
+        tried.append((cost(*fast(x, order)) - float(np.log(prior)), order, fast(x, order)[0]))
     return min(tried, key=lambda t: t[:2])[2]

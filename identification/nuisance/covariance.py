@@ -18,6 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import get_lapack_funcs
 
+from ..fitting.periodogram import pair_products
+
 Array = NDArray[np.float64]
 
 ROOT6 = np.sqrt(6.0)
@@ -169,6 +171,16 @@ class Covariance:
         if self._width and x.size:
             half, _ = _DIVIDE_BY_ROOT(self._factor, self._on_hidden(z), uplo="L", overwrite_b=1)
             found -= half.T @ half
+        return found
+
+    def pair_grams(self, x: Array, y: Array) -> Array:
+        """Of every pair of columns (x_k, y_k), both (n, k): products with K⁻¹ between the two (k, 2, 2), as `gram` has
+        them, without those between pairs."""
+        z = np.concatenate([x, y], axis=1) / self._variance[:, None]
+        found = pair_products((x, y), np.hsplit(z, 2))
+        if self._width and z.size:
+            half, _ = _DIVIDE_BY_ROOT(self._factor, self._on_hidden(z), uplo="L", overwrite_b=1)
+            found -= pair_products(np.hsplit(half, 2), np.hsplit(half, 2))
         return found
 
     def white(self, x: Array) -> Array:

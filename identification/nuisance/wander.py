@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..deciding import WANDER_PRIOR, WANDER_TIMES
-from .likelihood import Part, cost, lowest, side_by_side
+from .likelihood import Cost, Part, lowest, side_by_side
 from .noise import Noise, NoiseChannel
 
 Array = NDArray[np.float64]
@@ -34,13 +34,13 @@ def level_and_time(
     are its prior odds, other arguments as in `learn.learn`."""
     whole = np.concatenate(list(residuals))
     size, most = float(np.std(whole)) + 1e-12, float(np.sqrt(np.mean(whole**2))) + 1e-12
-    means = [averaged_over(r, c, run) for r, c, run in zip(residuals, columns, runs, strict=True)]
+    cost = Cost([averaged_over(r, c, run) for r, c, run in zip(residuals, columns, runs, strict=True)])
     own = slice(0, 2 if freely else 3)
     start, wide = np.log(np.array([0.3, 0.1]) * size)[: 1 if freely else 2], np.array([1.5, 2.0])[: 1 if freely else 2]
 
     def still(x: Array) -> float:
         noise = replace(fast, white=float(np.exp(x[0])) + 1e-3 * size, wander=0.0, settling=0.0)
-        return cost((noise, most if freely else float(np.exp(x[1]))), means)
+        return cost(noise, most if freely else float(np.exp(x[1])))
 
     x = lowest(still, start, wide, start - 6, start + 3)
     best = (still(x) + float(np.log(odds)), 0.0, WANDER_TIMES[0])
@@ -53,7 +53,7 @@ def level_and_time(
             return replace(fast, settling=0.0, **scales), spread
 
         def penalised(x: Array, slow: Callable[[Array], tuple[Noise, float]] = slow) -> float:
-            return cost(slow(x), means) + WANDER_PRIOR * float(np.exp(x[1])) / size
+            return cost(*slow(x)) + WANDER_PRIOR * float(np.exp(x[1])) / size
 
         for level in (0.01, 0.4):
             start = np.log(np.array([0.3, level, 0.1]) * size)[own]

@@ -64,6 +64,8 @@ def test_solutions_and_determinant_are_those_of_the_dense_matrix(kind, segments)
     np.testing.assert_allclose(found.solve(x), np.linalg.solve(k, x), rtol=1e-9, atol=1e-10)
     np.testing.assert_allclose(found.solve(x[:, 0]), np.linalg.solve(k, x[:, 0]), rtol=1e-9, atol=1e-10)
     np.testing.assert_allclose(found.gram(x), x.T @ np.linalg.solve(k, x), rtol=1e-9, atol=1e-10)
+    pairs = [x[:, [0, 2]].T @ np.linalg.solve(k, x[:, [0, 2]]), x[:, [1, 0]].T @ np.linalg.solve(k, x[:, [1, 0]])]
+    np.testing.assert_allclose(found.pair_grams(x[:, [0, 1]], x[:, [2, 0]]), pairs, rtol=1e-9, atol=1e-10)
     assert found.log_det == pytest.approx(np.linalg.slogdet(k)[1], rel=1e-11)
     np.testing.assert_allclose(found.dense(), k, rtol=1e-8, atol=1e-9)
 

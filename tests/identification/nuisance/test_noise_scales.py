@@ -10,7 +10,7 @@ from scipy.signal import butter, sosfilt
 from scipy.stats import multivariate_normal
 
 from snarelab.identification.nuisance.learn import learn
-from snarelab.identification.nuisance.likelihood import cost
+from snarelab.identification.nuisance.likelihood import Cost
 from snarelab.identification.nuisance.noise import Noise, NoiseChannel
 
 STEP, N = 1 / 80, 1600
@@ -202,4 +202,4 @@ def test_the_likelihood_is_that_of_all_samples_with_the_amplitudes_integrated_ou
     )
     wanted = -multivariate_normal(np.zeros(2 * n), k).logpdf(np.concatenate(r)) - n * np.log(2 * np.pi)
     parts = [(np.column_stack([a, b]), own) for a, b in zip(r, x, strict=True)]
-    assert cost((noise, spread), parts) == pytest.approx(wanted, rel=1e-9)
+    assert Cost(parts)(noise, spread) == pytest.approx(wanted, rel=1e-9)
