@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from .filters import thin, thin_half, thinned_length
+from .stamps import taken
 
 Array = NDArray[np.float64]
 Piece = tuple[Array, Array, Array, Array, float]
@@ -75,7 +76,7 @@ def _uniform_pieces(
     from scipy.interpolate import CubicSpline  # here only: a recording with an even clock never needs it
 
     good = np.isfinite(q).all(1) & np.isfinite(tau).all(1)
-    jitter, other_rates, lone, longest = 0.0, 0, 0, period
+    jitter, off, other_rates, lone, longest = 0.0, 0.0, 0, 0, period
     index = np.flatnonzero(good)
     steps = np.diff(t[index])
     local = np.maximum(median_filter(steps, ABOUT, mode="nearest"), period)
@@ -89,18 +90,20 @@ def _uniform_pieces(
             lone += len(run)
             continue
         longest = max(longest, float(np.max(np.diff(t[run])))) if gap == HOLE else longest
-        step = (t[run[-1]] - t[run[0]]) / (len(run) - 1)
-        even = t[run[0]] + step * np.arange(len(run))
-        deviation = float(np.max(np.abs(t[run] - even))) / period
+        when, stamped_off = taken(t[run], q[run], period)
+        off = max(off, stamped_off)
+        step = (when[-1] - when[0]) / (len(run) - 1)
+        even = when[0] + step * np.arange(len(run))
+        deviation = float(np.max(np.abs(when - even))) / period
         jitter = max(jitter, deviation)
         other_rate = abs(step / period - 1) > 1e-3
         other_rates += other_rate
         if deviation <= 0.02 and not other_rate:
-            pieces.append((t[run], q[run], tau[run], temperature[run], period))
+            pieces.append((when, q[run], tau[run], temperature[run], period))
             continue
-        even = t[run[0]] + period * np.arange(int((t[run[-1]] - t[run[0]]) / period + 1e-9) + 1)
-        spline = [CubicSpline(t[run], x[run])(even) for x in (q, tau)]
-        warm = np.stack([np.interp(even, t[run], x) for x in temperature[run].T], 1)
+        even = when[0] + period * np.arange(int((when[-1] - when[0]) / period + 1e-9) + 1)
+        spline = [CubicSpline(when, x[run])(even) for x in (q, tau)]
+        warm = np.stack([np.interp(even, when, x) for x in temperature[run].T], 1)
         pieces.append((even, *spline, warm, float(step)))
     notes = []
     if len(index) < len(t):
@@ -114,6 +117,10 @@ def _uniform_pieces(
         )
     if len(pieces) > 1:
         notes.append(f"{len(pieces)} runs between gaps are fitted side by side; nothing is interpolated across a gap")
+    if off:
+        notes.append(
+            f"the time stamps jitter by {off:.2g} periods, and the positions do not: taken as sampled on an even clock"
+        )
     if jitter > 0.02:
         notes.append(
             f"sampling is uneven (stamps up to {jitter:.2g} periods off an even clock): cubic splines put it on "
