@@ -14,7 +14,6 @@ Array = NDArray[np.float64]
 ABOUT = 25
 """Samples to either side over which a clock's drift, and a joint's speed, are taken."""
 
-
 LEAST = 1e-3
 """Jitter [periods] below which stamps are as good as any: rounding makes that much."""
 

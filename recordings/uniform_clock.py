@@ -118,9 +118,7 @@ def _uniform_pieces(
     if len(pieces) > 1:
         notes.append(f"{len(pieces)} runs between gaps are fitted side by side; nothing is interpolated across a gap")
     if off:
-        notes.append(
-            f"the time stamps jitter by {off:.2g} periods, and the positions do not: taken as sampled on an even clock"
-        )
+        notes.append(f"the time stamps jitter by {off:.2g} periods, and the positions do not: the jitter is taken out")
     if jitter > 0.02:
         notes.append(
             f"sampling is uneven (stamps up to {jitter:.2g} periods off an even clock): cubic splines put it on "

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from snarelab.recordings.stamps import taken
+from snarelab.recordings.uniform_clock import uniform
 
 PERIOD = 0.004
 
@@ -50,3 +51,25 @@ def test_where_nothing_moves_stamps_are_kept():
     when, found = taken(stamps, np.zeros((500, 2)), PERIOD)
     assert found == 0.0
     np.testing.assert_array_equal(when, stamps)
+
+
+@pytest.mark.parametrize(("jitter", "believed"), [(7e-4, True), (1.5e-3, False)])
+def test_what_rounding_makes_of_stamps_is_no_jitter(jitter, believed):
+    rng, t = np.random.default_rng(5), PERIOD * np.arange(3000)
+    stamps = t + jitter * PERIOD * rng.standard_normal(len(t))
+    when, _ = taken(stamps, counted(t, bits=26), PERIOD)
+    assert np.array_equal(when, stamps) == believed
+
+
+@pytest.mark.parametrize("jitter", [0.005, 0.02])
+def test_a_recording_whose_stamps_jitter_is_not_interpolated(jitter):
+    """Position and torque are those that were logged, at a clock that is even to a hundredth of a period."""
+    rng, t = np.random.default_rng(6), PERIOD * np.arange(3000)
+    q = counted(t)
+    ((when, kept, torque, *_),), notes, _, _ = uniform(
+        t + jitter * PERIOD * rng.standard_normal(len(t)), q, 2 * q, np.full(q.shape, np.nan)
+    )
+    np.testing.assert_array_equal(kept, q)
+    np.testing.assert_array_equal(torque, 2 * q)
+    assert np.max(np.abs(np.diff(when) - PERIOD)) < 0.01 * PERIOD
+    assert any("jitter" in note for note in notes)

@@ -58,9 +58,9 @@ def _levels(case: CheckCase, channel: str) -> list[tuple[float, float, np.ndarra
     """Largest and smallest value of a channel in each recording, where `LEAST` of its samples and three in a row stand
     at it; their share of all recordings' samples; and which of the case's samples are that recording's."""
     found, paths = [], [str(e.motion.path) for e in case.experiments]
-    columns = {str(d.attrs["path"]): d[channel].to_numpy() for d in case.datasets if channel in d}
-    whole = sum(map(len, columns.values()))
-    for path, column in columns.items():
+    columns = [(str(d.attrs["path"]), d[channel].to_numpy()) for d in case.datasets if channel in d]
+    whole = sum(len(column) for _, column in columns)
+    for path, column in columns:
         own = np.isin(case.samples.run, [k for k, other in enumerate(paths) if other == path])
         tau = column[np.isfinite(column)]
         for level in (float(tau.max(initial=0.0)), float(tau.min(initial=0.0))):

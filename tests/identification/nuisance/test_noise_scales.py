@@ -196,10 +196,12 @@ def test_the_likelihood_is_that_of_all_samples_with_the_amplitudes_integrated_ou
     noise, spread = Noise(0.9, 0.4, 0.1, 0.3, 8.0, 0.0), 0.7
     x = [rng.normal(size=(n, 3)) for _ in range(2)]
     r = [rng.normal(size=n) + c @ np.ones(3) for c in x]
-    k: Any = (
-        np.asarray(block_diag(*[noise.covariance(own).dense()] * 2), float)
-        + spread**2 * np.concatenate(x) @ np.concatenate(x).T
-    )
-    wanted = -multivariate_normal(np.zeros(2 * n), k).logpdf(np.concatenate(r)) - n * np.log(2 * np.pi)
-    parts = [(np.column_stack([a, b]), own) for a, b in zip(r, x, strict=True)]
-    assert Cost(parts)(noise, spread) == pytest.approx(wanted, rel=1e-9)
+    cost = Cost([(np.column_stack([a, b]), own) for a, b in zip(r, x, strict=True)])
+    # A noise that comes again with another spread is remembered; another noise is not taken for it.
+    for asked, wide in ((noise, spread), (noise, 0.2), (replace(noise, white=1.1), 0.2), (noise, spread)):
+        k: Any = (
+            np.asarray(block_diag(*[asked.covariance(own).dense()] * 2), float)
+            + wide**2 * np.concatenate(x) @ np.concatenate(x).T
+        )
+        wanted = -multivariate_normal(np.zeros(2 * n), k).logpdf(np.concatenate(r)) - n * np.log(2 * np.pi)
+        assert cost(asked, wide) == pytest.approx(wanted, rel=1e-9)
