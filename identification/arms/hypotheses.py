@@ -165,8 +165,25 @@ def _items(along: ColumnSource, p: PlacedEffect, by_words: Curves, columns: Cand
             for bend in BENDS:
                 more = np.concatenate([at, bent.index]), np.concatenate([spread, bend * bent.spread])
                 items.append(Item(*more, np.concatenate([positive, free]), whole, some, prior))
-    fitted = _fitted(along, p, columns) if p.key in along.tuned else None
-    return items if fitted is None else [*items, fitted]
+    more = _in_ratio(along, grid[0], made[0], columns), _fitted(along, p, columns) if p.key in along.tuned else None
+    return [*items, *(x for x in more if x is not None)]
+
+
+def _in_ratio(
+    along: ColumnSource, v: EffectVariant, parts: Mapping[int, Sequence[Array]] | None, columns: CandidateColumns
+) -> Item | None:
+    """What a place has, by one factor: one number, where any change of it takes as many as the law has."""
+    ratio = along.assembly.at(v.placed).once_more(v.parameters)
+    if ratio is None or parts is None:
+        return None
+    ratio = ratio[v.amplitudes]
+    own = {c: [x @ ratio[:, None] for x in some] for c, some in parts.items()}
+    size = _size(along, own)
+    return (
+        Item(columns.add(own), 1 / size, np.zeros(1, bool), label=replace(v, together=ratio))
+        if size[0] > 1e-12
+        else None
+    )
 
 
 def remembers(p: PlacedEffect) -> bool:

@@ -150,7 +150,7 @@ class ArmRecordings:
         assembly, experiment = fit.fit.assembly, fit.instruments[0]
         item, label = made.on.evidence.items[slot.taken.item], made.pool[slot.taken.hypothesis].label
         variant = item.label
-        values = variant.start((item.spread * amplitudes)[: max(len(variant.amplitudes), 1)])
+        values = variant.start((item.spread * amplitudes)[: variant.count])
         free = free_parameters(assembly, experiment, assembly.evaluate(experiment, fit.fit.theta), variant)
         placed = replace(label, hold=tuple(p.name for p in label.effect.parameters if p.name not in free))
         pairs = zip(placed.effect.parameters, values, strict=True)

@@ -90,7 +90,7 @@ def likeness(search: Search, own: int, amplitudes: Array, energy: float, other: 
     best, on = 0.0, search.on
     start = sum(len(h.items) for h in search.pool[:other])
     for number, item in enumerate(search.pool[other].items, start):
-        k = max(len(item.label.amplitudes), 1)
+        k = item.label.count
         cross = (amplitudes @ on.curvature(own, number))[:k]
         curvature = on.own(number)[:k, :k]
         curvature = curvature + (1e-9 * np.trace(curvature) + 1e-300) * np.eye(k)

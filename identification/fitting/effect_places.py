@@ -90,6 +90,10 @@ class EffectPlace(ABC):
         """Mass that a unit of each parameter adds to the arm (p,) [kg]; None where the law changes no link."""
         return None
 
+    def once_more(self, parameters: Array) -> Array | None:
+        """Changes of the parameters (p,) that double what the model has at the place; None where none do."""
+        return None
+
 
 class JointPlace(EffectPlace):
     """A joint, or an axis: a torque along it, or a change of its position, rate and acceleration (m = 3)."""
@@ -219,6 +223,12 @@ class LinkPlace(EffectPlace):
     def masses(self, parameters: Array) -> Array | None:
         """A link's mass is the first of its inertial parameters."""
         return self.change(parameters)[1][0]
+
+    def once_more(self, parameters: Array) -> Array | None:
+        """Of a law that can change all that a link's properties have: the link's density by one factor."""
+        phi, by_parameter = self._link()["phi"][0], self.change(parameters)[1]
+        found = np.linalg.lstsq(by_parameter, phi)[0]
+        return found if np.allclose(by_parameter @ found, phi, rtol=1e-9, atol=1e-12) else None
 
     def terms(self, along: TorqueState, parameters: Array, bare: bool = False) -> EffectTerms:
         """Linear in the change, whatever ``bare`` says."""

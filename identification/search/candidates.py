@@ -36,7 +36,8 @@ class EffectVariant:
 
     ``amplitudes`` are the parameters the law is linear in, whose columns are tried, between ``low`` and ``high``; where
     there is none (a delay, a spring), the law's whole contribution is the one column. The place of a mass on a link has
-    its slope tried beside the mass, which makes (mass, mass * x, mass * y, mass * z) amplitudes.
+    its slope tried beside the mass, which makes (mass, mass * x, mass * y, mass * z) amplitudes. Where they are held in
+    the ratios ``together``, one column stands for all.
     """
 
     placed: PlacedEffect
@@ -44,6 +45,12 @@ class EffectVariant:
     amplitudes: NDArray[np.int_]
     low: Array
     high: Array
+    together: Array | None = None
+
+    @property
+    def count(self) -> int:
+        """Columns that stand for the law."""
+        return 1 if self.together is not None else max(len(self.amplitudes), 1)
 
     def subsets(self) -> list[NDArray[np.int_]]:
         """Positions of the columns to try together: all and single ones; of a vector's few components, every set; of
@@ -66,7 +73,9 @@ class EffectVariant:
     def start(self, amplitudes: Array) -> Array:
         """All parameters of the effect (p,) for amplitudes found."""
         full = self.parameters.copy()
-        if len(self.amplitudes):
+        if self.together is not None:
+            full[self.amplitudes] = amplitudes[0] * self.together
+        elif len(self.amplitudes):
             full[self.amplitudes] = amplitudes
             slopes = [i for i in self.amplitudes if self.placed.effect.parameters[i].grid]
             masses = [i for i in self.amplitudes if not self.placed.effect.parameters[i].grid]

@@ -91,6 +91,11 @@ class GridPoint:
     origin: Mapping[str, float] = field(default_factory=dict)
     inverse: bool = False
 
+    @property
+    def count(self) -> int:
+        """Columns that stand for the law."""
+        return max(len(self.amplitudes), 1)
+
 
 @dataclass(frozen=True)
 class Linearisation:

@@ -50,7 +50,7 @@ def rivals(share: float, cosine: float) -> list[bool]:
     made = planted(1.0)
     _, x = made.columns.of(0, 0)
     x[:, 1] = cosine * x[:, 0] + np.sqrt(1 - cosine**2) * x[:, 2]
-    labels = [SimpleNamespace(amplitudes=[0]), SimpleNamespace(amplitudes=[0])]
+    labels = [SimpleNamespace(amplitudes=[0], count=1), SimpleNamespace(amplitudes=[0], count=1)]
     items = [Item(i.index, i.spread, i.positive, False, y) for i, y in zip(made.items[:2], labels, strict=True)]
     made = Explained(made.pieces, made.columns, items, 0)
     several = [Hypothesis(f"h{k}", True, (i,), -3.0 * k, f"h{k}") for k, i in enumerate(items)]
@@ -86,7 +86,7 @@ def test_a_whole_law_of_two_names_is_a_rival_of_each_though_it_stands_beside_nei
     _, x = made.columns.of(0, 0)
     x[:, 2] = x[:, 0]
     labels = [PlacedEffect(get_effect(name), "link3") for name in ("payload_mass", "com_offset", "inertia_error")]
-    one = SimpleNamespace(amplitudes=[0])
+    one = SimpleNamespace(amplitudes=[0], count=1)
     items = [Item(np.array([k]), np.ones(1), np.zeros(1, bool), False, one) for k in range(3)]
     made = Explained(made.pieces, made.columns, items, 0)
     odds = (0.0, -9.0, -9.0)
@@ -102,7 +102,7 @@ def becomes(alike: float) -> bool:
     made = planted(1.0)
     _, x = made.columns.of(0, 0)
     x[:, 1] = np.sqrt(alike) * x[:, 0] + np.sqrt(1 - alike) * x[:, 2]
-    labels = [SimpleNamespace(amplitudes=[0])] * 2
+    labels = [SimpleNamespace(amplitudes=[0], count=1)] * 2
     items = [Item(i.index, i.spread, i.positive, False, y) for i, y in zip(made.items[:2], labels, strict=True)]
     made = Explained(made.pieces, made.columns, items, 0)
     several = [Hypothesis("curve", False, (items[0],), -1.0), Hypothesis("name", True, (items[1],), -12.0)]

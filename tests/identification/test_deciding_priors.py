@@ -140,7 +140,7 @@ def shaped(monkeypatch, off: float, bent: float, curve: bool) -> float:
     columns = CandidateColumns([len(x)])
     over = Item(columns.add({0: [x[:, [2]]]}), np.ones(1), np.zeros(1, bool))
     words = hypothesising.coordinate(placed.effect) or ""
-    assembly = SimpleNamespace(joint_of=lambda _: 0)
+    assembly = SimpleNamespace(joint_of=lambda _: 0, at=lambda _: SimpleNamespace(once_more=lambda _: None))
     along: Any = SimpleNamespace(n_train=1, scale=np.ones(1), assembly=assembly, tuned={}, peaks={})
     items = hypothesising._items(along, placed, {(0, words): over} if curve else {}, columns)
     own = made.pieces[0][0]

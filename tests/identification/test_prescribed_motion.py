@@ -87,16 +87,6 @@ def test_noise_of_the_encoders_is_no_spring(tmp_path):
     assert found.verdict == "adequate", found.sentence
 
 
-SCALED = [
-    pytest.mark.slow,
-    pytest.mark.xfail(
-        strict=True,
-        reason="a link whose properties are all wrong by one factor is no shape of inertia_error yet: a payload there "
-        "and a small one at link2 (54 %) are likelier than ten free numbers",
-    ),
-]
-
-
 @pytest.mark.parametrize(
     ("concealed", "name", "at", "parameter", "value", "error", "seconds"),
     [
@@ -106,7 +96,7 @@ SCALED = [
         ("late torque", "sensor_delay", "tau.joint2", "delay", LATE, 0.15, 12.0),
         ("late drive", "command_delay", "tau.joint2", "delay", LATE, 0.15, 12.0),
         ("late encoder", "sensor_delay", "q.joint2", "delay", LATE, 0.15, 12.0),
-        pytest.param(*("inertia_error", "inertia_error", "link3", "mass", None, 0.15, 24.0), marks=SCALED),
+        pytest.param(*("inertia_error", "inertia_error", "link3", "mass", None, 0.15, 24.0), marks=pytest.mark.slow),
     ],
 )
 def test_named_placed_and_nothing_else(concealed, name, at, parameter, value, error, seconds, tmp_path):

@@ -172,7 +172,7 @@ def test_likeness_is_the_share_of_what_one_adds_that_another_can_add(cosine):
     q = np.linalg.qr(rng.normal(size=(n, 2)))[0] * np.sqrt(n)
     x[:, 0], x[:, 1] = q[:, 0], -3 * (cosine * q[:, 0] + np.sqrt(1 - cosine**2) * q[:, 1])
     for item in made.items:
-        object.__setattr__(item, "label", type("Label", (), {"amplitudes": [0]})())
+        object.__setattr__(item, "label", type("Label", (), {"amplitudes": [0], "count": 1})())
     run = search(made)
     amplitudes = np.array([0.7])
     energy = float(amplitudes @ run.on.curvature(0, 0) @ amplitudes)

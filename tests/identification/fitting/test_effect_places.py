@@ -91,6 +91,13 @@ def test_a_links_change_goes_through_its_own_columns_of_the_regressor():
     here = LinkPlace(tree, PlacedEffect(get_effect("inertia_error"), "link2"), 1, 1.0)
     change, _ = here.change(np.arange(10.0))
     np.testing.assert_allclose(change, np.arange(10.0), atol=1e-12)
+    # Its density by one factor; no mass at a point, and no place of it, does that.
+    once_more = here.once_more(np.zeros(10))
+    assert once_more is not None
+    np.testing.assert_allclose(once_more, phi)
+    for name, values in (("payload_mass", [1.0, 0, 0, 0]), ("com_offset", [0.0, 0, 0])):
+        other = LinkPlace(tree, PlacedEffect(get_effect(name), "link2"), 1, 1.0)
+        assert other.once_more(np.array(values)) is None
 
 
 def test_a_sensor_changes_what_it_reads_and_the_columns_behind_it():

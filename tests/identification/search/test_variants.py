@@ -1,5 +1,6 @@
 """Candidates by hand: which effects are tried where, grids of shapes, sets of columns, and starting values."""
 
+from dataclasses import replace
 from types import SimpleNamespace as Made
 from typing import Any
 
@@ -66,6 +67,13 @@ def test_a_start_has_the_amplitudes_found_and_places_by_their_mass(name, amplitu
     made = variant(name, amplitudes, parameters)
     np.testing.assert_allclose(made.start(np.array(found)), start)
     np.testing.assert_array_equal(made.parameters, parameters)
+    assert made.count == len(found)
+
+
+def test_amplitudes_in_ratio_are_one_column():
+    made = replace(variant("com_offset", [0, 2]), together=np.array([2.0, -1.0]))
+    assert made.count == 1
+    np.testing.assert_array_equal(made.start(np.array([0.3])), [0.6, 0.0, -0.3])
 
 
 def assembly(**scales) -> Any:
