@@ -64,7 +64,7 @@ def report_on(
     fits = channel_fits(model, found.first.fit, final, train, held)
     left = decided.left
     again = {c: b for c, b in left.bursts.items() if b.again}
-    loud = sorted({r.channel for r in left.curves} | set(again))
+    loud = sorted({r.channel for r in left.curves} | set(again) | set(left.vibrations))
 
     def size(c: int, share: float) -> str:
         return percent(float(np.sqrt(share)) * fits[c].train.relative_after)
@@ -77,6 +77,11 @@ def report_on(
         f"on {channels[c]}, {percent(b.share)} of the residual comes in bursts, at {b.frequency:.2g} Hz where it is "
         f"strongest ({size(c, b.share)} of the channel's torque)"
         for c, b in again.items()
+    ]
+    said += [
+        f"on {channels[c]}, a vibration of {v.frequency:.2g} Hz at {percent(v.slow)} to {percent(v.fast)} of the peak "
+        f"speed still explains {percent(v.explained)} of the residual ({size(c, v.explained)} of the channel's torque)"
+        for c, v in left.vibrations.items()
     ]
     description = "; ".join(said)
     if findings:

@@ -16,7 +16,7 @@ def verdict(named: Collection[object], nameless: Collection[object], faults: Col
     named : collection
         Effects that the held-out recordings confirmed.
     nameless : collection
-        What they confirmed of the remaining residual without an effect for it: curves, bursts that came again, motion.
+        What they confirmed of the remaining residual without an effect for it: curves, vibration, motion.
     faults : collection
         Contradictions between recordings and model that no physics explains: nothing is decided beside them.
     """

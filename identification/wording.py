@@ -66,6 +66,9 @@ def noise_words(unit: str, noise: Noise, encoders: Sequence[NDArray[np.float64]]
         f"a wander of {noise.wander:.2g} {u} over {noise.wander_time:.2g} s",
         f"{heard:.2g} {u} of the encoders",
     ]
+    if (v := noise.vibration) is not None:
+        where = "any speed" if v.steady else f"about {percent(v.pace)} of the peak speed"
+        parts.append(f"a vibration of {v.level:.2g} {u} and {v.frequency:.2g} Hz at {where}")
     return listed(parts)
 
 

@@ -17,16 +17,16 @@ def bursts_of(found: Selection[Any], train: Sequence[Experiment], held: Sequence
     always = on.beside(mean)
     told: dict[int, Bursts] = {}
     for c in range(len(evidence.channels[0])):
-        parts = []
+        parts, plain = [], found.weighed.noises[c].plain
         for i, e in enumerate([*train, *held]):
             own = evidence.channels[i][c]
             left = own.residual - own.columns @ always[own.index]
             for item, amplitudes in mean:
                 left = left - evidence.contribution(i, c, evidence.items[item], amplitudes)
-            step = e.motion.period * e.motion.thinning
-            parts.append(
-                ChannelResidual(left, left * own.covariance.solve(left), found.weighed.runs[i][c].settles == 0, step)
-            )
+            step, run = e.motion.period * e.motion.thinning, found.weighed.runs[i][c]
+            # What comes and goes may be a vibration's; in units of that it would not.
+            k = own.covariance if plain is found.weighed.noises[c] else plain.covariance(run)
+            parts.append(ChannelResidual(left, left * k.solve(left), run.settles == 0, step))
         one = bursts(parts[: len(train)], parts[len(train) :])
         if one is not None:
             told[c] = one

@@ -162,13 +162,19 @@ def _runs(
                 rests = [_rests(m, x, train) for x in (own, *(x for x in several if x[c]))]
                 *sticks, settles = (np.max(shares, axis=0) for shares in zip(*rests, strict=True))
                 level = _level(found.assembly, found.theta, train, residuals, c, scale[c])
+            step, inside, encoder = m.period * m.thinning, m.band_segments(), encoder_noise(e, c)
             row.append(
-                NoiseChannel(
-                    m.period * m.thinning, m.band_segments(), encoder_noise(e, c), tuple(sticks), settles, level
-                )
+                NoiseChannel(step, inside, encoder, tuple(sticks), settles, level, pace=_pace(model, m, c, train))
             )
         made.append(row)
     return made
+
+
+def _pace(model: Model, motion: Motion, c: int, train: Sequence[Experiment]) -> Array | None:
+    """A joint's speed as a share of its peak speed (n,). On a suspension or a floating base every joint moves what
+    carries the others, which rings as it likes: none is given there."""
+    peak = max(float(np.abs(e.motion.qd[:, c]).max()) for e in train)
+    return np.abs(motion.to_band(motion.qd)[:, c]) / peak if model.tree.stands and peak > 0 else None
 
 
 def _axes_of_several(assembly: TorqueModel) -> list[Array]:
@@ -225,9 +231,7 @@ def _noise(
         middle = items[len(items) // 2]
         # What shows near rest, or has a hidden state, follows noise as well as it follows the law.
         if not (p.effect.at_rest or p.effect.exceeds_at_rest or p.effect.states):
-            laws += [
-                int(i) for i in middle.index[: max(len(middle.label.amplitudes), 1)] if columns.has(channel, int(i))
-            ]
+            laws += [int(i) for i in middle.index[: middle.label.count] if columns.has(channel, int(i))]
     small = [int(i) for (c, words), x in by_words.items() if c == channel and words in SMALL for i in x.index]
     n = along.n_train
 

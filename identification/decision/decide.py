@@ -1,6 +1,4 @@
-"""The whole decision: search, confirm, search again in place of names that were not confirmed, nameless curves and
-bursts.
-"""
+"""The whole decision: search, confirm, search again in place of names that were not confirmed, and what has no name."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,9 +15,7 @@ from .selection import F, Naming, Selection
 
 @dataclass(frozen=True)
 class Decision(Generic[F]):
-    """The decision: names that the held-out recordings confirmed, nameless curves and bursts, and the names that were
-    rejected.
-    """
+    """Names that the held-out recordings confirmed, what has no name, and the names that were rejected."""
 
     best: Confirmation[F]
     left: NamelessParts
@@ -32,8 +28,8 @@ class Decision(Generic[F]):
 
     @property
     def verdict(self) -> Verdict:
-        """The verdict by the names, and by nameless curves and bursts; a burst that occurs once does not count."""
-        return verdict(self.best.names, [*self.left.curves, *(b for b in self.left.bursts.values() if b.again)])
+        """The verdict by the names, and by what has none."""
+        return verdict(self.best.names, self.left.told)
 
 
 def decide(kind: RecordingKind[F], progress: Callable[[str], None] = lambda _: None) -> Decision[F]:

@@ -1,7 +1,7 @@
-"""The nameless part of the remaining residual: curves that the held-out recordings confirm, and bursts."""
+"""What has no name in the residual: curves and vibration that the held-out recordings confirm, and bursts."""
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -11,22 +11,30 @@ from ..deciding import DISCREPANCY, GATE
 from ..evidence.gain import Remaining, scatter
 from ..evidence.members import Members
 from ..evidence.search import MemberOdds
-from ..evidence.tolerant import searched
+from ..evidence.tolerant import searched, vibration_of
+from ..evidence.weighed import WeighedRecordings
 from ..nuisance.bursts import Bursts
 from .confirm import Confirmation
 from .kind import RecordingKind
 from .names import share_of_residual
 from .selection import F, Remainder, Selection
+from .vibration import ToldVibration, vibrations
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class NamelessParts:
-    """Nameless curves, and bursts by channel."""
+    """Nameless curves, and bursts and vibration by channel."""
 
     curves: tuple[Remainder, ...]
     bursts: Mapping[int, Bursts]
+    vibrations: Mapping[int, ToldVibration] = field(default_factory=dict)
+
+    @property
+    def told(self) -> list[object]:
+        """All of it that makes a model incomplete; a burst that occurs once does not."""
+        return [*self.curves, *self.vibrations.values(), *(b for b in self.bursts.values() if b.again)]
 
 
 def left_over(kind: RecordingKind[F], best: Confirmation[F], barred: Collection[str]) -> NamelessParts:
@@ -37,9 +45,25 @@ def left_over(kind: RecordingKind[F], best: Confirmation[F], barred: Collection[
     if best.rejected or found.searched is not found.last:
         weighed = kind.weighed(best.last, found.weighed)
         changed = {c for x in best.rejected for c in x.channels} or set(range(len(weighed.noises)))
-        weighed, made, slots, tolerance = searched(weighed, kind.train, barred, changed)
-        found = replace(found, weighed=weighed, search=made, slots=tuple(slots), tolerance=tolerance)
-    return NamelessParts(remainders(kind, found, best.last), kind.bursts(found))
+        found = _again(kind, found, weighed, barred, changed)
+    shaken = vibrations(kind, found)
+    if once := {c for c, x in enumerate(found.weighed.noises) if x.still is not x and c not in shaken}:
+        weighed = found.weighed
+        for c in once:
+            weighed = weighed.in_noise(c, weighed.noises[c].still)
+        found = _again(kind, found, weighed, {*barred, *map(vibration_of, once)}, once)
+    return NamelessParts(remainders(kind, found, best.last), kind.bursts(found), shaken)
+
+
+def _again(
+    kind: RecordingKind[F],
+    found: Selection[F],
+    weighed: WeighedRecordings,
+    barred: Collection[str],
+    changed: Collection[int],
+) -> Selection[F]:
+    weighed, made, slots, tolerance = searched(weighed, kind.train, barred, changed)
+    return replace(found, weighed=weighed, search=made, slots=tuple(slots), tolerance=tolerance)
 
 
 def remainders(kind: RecordingKind[F], found: Selection[F], fit: F) -> tuple[Remainder, ...]:

@@ -83,7 +83,8 @@ class Selection(Generic[F]):
     search: Search
     slots: tuple[MemberOdds, ...]
     """Of the last search."""
-    tolerance: float
+    tolerance: Array
+    """Of each body's masses."""
 
     @property
     def nameless(self) -> dict[tuple[int, str], float]:

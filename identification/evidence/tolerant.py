@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..deciding import TOLERANCES
-from ..nuisance.noise import Noise
+from ..nuisance.noise import Noise, NoiseChannel
+from ..nuisance.vibration import vibrating
 from .evidence import Evidence
 from .members import Members
 from .projected import ProjectedEvidence
@@ -19,42 +20,54 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class _Best:
-    """The best set of a search, its log evidence, and the tolerance of the masses."""
+    """The best set of a search, its log evidence, and the tolerance of each body's masses (bodies,)."""
 
     value: float
     search: Search
     taken: tuple[Member, ...]
-    tolerance: float
+    tolerance: Array
+
+
+def vibration_of(channel: int) -> str:
+    """The key that bars a channel's vibration."""
+    return f"vibration.{channel}"
 
 
 def searched(
     weighed: WeighedRecordings, recordings: Sequence[int], barred: Collection[str], channels: Collection[int]
-) -> tuple[WeighedRecordings, Search, list[MemberOdds], float]:
-    """The best set of explanations of some recordings, with its noise and its tolerance of the masses.
+) -> tuple[WeighedRecordings, Search, list[MemberOdds], Array]:
+    """The best set of explanations of some recordings, with its noise and its tolerances of the masses.
 
     Chosen before the search, a wide tolerance would take a payload in; without any, it would be named a payload. So
     with the noise: beside all that could be missing, a torque that wanders is taken for some of it; beside nothing,
-    what is missing is taken for a wander. Where something is found, both are tried, and the noise of what it
-    leaves; and everywhere that nothing wanders. ``channels`` are those of which that may have changed.
+    what is missing is taken for a wander. Where something is found, both are tried, and the noise of what it leaves;
+    and everywhere that nothing wanders, and what vibrates. ``channels`` are those of which that may have changed. One
+    body may be further off than the others are: a model is hardly ever as exact everywhere.
     """
     masses = weighed.beside.tolerant
     tolerances = (*TOLERANCES, *weighed.beside.more) if masses.stop > masses.start else TOLERANCES[:1]
-    best = max((_best(weighed, recordings, barred, x) for x in tolerances), key=lambda b: b.value)
-    before = weighed
+    alike = [np.full(weighed.beside.bodies, x) for x in tolerances]
+    best = max((_best(weighed, recordings, barred, x) for x in alike), key=lambda b: b.value)
+    best = _loosened(weighed, recordings, barred, best, tolerances)
+    before, left = weighed, _left(weighed, best, recordings)
     for c in sorted(channels):
-        weighed = _chosen(weighed, c, best, recordings, barred)
+        weighed = _chosen(weighed, c, best, [x[:, c] for x in left], recordings, barred)
     if weighed is not before:
         best = _best(weighed, recordings, barred, best.tolerance)
     return weighed, best.search, best.search.answer(), best.tolerance
 
 
 def _chosen(
-    weighed: WeighedRecordings, c: int, best: _Best, recordings: Sequence[int], barred: Collection[str]
+    weighed: WeighedRecordings,
+    c: int,
+    best: _Best,
+    left: Sequence[Array],
+    recordings: Sequence[int],
+    barred: Collection[str],
 ) -> WeighedRecordings:
-    """The noise of one channel that is likeliest beside the best set of explanations of that channel by itself."""
-    changes = _others(weighed, c, best, recordings)
-    if not changes:
-        return weighed
+    """The noise of one channel that is likeliest beside the best set of explanations of that channel by itself, which
+    leaves this of it in each recording (n,)."""
+    changes = _others(weighed, c, best, left, recordings, barred)
     alone, pool, always = weighed.evidence.alone(c, weighed.pool)
     out = {h for h, x in enumerate(pool) if x.key in barred}
     weight = weighed.beside.weight(best.tolerance)[always]
@@ -67,6 +80,8 @@ def _chosen(
     first = most = value(alone, own)
     for change in changes:
         noise = change(own)
+        if noise is own:
+            continue
         other = alone.with_covariances(0, [noise.covariance(row[c]) for row in weighed.runs])
         tried = value(other, noise)
         if tried > most:
@@ -75,7 +90,12 @@ def _chosen(
 
 
 def _others(
-    weighed: WeighedRecordings, c: int, best: _Best, recordings: Sequence[int]
+    weighed: WeighedRecordings,
+    c: int,
+    best: _Best,
+    left: Sequence[Array],
+    recordings: Sequence[int],
+    barred: Collection[str],
 ) -> list[Callable[[Noise], Noise]]:
     """Changes of a channel's noise that are worth a try, one after the other."""
     own, evidence = weighed.noises[c], weighed.evidence
@@ -87,7 +107,24 @@ def _others(
     if found:
         learnt = (weighed.bare(c), weighed.noise_of_rest(c, _added(weighed, c, best, found, recordings)))
         changes += [lambda x, other=other: replace(other, width=x.width) for other in learnt]
+    runs = [weighed.runs[i][c] for i in recordings]
+    changes.append(lambda x: _shaken(x, left, runs, barred=vibration_of(c) in barred))
     return changes
+
+
+def _shaken(noise: Noise, left: Sequence[Array], runs: Sequence[NoiseChannel], *, barred: bool) -> Noise:
+    """A noise with its vibration, that at some speeds not if it is barred."""
+    found = vibrating(left, runs, noise)
+    return found.still if barred else found
+
+
+def _left(weighed: WeighedRecordings, best: _Best, recordings: Sequence[int]) -> list[Array]:
+    """What the best set leaves of each recording (n, J)."""
+    members = Members(best.search.on, [(t.item, t.size) for t in best.taken])
+    mean = [(t.item, members.of(t.item)) for t in best.taken]
+    always, items = best.search.on.beside(mean), weighed.evidence.items
+    given = [(items[item], amplitudes) for item, amplitudes in mean]
+    return [weighed.evidence.left(i, always, given).residual for i in recordings]
 
 
 def _added(
@@ -101,7 +138,34 @@ def _added(
     ]
 
 
-def _best(weighed: WeighedRecordings, recordings: Sequence[int], barred: Collection[str], tolerance: float) -> _Best:
+def _loosened(
+    weighed: WeighedRecordings,
+    recordings: Sequence[int],
+    barred: Collection[str],
+    best: _Best,
+    tolerances: Sequence[float],
+) -> _Best:
+    """The best set with wider tolerances of single bodies, where something was found that these may explain: the ones
+    first with which nothing else explains the recordings best."""
+    bare, bodies = weighed.evidence.of_items([]), range(weighed.beside.bodies)
+
+    def null(tolerance: Array) -> float:
+        return ProjectedEvidence(bare, recordings, weighed.beside.weight(tolerance)).null
+
+    while best.taken and len(bodies) > 1:
+        wider = [np.where(np.arange(len(bodies)) == k, x, best.tolerance) for k in bodies for x in tolerances]
+        wider = [x for x in wider if np.any(x > best.tolerance)]
+        likeliest = max(wider, key=null, default=best.tolerance)
+        if null(likeliest) <= null(best.tolerance):
+            break
+        other = _best(weighed, recordings, barred, likeliest)
+        if other.value <= best.value:
+            break
+        best = other
+    return best
+
+
+def _best(weighed: WeighedRecordings, recordings: Sequence[int], barred: Collection[str], tolerance: Array) -> _Best:
     """The best set that simple moves reach from nothing."""
     out = {h for h, x in enumerate(weighed.pool) if x.key in barred}
     search = Search(

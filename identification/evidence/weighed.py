@@ -30,11 +30,15 @@ class NuisanceColumns:
     """Prior deviation of each of the baseline's parameters about its fit (P,), the first columns' unit."""
     more: tuple[float, ...] = ()
     """Tolerances beyond `TOLERANCES` that may be chosen."""
+    bodies: int = 1
+    """How many have a tolerance of their own; the tolerant columns are theirs one after the other, as many of each."""
 
-    def weight(self, tolerance: float) -> Array:
-        """Factors on the prior deviations (count,) for masses that are known to a share."""
+    def weight(self, tolerance: Array | float) -> Array:
+        """Factors on the prior deviations (count,) for masses that are known to a share, each body's to its own
+        (bodies,)."""
         weight = np.ones(self.count)
-        weight[self.tolerant] = tolerance
+        own = weight[self.tolerant]
+        weight[self.tolerant] = np.repeat(np.broadcast_to(tolerance, self.bodies), len(own) // self.bodies)
         return weight
 
 
@@ -53,6 +57,12 @@ class WeighedRecordings:
     """A channel's noise where nothing is missing."""
     noise_of_rest: Callable[[int, Sequence[Array]], Noise]
     """A channel's noise where nothing is missing but these parts (n,) of the training recordings' residuals."""
+
+    def in_noise(self, c: int, noise: Noise) -> "WeighedRecordings":
+        """These recordings with another noise of one channel."""
+        alone, _, _ = self.evidence.alone(c, ())
+        own = [noise.covariance(row[c]) for row in self.runs]
+        return self.with_noise(c, noise, alone.with_covariances(0, own))
 
     def with_noise(self, c: int, noise: Noise, alone: Evidence) -> "WeighedRecordings":
         """These recordings with another noise of one channel; ``alone`` is the channel's evidence under that noise."""

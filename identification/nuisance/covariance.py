@@ -3,7 +3,7 @@
     K = diag(variance) + sum_s level_s² c_s(|t - t'| / time_s) + diag(b) T diag(b)
 
 with c(x) = e^(-x) of a first-order lag, (1 + x) e^(-x) of two in a row (Matérn 3/2; Rasmussen and Williams 2006,
-chapter 4), and T the covariance of (e_t - 2 e_t-1 + e_t-2) / √6.
+chapter 4), an oscillation that decays with e^(-x) of a vibration, and T the covariance of (e_t - 2 e_t-1 + e_t-2) / √6.
 
 Every remembering process is an autoregression of first or second order on the band's even clock, so that with the
 hidden values x (all processes and e, sample by sample) K = D + H Q⁻¹ H' with a banded precision Q (Särkkä and Solin
@@ -31,11 +31,13 @@ _FACTORISE, _DIVIDE, _DIVIDE_BY_ROOT = get_lapack_funcs(("pbtrf", "pbtrs", "tbtr
 @dataclass(frozen=True)
 class LaggedNoise:
     """White noise through a lag, or through two in a row (``order`` 2; its spectrum falls with f⁴): standard deviation
-    ``level``, one number or one a sample (n,), and the lag's ``time`` [s]."""
+    ``level``, one number or one a sample (n,), and the lag's ``time`` [s]. Of order 2 it may vibrate at a ``frequency``
+    [Hz], as an oscillator does that is shaken, and whose vibration decays within ``time``."""
 
     level: "float | Array"
     time: float
     order: int = 1
+    frequency: float = 0.0
 
 
 class Covariance:
@@ -67,10 +69,10 @@ class Covariance:
         n = len(self._variance)
         there = [p for p in processes if np.any(np.asarray(p.level) > 0)]
         self._levels = [np.broadcast_to(np.asarray(p.level, float), (n,)) for p in there]
-        times = [p.time for p in there]
         has = derivative is not None and bool(np.any(derivative > 0))
         self._width = width = (len(self._levels) + has) * bool(n)
         self._orders = [p.order for p in there]
+        self._recursions = [_recursion(p, step) for p in there]
         self._log_det = float(np.sum(np.log(self._variance)))
         self._derivative = self._lagged(np.asarray(derivative, float), segments) if has else None
         if not width:
@@ -78,10 +80,9 @@ class Covariance:
         first, second = np.zeros((2, n), bool)
         first[[s.start for s in segments if s.stop > s.start]] = True
         second[[s.start + 1 for s in segments if s.stop > s.start + 1]] = True
-        self._first, self._decays = first, np.exp(-step / np.array(times))
+        self._first = first
         band = np.zeros(((2 * width if has or 2 in self._orders else width) + 1, n * width))
-        for s, (decay, order) in enumerate(zip(self._decays, self._orders, strict=True)):
-            a, b, fresh = _recursion(decay, order)
+        for s, ((a, b, fresh), order) in enumerate(zip(self._recursions, self._orders, strict=True)):
             one, two = np.full(n, a), np.full(n, b)  # from the sample before, and from the one before that
             news = np.full(n, 1 / fresh)
             begins = a / (1 - b)
@@ -210,6 +211,11 @@ class Covariance:
                 yield found
             row = rows.stop
 
+    def log_density(self, x: Array) -> Array:
+        """Log density of each sample of x (n,), given those before it [nats] (n,)."""
+        deviation = 1 / self._steps[:, -1, -1] if self._width else np.sqrt(self._variance)
+        return -0.5 * self.white(x[:, None])[:, 0] ** 2 - np.log(deviation) - 0.5 * np.log(2 * np.pi)
+
     @cached_property
     def _steps(self) -> Array:
         """Maps (n, m + 1, m + 1) from what is predicted of m hidden values, and a sample, to what is predicted
@@ -220,8 +226,8 @@ class Covariance:
         weights = np.stack([*self._levels, *before, *(self._derivative or ())], axis=1)
         d = weights.shape[1]
         forward, start, news = np.zeros((d, d)), np.eye(d), np.zeros((d, d))
-        for k, (decay, order) in enumerate(zip(self._decays, self._orders, strict=True)):
-            a, b, news[k, k] = _recursion(decay, order)
+        for k, ((a, b, fresh), order) in enumerate(zip(self._recursions, self._orders, strict=True)):
+            news[k, k] = fresh
             forward[k, k] = a
             if order == 2:
                 then = s + smooth.index(k)
@@ -251,9 +257,11 @@ class Covariance:
         return np.asarray(np.linalg.inv(self.solve(np.eye(n))), float)
 
 
-def _recursion(decay: float, order: int) -> tuple[float, float, float]:
+def _recursion(process: LaggedNoise, step: float) -> tuple[float, float, float]:
     """Of a process of unit variance: its factors of the sample before and of the one before that, and the variance of
-    what is new."""
-    if order == 1:
+    what is new (Box and Jenkins 1976, chapter 3)."""
+    decay = float(np.exp(-step / process.time))
+    if process.order == 1:
         return decay, 0.0, 1 - decay**2
-    return 2 * decay, -(decay**2), (1 - decay**2) ** 3 / (1 + decay**2)
+    a, b = 2 * decay * float(np.cos(2 * np.pi * process.frequency * step)), -(decay**2)
+    return a, b, (1 + b) * ((1 - b) ** 2 - a**2) / (1 - b)

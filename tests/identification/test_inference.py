@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from decided import decided, names
 from pendulum import recorded
+from scipy.signal import savgol_filter
+from shaken import chattering
 
 from snarelab.identification.fitting.experiment import load_experiments
 from snarelab.identification.fitting.fit import channel_rms
@@ -65,6 +67,50 @@ def test_beside_a_law_without_a_name_nothing_is_named(tmp_path):
         told += found.verdict == "unknown_effect"
     assert len(named) <= 1, named
     assert told >= 18
+
+
+def shake(path, seed, size, hertz, rate=200):
+    """A joint that chatters in its torque while it moves at a third to two thirds of its peak speed [N·m]."""
+    table = np.loadtxt(path, delimiter=",", skiprows=1)
+    speed = np.abs(np.asarray(savgol_filter(table[:, 1], 21, 2, deriv=1, delta=1 / rate)))
+    at_pace = (speed > speed.max() / 3) & (speed < 2 * speed.max() / 3)
+    table[:, 2] += size * chattering(np.random.default_rng(seed), at_pace, 1 / rate, hertz)
+    np.savetxt(path, table, delimiter=",", header="time,q.joint1,tau.joint1", comments="", fmt="%.8g")
+
+
+def chatters(folder, seed, again):
+    """What is told of a joint that chatters at some speeds, in the held-out recording ``again`` or not."""
+    folder.mkdir()
+    model = recorded(folder, seed)
+    for number, name in enumerate(("train.csv", "hold.csv") if again else ("train.csv",)):
+        shake(folder / name, 10 * seed + number, 2.0, 5.0)
+    return decided(model, folder)
+
+
+def test_a_joint_that_chatters_at_some_speeds_is_told_by_its_frequency_if_it_does_again(tmp_path):
+    found = chatters(tmp_path / "again", 81, again=True)
+    assert not names(found)
+    assert found.verdict == "unknown_effect"
+    (told,) = found.left.vibrations.values()
+    assert told.frequency == pytest.approx(5.0, rel=0.1)
+    assert told.slow < 1 / 2 < told.fast
+    found = chatters(tmp_path / "once", 81, again=False)
+    assert not names(found)
+    assert not found.left.vibrations
+
+
+@pytest.mark.slow
+def test_chatter_is_never_named_and_is_noise_where_few_passes_do_not_tell_its_speeds(tmp_path):
+    told = 0
+    for seed in range(82, 88):
+        again, once = (chatters(tmp_path / f"{seed}{x}", seed, again=x) for x in (True, False))
+        assert not names(again)
+        assert not once.left.vibrations
+        (noise,) = again.found.weighed.noises
+        assert noise.vibration
+        assert noise.vibration.frequency == pytest.approx(5.0, rel=0.1)
+        told += bool(again.left.vibrations)
+    assert told >= 2
 
 
 def relative(fit, folder):

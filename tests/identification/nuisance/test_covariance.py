@@ -22,9 +22,14 @@ def dense(variance, processes, derivative, segments):
     same = run[:, None] == run[None, :]
     for p in processes:
         lags, decay = np.abs(t[:, None] - t) / STEP, np.exp(-STEP / p.time)
-        # Two lags in a row: the sum of the products of their impulse responses, k ρ^k, in closed form.
-        twice = lags * (1 - decay**2) / (1 + decay**2) if p.order == 2 else 0.0
-        k += p.level**2 * same * decay**lags * (1 + twice)
+        # Two lags in a row: the sum of the products of their impulse responses, k ρ^k, in closed form; of a vibration,
+        # ρ^k sin((k + 1) ω) / sin ω.
+        shape = 1 + lags * (1 - decay**2) / (1 + decay**2) if p.order == 2 else 1.0
+        if p.frequency:
+            w = 2 * np.pi * p.frequency * STEP
+            shape = np.cos(lags * w) + np.sin(lags * w) / np.tan(w) * (1 - decay**2) / (1 + decay**2)
+        level = np.broadcast_to(p.level, n)
+        k += level[:, None] * level * same * decay**lags * shape
     if derivative is not None:
         difference = np.zeros((n, n))
         for s in segments:
@@ -49,6 +54,8 @@ KINDS = {
     "smooth": ((LaggedNoise(0.7, 0.1, 2),), False),
     "smooth and wandering": ((LaggedNoise(2.0, 8.0), LaggedNoise(0.7, 0.1, 2)), False),
     "smooth, wandering, encoders": ((LaggedNoise(0.7, 0.1, 2), LaggedNoise(2.0, 8.0)), True),
+    "vibrating": ((LaggedNoise(0.7, 0.4, 2, 3.1),), False),
+    "vibrating now and then": ((LaggedNoise(np.linspace(0.0, 2.0, 90), 0.4, 2, 3.1), LaggedNoise(0.7, 0.1)), True),
     "all": ((LaggedNoise(0.7, 0.1), LaggedNoise(0.0, 1.0), LaggedNoise(2.0, 8.0)), True),
 }
 
@@ -81,6 +88,19 @@ def test_columns_made_white_have_the_products_of_the_dense_inverse(kind, segment
     if segments is PARTS:  # outside every run a sample is like one in a run of its own: compared with `solve`
         wanted = x.T @ found.solve(y)
     np.testing.assert_allclose(found.white(x).T @ found.white(y), wanted, rtol=1e-8, atol=1e-9)
+
+
+def test_densities_of_samples_add_up_to_that_of_all():
+    variance, encoders, x = some(4)
+    for processes in ((), (LaggedNoise(2.0, 8.0), LaggedNoise(0.7, 0.4, 2, 3.1))):
+        own = Covariance(variance, processes, encoders if processes else None, STEP, PARTS)
+        every = own.log_density(x[:, 0])
+        whole = -0.5 * (x[:, 0] @ own.solve(x[:, 0]) + own.log_det + 90 * np.log(2 * np.pi))
+        assert every.shape == (90,)
+        assert every.sum() == pytest.approx(whole, rel=1e-10)
+        # Nothing that comes later is known yet.
+        before = Covariance(variance[:37], processes, encoders[:37] if processes else None, STEP, PARTS[:1])
+        np.testing.assert_allclose(before.log_density(x[:37, 0]), every[:37], rtol=1e-10)
 
 
 def test_a_process_of_no_level_and_no_derivative_are_none():
