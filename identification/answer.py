@@ -92,7 +92,7 @@ def report_on(
         remainder = f" {description[:1].upper()}{description[1:]}." if description else ""
     noise = {
         channels[c]: noise_words(fits[c].unit, x, [row[c].encoder for row in found.weighed.runs])
-        for c, x in enumerate(found.weighed.noises)
+        for c, x in enumerate(left.noises or found.weighed.noises)
     }
     named = {n.placed.key for n in best.names}
     notes = [f"{Path(e.motion.path).name}: {note}" for e in (*train, *held) for note in e.motion.notes]

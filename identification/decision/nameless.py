@@ -11,9 +11,9 @@ from ..deciding import DISCREPANCY, GATE
 from ..evidence.gain import Remaining, scatter
 from ..evidence.members import Members
 from ..evidence.search import MemberOdds
-from ..evidence.tolerant import searched, vibration_of
-from ..evidence.weighed import WeighedRecordings
+from ..evidence.tolerant import Searched, searched, shaken
 from ..nuisance.bursts import Bursts
+from ..nuisance.noise import Noise
 from .confirm import Confirmation
 from .kind import RecordingKind
 from .names import share_of_residual
@@ -25,11 +25,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class NamelessParts:
-    """Nameless curves, and bursts and vibration by channel."""
+    """Nameless curves, bursts and vibration by channel, and each channel's noise with what vibrates."""
 
     curves: tuple[Remainder, ...]
     bursts: Mapping[int, Bursts]
     vibrations: Mapping[int, ToldVibration] = field(default_factory=dict)
+    noises: tuple[Noise, ...] = ()
 
     @property
     def told(self) -> list[object]:
@@ -45,24 +46,31 @@ def left_over(kind: RecordingKind[F], best: Confirmation[F], barred: Collection[
     if best.rejected or found.searched is not found.last:
         weighed = kind.weighed(best.last, found.weighed)
         changed = {c for x in best.rejected for c in x.channels} or set(range(len(weighed.noises)))
-        found = _again(kind, found, weighed, barred, changed)
-    shaken = vibrations(kind, found)
-    if once := {c for c, x in enumerate(found.weighed.noises) if x.still is not x and c not in shaken}:
-        weighed = found.weighed
-        for c in once:
-            weighed = weighed.in_noise(c, weighed.noises[c].still)
-        found = _again(kind, found, weighed, {*barred, *map(vibration_of, once)}, once)
-    return NamelessParts(remainders(kind, found, best.last), kind.bursts(found), shaken)
+        found = _with(found, searched(weighed, kind.train, barred, changed))
+    told: Mapping[int, ToldVibration] = {}
+    noises = found.weighed.noises
+    if more := shaken(found.weighed, kind.train, barred, found.tolerance):
+        other = _with(found, more)
+        told = vibrations(kind, other)
+        noises = tuple(x if c in told else x.still for c, x in enumerate(other.weighed.noises))
+        # Where the held-out recordings do not confirm it, all is as it was before.
+        found = _in_noises(kind, other, noises, barred) if told else found
+    return NamelessParts(remainders(kind, found, best.last), kind.bursts(found), told, noises)
 
 
-def _again(
-    kind: RecordingKind[F],
-    found: Selection[F],
-    weighed: WeighedRecordings,
-    barred: Collection[str],
-    changed: Collection[int],
+def _in_noises(
+    kind: RecordingKind[F], found: Selection[F], noises: Sequence[Noise], barred: Collection[str]
 ) -> Selection[F]:
-    weighed, made, slots, tolerance = searched(weighed, kind.train, barred, changed)
+    weighed = found.weighed
+    changed = {c for c, x in enumerate(noises) if x is not weighed.noises[c]}
+    for c in changed:
+        weighed = weighed.in_noise(c, noises[c])
+    return _with(found, searched(weighed, kind.train, barred, changed)) if changed else found
+
+
+def _with(found: Selection[F], again: Searched) -> Selection[F]:
+    """A search, done again beside the same fit."""
+    weighed, made, slots, tolerance = again
     return replace(found, weighed=weighed, search=made, slots=tuple(slots), tolerance=tolerance)
 
 

@@ -2,12 +2,13 @@
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..deciding import TOLERANCES
-from ..nuisance.noise import Noise, NoiseChannel
+from ..nuisance.noise import Noise
 from ..nuisance.vibration import vibrating
 from .evidence import Evidence
 from .members import Members
@@ -28,32 +29,49 @@ class _Best:
     tolerance: Array
 
 
-def vibration_of(channel: int) -> str:
-    """The key that bars a channel's vibration."""
-    return f"vibration.{channel}"
+Searched = tuple[WeighedRecordings, Search, list[MemberOdds], Array]
+"""Recordings in the noise that was chosen, the search, its best set, and the tolerance of each body's masses."""
 
 
 def searched(
     weighed: WeighedRecordings, recordings: Sequence[int], barred: Collection[str], channels: Collection[int]
-) -> tuple[WeighedRecordings, Search, list[MemberOdds], Array]:
+) -> Searched:
     """The best set of explanations of some recordings, with its noise and its tolerances of the masses.
 
     Chosen before the search, a wide tolerance would take a payload in; without any, it would be named a payload. So
     with the noise: beside all that could be missing, a torque that wanders is taken for some of it; beside nothing,
     what is missing is taken for a wander. Where something is found, both are tried, and the noise of what it leaves;
-    and everywhere that nothing wanders, and what vibrates. ``channels`` are those of which that may have changed. One
-    body may be further off than the others are: a model is hardly ever as exact everywhere.
+    and everywhere that nothing wanders. ``channels`` are those of which that may have changed. One body may be further
+    off than the others are: a model is hardly ever as exact everywhere.
     """
     masses = weighed.beside.tolerant
     tolerances = (*TOLERANCES, *weighed.beside.more) if masses.stop > masses.start else TOLERANCES[:1]
     alike = [np.full(weighed.beside.bodies, x) for x in tolerances]
     best = max((_best(weighed, recordings, barred, x) for x in alike), key=lambda b: b.value)
     best = _loosened(weighed, recordings, barred, best, tolerances)
-    before, left = weighed, _left(weighed, best, recordings)
+    before = weighed
     for c in sorted(channels):
-        weighed = _chosen(weighed, c, best, [x[:, c] for x in left], recordings, barred)
+        weighed = _chosen(weighed, c, best, _others(weighed, c, best, recordings), recordings, barred)
     if weighed is not before:
         best = _best(weighed, recordings, barred, best.tolerance)
+    return weighed, best.search, best.search.answer(), best.tolerance
+
+
+def shaken(
+    weighed: WeighedRecordings, recordings: Sequence[int], barred: Collection[str], tolerance: Array
+) -> Searched | None:
+    """The same with what vibrates in the noise; None where nothing does.
+
+    For what is left at the end: before, vibration would stand for what is still to be named, as for a ripple at a
+    steady speed, and make the rest of the noise too small."""
+    best = _best(weighed, recordings, barred, tolerance)
+    before, left = weighed, _left(weighed, best, recordings)
+    for c in range(len(weighed.noises)):
+        own, runs = [x[:, c] for x in left], [weighed.runs[i][c] for i in recordings]
+        weighed = _chosen(weighed, c, best, [partial(vibrating, own, runs)], recordings, barred)
+    if weighed is before:
+        return None
+    best = _best(weighed, recordings, barred, tolerance)
     return weighed, best.search, best.search.answer(), best.tolerance
 
 
@@ -61,13 +79,13 @@ def _chosen(
     weighed: WeighedRecordings,
     c: int,
     best: _Best,
-    left: Sequence[Array],
+    changes: Sequence[Callable[[Noise], Noise]],
     recordings: Sequence[int],
     barred: Collection[str],
 ) -> WeighedRecordings:
-    """The noise of one channel that is likeliest beside the best set of explanations of that channel by itself, which
-    leaves this of it in each recording (n,)."""
-    changes = _others(weighed, c, best, left, recordings, barred)
+    """The noise of one channel that is likeliest beside the best set of explanations of that channel by itself."""
+    if not changes:
+        return weighed
     alone, pool, always = weighed.evidence.alone(c, weighed.pool)
     out = {h for h, x in enumerate(pool) if x.key in barred}
     weight = weighed.beside.weight(best.tolerance)[always]
@@ -90,12 +108,7 @@ def _chosen(
 
 
 def _others(
-    weighed: WeighedRecordings,
-    c: int,
-    best: _Best,
-    left: Sequence[Array],
-    recordings: Sequence[int],
-    barred: Collection[str],
+    weighed: WeighedRecordings, c: int, best: _Best, recordings: Sequence[int]
 ) -> list[Callable[[Noise], Noise]]:
     """Changes of a channel's noise that are worth a try, one after the other."""
     own, evidence = weighed.noises[c], weighed.evidence
@@ -107,15 +120,7 @@ def _others(
     if found:
         learnt = (weighed.bare(c), weighed.noise_of_rest(c, _added(weighed, c, best, found, recordings)))
         changes += [lambda x, other=other: replace(other, width=x.width) for other in learnt]
-    runs = [weighed.runs[i][c] for i in recordings]
-    changes.append(lambda x: _shaken(x, left, runs, barred=vibration_of(c) in barred))
     return changes
-
-
-def _shaken(noise: Noise, left: Sequence[Array], runs: Sequence[NoiseChannel], *, barred: bool) -> Noise:
-    """A noise with its vibration, that at some speeds not if it is barred."""
-    found = vibrating(left, runs, noise)
-    return found.still if barred else found
 
 
 def _left(weighed: WeighedRecordings, best: _Best, recordings: Sequence[int]) -> list[Array]:
