@@ -106,7 +106,7 @@ def test_chatter_is_never_named_and_is_noise_where_few_passes_do_not_tell_its_sp
         again, once = (chatters(tmp_path / f"{seed}{x}", seed, again=x) for x in (True, False))
         assert not names(again)
         assert not once.left.vibrations
-        (noise,) = again.found.weighed.noises
+        (noise,) = again.left.noises
         assert noise.vibration
         assert noise.vibration.frequency == pytest.approx(5.0, rel=0.1)
         told += bool(again.left.vibrations)
