@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.regressor import OWN
 from ..deciding import BASELINE, BASELINE_OWN, BASELINE_SHAPE
 from ..evidence.pool import CandidateColumns, Curves
 from ..evidence.weighed import NuisanceColumns, Part
@@ -49,9 +48,7 @@ def columns_beside(
                 row[c].append(x)
         count += block.count
     joined = [[_joined(own) for own in row] for row in parts]
-    beside = [[np.hstack(own) for own in row] for row in noise_beside]
-    links = max((tolerant.stop - tolerant.start) // OWN, 1)
-    return NuisanceColumns(joined, count, tolerant, beside, spread, bodies=links)
+    return NuisanceColumns(joined, count, tolerant, [[np.hstack(own) for own in row] for row in noise_beside], spread)
 
 
 def _filled(part: Part, n: int) -> Part:

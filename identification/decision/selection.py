@@ -83,8 +83,7 @@ class Selection(Generic[F]):
     search: Search
     slots: tuple[MemberOdds, ...]
     """Of the last search."""
-    tolerance: Array
-    """Of each body's masses."""
+    tolerance: float
 
     @property
     def nameless(self) -> dict[tuple[int, str], float]:

@@ -207,7 +207,7 @@ class Evidence:
 
     def of_items(self, numbers: Sequence[int]) -> "Evidence":
         """The evidence of some items by themselves, without the columns of the others."""
-        columns = np.unique(np.concatenate([np.zeros(0, int), *(self.items[x].index for x in numbers)]))
+        columns = np.unique(np.concatenate([self.items[x].index for x in numbers]))
         other = copy(self)
         other.items = tuple(
             replace(self.items[x], index=np.searchsorted(columns, self.items[x].index)) for x in numbers

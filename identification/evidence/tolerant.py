@@ -21,34 +21,31 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class _Best:
-    """The best set of a search, its log evidence, and the tolerance of each body's masses (bodies,)."""
+    """The best set of a search, its log evidence, and the tolerance of the masses."""
 
     value: float
     search: Search
     taken: tuple[Member, ...]
-    tolerance: Array
+    tolerance: float
 
 
-Searched = tuple[WeighedRecordings, Search, list[MemberOdds], Array]
-"""Recordings in the noise that was chosen, the search, its best set, and the tolerance of each body's masses."""
+Searched = tuple[WeighedRecordings, Search, list[MemberOdds], float]
+"""Recordings in the noise that was chosen, the search, its best set, and the tolerance of the masses."""
 
 
 def searched(
     weighed: WeighedRecordings, recordings: Sequence[int], barred: Collection[str], channels: Collection[int]
 ) -> Searched:
-    """The best set of explanations of some recordings, with its noise and its tolerances of the masses.
+    """The best set of explanations of some recordings, with its noise and its tolerance of the masses.
 
     Chosen before the search, a wide tolerance would take a payload in; without any, it would be named a payload. So
     with the noise: beside all that could be missing, a torque that wanders is taken for some of it; beside nothing,
     what is missing is taken for a wander. Where something is found, both are tried, and the noise of what it leaves;
-    and everywhere that nothing wanders. ``channels`` are those of which that may have changed. One body may be further
-    off than the others are: a model is hardly ever as exact everywhere.
+    and everywhere that nothing wanders. ``channels`` are those of which that may have changed.
     """
     masses = weighed.beside.tolerant
     tolerances = (*TOLERANCES, *weighed.beside.more) if masses.stop > masses.start else TOLERANCES[:1]
-    alike = [np.full(weighed.beside.bodies, x) for x in tolerances]
-    best = max((_best(weighed, recordings, barred, x) for x in alike), key=lambda b: b.value)
-    best = _loosened(weighed, recordings, barred, best, tolerances)
+    best = max((_best(weighed, recordings, barred, x) for x in tolerances), key=lambda b: b.value)
     before = weighed
     for c in sorted(channels):
         weighed = _chosen(weighed, c, best, _others(weighed, c, best, recordings), recordings, barred)
@@ -58,7 +55,7 @@ def searched(
 
 
 def shaken(
-    weighed: WeighedRecordings, recordings: Sequence[int], barred: Collection[str], tolerance: Array
+    weighed: WeighedRecordings, recordings: Sequence[int], barred: Collection[str], tolerance: float
 ) -> Searched | None:
     """The same with what vibrates in the noise; None where nothing does.
 
@@ -143,34 +140,7 @@ def _added(
     ]
 
 
-def _loosened(
-    weighed: WeighedRecordings,
-    recordings: Sequence[int],
-    barred: Collection[str],
-    best: _Best,
-    tolerances: Sequence[float],
-) -> _Best:
-    """The best set with wider tolerances of single bodies, where something was found that these may explain: the ones
-    first with which nothing else explains the recordings best."""
-    bare, bodies = weighed.evidence.of_items([]), range(weighed.beside.bodies)
-
-    def null(tolerance: Array) -> float:
-        return ProjectedEvidence(bare, recordings, weighed.beside.weight(tolerance)).null
-
-    while best.taken and len(bodies) > 1:
-        wider = [np.where(np.arange(len(bodies)) == k, x, best.tolerance) for k in bodies for x in tolerances]
-        wider = [x for x in wider if np.any(x > best.tolerance)]
-        likeliest = max(wider, key=null, default=best.tolerance)
-        if null(likeliest) <= null(best.tolerance):
-            break
-        other = _best(weighed, recordings, barred, likeliest)
-        if other.value <= best.value:
-            break
-        best = other
-    return best
-
-
-def _best(weighed: WeighedRecordings, recordings: Sequence[int], barred: Collection[str], tolerance: Array) -> _Best:
+def _best(weighed: WeighedRecordings, recordings: Sequence[int], barred: Collection[str], tolerance: float) -> _Best:
     """The best set that simple moves reach from nothing."""
     out = {h for h, x in enumerate(weighed.pool) if x.key in barred}
     search = Search(

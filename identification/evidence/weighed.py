@@ -30,15 +30,11 @@ class NuisanceColumns:
     """Prior deviation of each of the baseline's parameters about its fit (P,), the first columns' unit."""
     more: tuple[float, ...] = ()
     """Tolerances beyond `TOLERANCES` that may be chosen."""
-    bodies: int = 1
-    """How many have a tolerance of their own; the tolerant columns are theirs one after the other, as many of each."""
 
-    def weight(self, tolerance: Array | float) -> Array:
-        """Factors on the prior deviations (count,) for masses that are known to a share, each body's to its own
-        (bodies,)."""
+    def weight(self, tolerance: float) -> Array:
+        """Factors on the prior deviations (count,) for masses that are known to a share."""
         weight = np.ones(self.count)
-        own = weight[self.tolerant]
-        weight[self.tolerant] = np.repeat(np.broadcast_to(tolerance, self.bodies), len(own) // self.bodies)
+        weight[self.tolerant] = tolerance
         return weight
 
 
