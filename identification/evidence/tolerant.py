@@ -57,7 +57,7 @@ def searched(
 def shaken(
     weighed: WeighedRecordings, recordings: Sequence[int], barred: Collection[str], tolerance: float
 ) -> Searched | None:
-    """The same with what vibrates in the noise; None where nothing does.
+    """The best set with what vibrates in the noise; None where nothing does.
 
     For what is left at the end: before, vibration would stand for what is still to be named, as for a ripple at a
     steady speed, and make the rest of the noise too small."""
