@@ -2,13 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from scipy.stats import norm
 
 from ..deciding import DISCREPANCY, GATE
-from ..evidence.members import Members
+from ..evidence.members import left_by
 from .kind import RecordingKind
 from .selection import F, Selection
 
@@ -30,14 +29,14 @@ def vibrations(kind: RecordingKind[F], found: Selection[F]) -> Mapping[int, Told
     """Of every channel whose noise vibrates at some speeds, if it does in the held-out recordings too.
 
     Without it the noise is the likeliest of the training recordings by itself, or that which was beside the vibration:
-    the held-out recordings may be quieter as a whole. In either noise the chance that their density is G nats higher
-    with the vibration is at most e^(-G) (Markov's inequality), however they scatter. The block of time that gains most
-    does not count: what occurs once, as a knock does, follows no speed.
+    the held-out recordings may be quieter as a whole. Were either noise the true one, the chance that their density is
+    G nats higher with the vibration would be at most e^(-G) (Markov's inequality); real noise is neither. The block of
+    time that gains most does not count: what occurs once, as a knock does, follows no speed.
     """
     noises, told = found.weighed.noises, dict[int, ToldVibration]()
     if not any(x.vibration for x in noises):
         return told
-    left = _left(found)
+    left = left_by(found.search.on, [(s.taken.item, s.taken.size) for s in found.slots], [*kind.train, *kind.held])
     for c, noise in enumerate(noises):
         v = noise.vibration
         if v is None or v.steady:
@@ -57,12 +56,3 @@ def vibrations(kind: RecordingKind[F], found: Selection[F]) -> Mapping[int, Told
             share = min(float(energy.mean() / whole.mean()), 1.0)
             told[c] = ToldVibration(v.frequency, max(v.pace - reach, 0.0), min(v.pace + reach, 1.0), share, held)
     return told
-
-
-def _left(found: Selection[Any]) -> list[np.ndarray]:
-    """What all that was found leaves of every recording (n, J)."""
-    members = Members(found.search.on, [(s.taken.item, s.taken.size) for s in found.slots])
-    mean = [(s.taken.item, members.of(s.taken.item)) for s in found.slots]
-    always, evidence = found.search.on.beside(mean), found.weighed.evidence
-    given = [(evidence.items[item], amplitudes) for item, amplitudes in mean]
-    return [evidence.left(i, always, given).residual for i in range(len(evidence.channels))]

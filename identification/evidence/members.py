@@ -97,3 +97,11 @@ def log_bayes_whole(curvature: Array, score: Array) -> Array:
     left = score - h
     k2 = WHOLE**2
     return score - 0.5 * h - 0.5 * np.log1p(k2 * h) + 0.5 * k2 * left**2 / (1 + k2 * h)
+
+
+def left_by(on: ProjectedEvidence, pairs: Sequence[tuple[int, float]], recordings: Sequence[int]) -> list[Array]:
+    """What a set of items, with their sizes, leaves of recordings beside all that always stands (n, J)."""
+    members, items = Members(on, pairs), on.evidence.items
+    mean = [(item, members.of(item)) for item, _ in pairs]
+    always, given = on.beside(mean), [(items[item], amplitudes) for item, amplitudes in mean]
+    return [on.evidence.left(i, always, given).residual for i in recordings]

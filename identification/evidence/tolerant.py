@@ -11,7 +11,7 @@ from ..deciding import TOLERANCES
 from ..nuisance.noise import Noise
 from ..nuisance.vibration import vibrating
 from .evidence import Evidence
-from .members import Members
+from .members import Members, left_by
 from .projected import ProjectedEvidence
 from .search import Member, MemberOdds, Search
 from .weighed import WeighedRecordings
@@ -62,7 +62,8 @@ def shaken(
     For what is left at the end: before, vibration would stand for what is still to be named, as for a ripple at a
     steady speed, and make the rest of the noise too small."""
     best = _best(weighed, recordings, barred, tolerance)
-    before, left = weighed, _left(weighed, best, recordings)
+    before = weighed
+    left = left_by(best.search.on, [(t.item, t.size) for t in best.taken], recordings)
     for c in range(len(weighed.noises)):
         own, runs = [x[:, c] for x in left], [weighed.runs[i][c] for i in recordings]
         weighed = _chosen(weighed, c, best, [partial(vibrating, own, runs)], recordings, barred)
@@ -118,15 +119,6 @@ def _others(
         learnt = (weighed.bare(c), weighed.noise_of_rest(c, _added(weighed, c, best, found, recordings)))
         changes += [lambda x, other=other: replace(other, width=x.width) for other in learnt]
     return changes
-
-
-def _left(weighed: WeighedRecordings, best: _Best, recordings: Sequence[int]) -> list[Array]:
-    """What the best set leaves of each recording (n, J)."""
-    members = Members(best.search.on, [(t.item, t.size) for t in best.taken])
-    mean = [(t.item, members.of(t.item)) for t in best.taken]
-    always, items = best.search.on.beside(mean), weighed.evidence.items
-    given = [(items[item], amplitudes) for item, amplitudes in mean]
-    return [weighed.evidence.left(i, always, given).residual for i in recordings]
 
 
 def _added(

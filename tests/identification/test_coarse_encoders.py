@@ -48,6 +48,5 @@ def test_what_knocks_once_is_noted_and_what_comes_again_has_no_name(tmp_path):
     assert any("do not recur" in note and "tau.joint1" in note for note in once.notes)
     again = diagnosed(tmp_path, 1, knocks=(3.3, 7.3, 10.9))
     assert again.verdict == "unknown_effect", again.sentence
-    said = ("comes in bursts, at 6.8 Hz", "comes in bursts, at 7 Hz", "a vibration of 6.9 Hz", "a vibration of 7 Hz")
-    assert any(words in again.description for words in said), again.description
+    assert "comes in bursts, at 6.8 Hz" in again.description or "comes in bursts, at 7 Hz" in again.description
     assert not any("do not recur" in note for note in again.notes)

@@ -92,7 +92,7 @@ def test_a_joint_that_chatters_at_some_speeds_is_told_by_its_frequency_if_it_doe
     assert not names(found)
     assert found.verdict == "unknown_effect"
     (told,) = found.left.vibrations.values()
-    assert told.frequency == pytest.approx(5.0, rel=0.1)
+    assert told.frequency == pytest.approx(5.0, rel=0.05)
     assert told.slow < 1 / 2 < told.fast
     found = chatters(tmp_path / "once", 81, again=False)
     assert not names(found)
@@ -108,7 +108,7 @@ def test_chatter_is_never_named_and_is_noise_where_few_passes_do_not_tell_its_sp
         assert not once.left.vibrations
         (noise,) = again.left.noises
         assert noise.vibration
-        assert noise.vibration.frequency == pytest.approx(5.0, rel=0.1)
+        assert noise.vibration.frequency == pytest.approx(5.0, rel=0.05)
         told += bool(again.left.vibrations)
     assert told >= 2
 

@@ -43,7 +43,7 @@ def test_a_joint_that_chatters_at_some_speeds_has_its_frequency_and_these_speeds
     v = found.vibration
     assert v is not None
     assert not v.steady
-    assert v.frequency == pytest.approx(hertz, rel=0.1)
+    assert v.frequency == pytest.approx(hertz, rel=0.05)
     assert 0.3 <= v.pace <= 0.6
     assert np.hypot(found.white, found.coloured) == pytest.approx(np.hypot(0.2, 0.3), rel=0.4)
     assert found.still.vibration is None or found.still.vibration.steady
