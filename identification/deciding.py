@@ -46,6 +46,18 @@ WANDER_PRIOR = 5.0
 DRIVEN = 0.01
 """Largest share of a joint's jerk that unexplained torque may have driven inside the instrument motion's band."""
 
+# Vibration.
+VIBRATION_PACES = (0.15, 0.3, 0.45, 0.6, 0.8)
+"""Speeds about which a joint may vibrate [share of its peak speed] ..."""
+VIBRATION_WIDTHS = (0.15, 0.3)
+"""... and how far about them [standard deviation, share of the peak speed]."""
+VIBRATION_SLOWEST = 1.0
+"""Lowest frequency [Hz]: what is slower is a joint's own motion."""
+VIBRATION_RESOLVED = 0.35
+"""Highest frequency [1 / period of the samples]."""
+VIBRATION_DAMPING = 0.05
+"""Largest damping ratio: structures have 0.5 to 5 %, and what dies faster is no vibration."""
+
 # Sticking.
 STICKS = ((0.04, 0.005), (0.01, 0.001))
 """Below this share of the peak speed, or so shortly after it (share of the travel), a joint holds any torque; the

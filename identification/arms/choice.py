@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from ..deciding import LAW_ERROR
 from ..decision.kind import Chosen
 from ..evidence.search import MemberOdds, Search
-from .hypotheses import remembers
+from .laws import remembers
 
 
 def together(made: Search, slots: Sequence[MemberOdds], large: Sequence[MemberOdds]) -> list[Chosen]:

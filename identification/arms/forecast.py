@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...models.model import Model
-from ..decision.kind import Forecast
 from ..decision.selection import Selection
-from ..evidence.projected import ProjectedEvidence
+from ..evidence.forecast import Forecast
+from ..evidence.forecast import forecast as predicted
 from ..fitting.experiment import Experiment, Scales
 from ..fitting.fit import Fit
 from .weigh import weigh
@@ -45,16 +45,12 @@ def forecast(
         nameless=found.nameless,
         residuals=residuals,
     )
-    weight = weighed.beside.weight(found.tolerance)
-    weight[: len(own.theta)][own.at_bound] = 0.0
-    fitted_by = ProjectedEvidence(weighed.evidence, range(n), weight)
-    mean, covariance = known = fitted_by.posterior(len(own.theta))
-    unit = weighed.beside.spread
+    # Masses that were learnt would be a name of a mass, at however many deviations; and what laws have wrong, and how
+    # a recording starts, is each recording's own.
+    count = len(own.theta)
+    untold = np.arange(count, weighed.beside.count)
     held = range(n, len(experiments))
-    on = ProjectedEvidence(weighed.evidence, held, weight, known)
-    always = on.beside([])
-    left = tuple(weighed.evidence.left(i, always, []) for i in held)
-    return Forecast(on.null, left, unit * mean, covariance * np.outer(unit, unit))
+    return predicted(weighed, range(n), held, count, fixed=np.flatnonzero(own.at_bound), untold=untold)
 
 
 def known_to(fit: Fit, told: Forecast) -> Fit:

@@ -1,16 +1,13 @@
 """Named effects and nameless curves of an arm's joints as hypotheses: their columns."""
 
-import functools
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...models.effect import Effect
 from ...models.model import Model, PlacedEffect
 from ..deciding import BENDS, SLOPE
 from ..evidence.pool import CandidateColumns, Curves, Item
@@ -21,6 +18,7 @@ from ..fitting.periodogram import Peaks
 from ..nuisance.curve import SMALL, Coordinates, family
 from ..nuisance.start import free_responses, springs_back
 from ..search.candidates import MOST_OF_WHOLE, EffectVariant, candidate_columns, library, reduced, variants
+from .laws import coordinate, remembers
 from .whole_mass import by_mass
 
 Array = NDArray[np.float64]
@@ -186,11 +184,6 @@ def _in_ratio(
     )
 
 
-def remembers(p: PlacedEffect) -> bool:
-    """Whether a law has a memory that is no drive's or link's own: a sling's carriage, a tank, a late sensor."""
-    return bool(p.effect.states) and p.effect.at != "joint" and p.effect.acts_on == "torque"
-
-
 def lagging(along: ColumnSource, parts: Mapping[int, Sequence[Array]], columns: CandidateColumns) -> Item:
     """What a law adds if it is early or late: the first two derivatives by time of each of its columns.
 
@@ -236,11 +229,6 @@ def _about_peaks(assembly: TorqueModel, p: PlacedEffect, peaks: Peaks) -> list[E
     at = [x.periodic_over != "" for x in p.effect.parameters]
     waves = (peaks.waves[:, None] + peaks.step * np.array([-1, 0, 1])).ravel()
     return [replace(v, parameters=np.where(at, 1 / w, v.parameters)) for w in waves]
-
-
-def rings(p: PlacedEffect) -> bool:
-    """Whether a law has a frequency of its own that no joint's motion gives: a tank, a boom on the base."""
-    return bool(p.effect.states) and p.effect.at == "base"
 
 
 def _fitted(along: ColumnSource, p: PlacedEffect, columns: CandidateColumns) -> Item | None:
@@ -311,48 +299,3 @@ def _size(along: ColumnSource, parts: Mapping[int, Sequence[Array]]) -> Array:
         for c, own in parts.items()
     ]
     return np.max(sizes, axis=0)
-
-
-def coordinate(effect: Effect) -> str | None:
-    """Coordinate of a joint's law, or of its slide's, in words of the family of curves; derived from the law itself."""
-    if effect.at not in ("joint", "slide") or effect.acts_on != "torque" or effect.others:
-        return None
-    if effect.remembers:
-        return "distance since it turned by direction"
-    reads = _reads(effect)
-    if "qdd" in reads:
-        return None
-    if "load" in reads and not effect.states:
-        return "load by direction"
-    if "q" in reads:
-        return "position by direction" if "qd" in reads else "position"
-    return "speed" if _even(effect) else "speed by direction"
-
-
-@functools.cache
-def _even(effect: Effect) -> bool:
-    """Is a law of speed the same in both directions?"""
-    speed = ca.SX.sym("qd")
-    signals = {n: ca.SX(1.0) for n in _SIGNALS} | {"qd": speed} | {n: ca.SX(0.0) for n in effect.states}
-    parameters = {p.name: ca.SX(p.grid[len(p.grid) // 2] if p.grid else 1.0) for p in effect.parameters}
-    law = ca.Function("law", [speed], [effect.law(signals, parameters)])
-    forth, back = float(law(0.7)), float(law(-0.7))
-    return abs(forth - back) < 1e-9 * (abs(forth) + abs(back))
-
-
-_SIGNALS = ("q", "qd", "qdd", "load", "inertia", "time", "temperature", "speed_scale")
-
-
-@functools.cache
-def _reads(effect: Effect) -> set[str]:
-    signals = {n: ca.SX.sym(n) for n in _SIGNALS}
-    signals |= {n: ca.SX.sym(n) for n in effect.states}
-    parameters = {p.name: ca.SX.sym(f"parameter {p.name}") for p in effect.parameters}
-    laws = [effect.law(signals, parameters), *(effect.rate(signals, parameters) if effect.rate else ())]
-    return {x.name() for law in laws for x in ca.symvar(law)}
-
-
-def shapes(assembly: TorqueModel) -> NDArray[np.bool_]:
-    """Parameters that the torque is not linear in (P,)."""
-    shapes = {(p.effect.name, p.at, x.name) for p in assembly.placed for x in p.effect.parameters if x.grid}
-    return np.array([(s.effect, s.at, s.name) in shapes for s in assembly.slots], bool)

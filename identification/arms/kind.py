@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 from ...models.model import Model, PlacedEffect
 from ..deciding import DRIVEN
-from ..decision.kind import Chosen, Forecast
+from ..decision.kind import Chosen
 from ..decision.selection import Naming, Selection
+from ..evidence.forecast import Forecast
 from ..evidence.members import log_bayes
 from ..evidence.projected import ProjectedEvidence
 from ..evidence.search import MemberOdds, Search
@@ -26,7 +27,7 @@ from .blocks import blocks
 from .bursts import bursts_of
 from .choice import together
 from .forecast import along_instruments, forecast, known_to
-from .hypotheses import rings
+from .laws import rings
 from .weigh import weigh
 
 Array = NDArray[np.float64]

@@ -12,7 +12,8 @@ from ..fitting.fit import Fit
 from ..fitting.problem import gather
 from .beside import nuisances
 from .beside._block import FitContext
-from .hypotheses import ColumnSource, shapes
+from .hypotheses import ColumnSource
+from .laws import shapes
 
 Array = NDArray[np.float64]
 

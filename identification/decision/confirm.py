@@ -13,8 +13,9 @@ from functools import partial
 from typing import Generic
 
 from ..deciding import DISCREPANCY, GATE
+from ..evidence.forecast import Forecast
 from ..evidence.gain import scatter
-from .kind import Forecast, RecordingKind
+from .kind import RecordingKind
 from .nearly import without_its_curves
 from .selection import F, Naming, Selection
 

@@ -7,14 +7,13 @@ searched, confirmed and told is decided alike for all of them. Arms, fixed, floa
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...models.model import PlacedEffect
-from ..evidence.gain import Remaining
+from ..evidence.forecast import Forecast
 from ..evidence.projected import ProjectedEvidence
 from ..evidence.search import MemberOdds, Search
 from ..evidence.weighed import WeighedRecordings
@@ -24,18 +23,6 @@ from .selection import F, Naming, Selection
 Array = NDArray[np.float64]
 Chosen = tuple[MemberOdds, Sequence[MemberOdds]]
 """A name to take, and the set beside which its amplitudes are."""
-
-
-@dataclass(frozen=True)
-class Forecast:
-    """Log density of the held-out recordings given the training ones, and what is left of each; what the training
-    recordings say of the parameters, about their fit: mean (P,) and covariance (P, P).
-    """
-
-    density: float
-    left: tuple[Remaining, ...]
-    mean: Array
-    covariance: Array
 
 
 class RecordingKind(Protocol[F]):

@@ -18,28 +18,23 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from ..deciding import (
+    VIBRATION_DAMPING,
+    VIBRATION_PACES,
+    VIBRATION_RESOLVED,
+    VIBRATION_SLOWEST,
+    VIBRATION_WIDTHS,
+)
 from .likelihood import Cost, lowest, side_by_side
 from .noise import Noise, NoiseChannel, Vibration, bell
 
 Array = NDArray[np.float64]
 
-SPEEDS = tuple((pace, wide) for pace in (0.15, 0.3, 0.45, 0.6, 0.8) for wide in (0.15, 0.3))
-"""Paces and widths that are tried [shares of the peak speed] ..."""
-
 ANY = ((0.0, np.inf),)
-"""... and a pace that is as wide as can be."""
-
-SLOWEST = 1.0
-"""[Hz] What is slower is a joint's own motion."""
-
-RESOLVED = 0.35
-"""Frequencies up to this are tried [1 / period]."""
+"""A pace that is as wide as can be."""
 
 SPACING = 0.05
 """[Hz] Between the frequencies that are tried."""
-
-DAMPING = 0.05
-"""Largest damping ratio, 1 / (2π f τ): structures have 0.5 to 5 %, and what dies faster is no vibration."""
 
 LONGEST = 8.0
 """[s] Longest decay."""
@@ -67,7 +62,7 @@ def vibrating(residuals: Sequence[Array], runs: Sequence[NoiseChannel], noise: N
         return noise
     noise = replace(noise, vibration=None) if noise.vibration else noise
     look = _Look(residuals, runs, noise)
-    some, any_speed = look.vibrating(SPEEDS), look.vibrating(ANY)
+    some, any_speed = look.vibrating(tuple(product(VIBRATION_PACES, VIBRATION_WIDTHS))), look.vibrating(ANY)
     if some is None and any_speed is None:
         return noise
     # What is only learnt anew gains without a vibration, too.
@@ -86,7 +81,7 @@ class _Look:
         parts = [(side_by_side(r, np.zeros((len(r), 0))), run) for r, run in zip(residuals, runs, strict=True)]
         self._likelihood = Cost(parts)
         self._size = float(np.std(np.concatenate(list(residuals)))) + 1e-12
-        self._band = RESOLVED / max(run.step for run in runs) - SLOWEST
+        self._band = VIBRATION_RESOLVED / max(run.step for run in runs) - VIBRATION_SLOWEST
         self._own = np.log([noise.white, max(noise.coloured, 1e-3 * self._size), noise.coloured_time])
 
     def cost(self, noise: Noise) -> float:
@@ -133,15 +128,15 @@ class _Look:
 
 
 def _least_decay(hertz: float) -> float:
-    return 1 / (2 * np.pi * DAMPING * hertz)
+    return 1 / (2 * np.pi * VIBRATION_DAMPING * hertz)
 
 
 def _loudest(
     residuals: Sequence[Array], runs: Sequence[NoiseChannel], noise: Noise, speeds: Sequence[tuple[float, float]]
 ) -> Array:
     """The strongest frequency of the white residual at each pace and width [Hz]."""
-    top = RESOLVED / max(run.step for run in runs)
-    hertz = np.arange(SLOWEST, max(top, SLOWEST + SPACING), SPACING)
+    top = VIBRATION_RESOLVED / max(run.step for run in runs)
+    hertz = np.arange(VIBRATION_SLOWEST, max(top, VIBRATION_SLOWEST + SPACING), SPACING)
     power = np.zeros((len(hertz), len(speeds)))
     for r, run in zip(residuals, runs, strict=True):
         white = noise.covariance(run).white(r[:, None])

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...models.model import PlacedEffect
-from ..deciding import TOLERANCES
-from ..decision.kind import Chosen, Forecast
+from ..decision.kind import Chosen
 from ..decision.selection import Naming, Selection
+from ..evidence.forecast import Forecast
+from ..evidence.forecast import forecast as predicted
 from ..evidence.pool import Item
 from ..evidence.projected import ProjectedEvidence
 from ..evidence.search import MemberOdds, Search
@@ -148,9 +149,7 @@ class SourceRecordings:
     def _forecast(
         self, found: Selection[SourceFit], fit: SourceFit, tolerance_of_name: Collection[int] = ()
     ) -> Forecast:
-        """Averaged over how exactly the shifts may be known.
-
-        Without a name, the shifts that are its own tolerance are known to their deviations alone, and not from the
+        """Without a name, the shifts that are its own tolerance are known to their deviations alone, and not from the
         training recordings: learnt there they would be the effect itself under another name, however many deviations
         it takes.
         """
@@ -158,24 +157,8 @@ class SourceRecordings:
         weighed = weigh(
             self.source, both_sets, self.given, _joined(fit), self._noise(found), search=False, nameless=found.nameless
         )
-        evidence, n = weighed.evidence, len(self.train)
-        masses, p = weighed.beside.tolerant, len(fit.train.at.values)
-        priors, ons = [], []
-        for tolerance in (*TOLERANCES, *weighed.beside.more) if masses.stop > masses.start else TOLERANCES[:1]:
-            weight = weighed.beside.weight(tolerance)
-            own = ProjectedEvidence(evidence, range(n), weight)
-            priors.append(own.null)
-            mean, covariance = own.posterior(evidence.n_always)
-            for k in (p + s for s in tolerance_of_name):
-                mean[k], covariance[k], covariance[:, k] = 0.0, 0.0, 0.0
-                covariance[k, k] = weight[k] ** 2
-            ons.append((ProjectedEvidence(evidence, self.held, weight, (mean, covariance)), mean, covariance))
-        both = np.array(priors) + [on.null for on, _, _ in ons]
-        on, mean, covariance = ons[int(np.argmax(both))]
-        always, unit = on.beside([]), weighed.beside.spread[:p]
-        left = tuple(evidence.left(i, always, []) for i in self.held)
-        density = float(np.logaddexp.reduce(both) - np.logaddexp.reduce(priors))
-        return Forecast(density, left, unit * mean[:p], covariance[:p, :p] * np.outer(unit, unit))
+        p = len(fit.train.at.values)
+        return predicted(weighed, self.train, self.held, p, untold=[p + s for s in tolerance_of_name])
 
     def apart(self, one: SourceFit, other: SourceFit) -> Array:
         """RMS difference of two fits' predictions, with the set-up as it is stated [share of the channel's RMS] (c,).

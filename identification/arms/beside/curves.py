@@ -11,7 +11,7 @@ from ...deciding import DISCREPANCY, LAW_ERROR
 from ...evidence.weighed import Part
 from ...fitting.fit import Fit
 from ...nuisance.curve import SMALL
-from ..hypotheses import coordinate, shapes
+from ..laws import coordinate, shapes
 from ._block import FitContext, NuisanceBlock
 
 Array = NDArray[np.float64]

@@ -13,7 +13,8 @@ from ...deciding import LAW_ERROR
 from ...fitting.fit import Fit
 from ...nuisance.curve import over_decades
 from ...search.refit import carry
-from ..hypotheses import ColumnSource, coordinate
+from ..hypotheses import ColumnSource
+from ..laws import coordinate
 from ._block import FitContext, NuisanceBlock
 
 Array = NDArray[np.float64]

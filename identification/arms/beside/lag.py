@@ -6,7 +6,8 @@ import numpy as np
 
 from ...deciding import BENDS
 from ...search.refit import carry
-from ..hypotheses import lagging, remembers
+from ..hypotheses import lagging
+from ..laws import remembers
 from ._block import FitContext, NuisanceBlock, of_every
 
 

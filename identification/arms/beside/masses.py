@@ -1,7 +1,8 @@
 """Inertial parameters of every link, which a model file knows to a share that the evidence chooses.
 
 A kilogram more, or a metre or a square metre of it, is a column of the rigid body's regressor (Atkeson, An, Hollerbach
-1986). Where masses are free the fit has them itself.
+1986), and so is a link that is denser than its drawing as a whole, all ten of its parameters by one factor. Where
+masses are free the fit has them itself.
 """
 
 from collections.abc import Iterator
@@ -20,7 +21,7 @@ Array = NDArray[np.float64]
 
 
 def blocks(context: FitContext) -> Iterator[NuisanceBlock]:
-    """Every inertial parameter in units of its link's own."""
+    """Every inertial parameter in units of its link's own, then every link as a whole."""
     assembly = context.found.assembly
     if assembly.base is not None:
         return
@@ -36,8 +37,10 @@ def blocks(context: FitContext) -> Iterator[NuisanceBlock]:
             scale = by_mass(assembly, e, c)
             if scale is not None:
                 felt = felt + scale[:, None] * (at % OWN == 0)
-            parts[-1][c] = at, felt * one[at]
-    yield NuisanceBlock(len(one), parts, tolerated=True, noise_beside=noise_beside)
+            links, first = np.unique(at // OWN, return_index=True)
+            whole = np.add.reduceat(felt * assembly.phi[at], first, axis=1)
+            parts[-1][c] = np.concatenate([at, len(one) + links]), np.hstack([felt * one[at], whole])
+    yield NuisanceBlock(len(one) + len(one) // OWN, parts, tolerated=True, noise_beside=noise_beside)
 
 
 def inertial_part(assembly: TorqueModel) -> Array:

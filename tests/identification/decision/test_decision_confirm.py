@@ -14,7 +14,7 @@ from snarelab.identification.arms.blocks import FEWEST_BLOCKS, blocks
 from snarelab.identification.arms.forecast import along_instruments, known_to
 from snarelab.identification.decision import confirm as module
 from snarelab.identification.decision.confirm import Loss, confirm
-from snarelab.identification.decision.kind import Forecast
+from snarelab.identification.evidence.forecast import Forecast
 from snarelab.identification.fitting.fit import Fit
 from snarelab.models.effects import get_effect
 from snarelab.models.model import PlacedEffect
