@@ -69,6 +69,8 @@ class CandidateColumns:
     """Samples of each recording in the analysis band."""
     count: int = 0
     numbers: dict[int, list[NDArray[np.int_]]] = field(default_factory=dict)
+    filled: dict[int, int] = field(default_factory=dict)
+    """How many columns a channel has."""
     rows: dict[tuple[int, int], Single] = field(default_factory=dict)
     """One a column; with room for more, which takes no memory before it is written to."""
 
@@ -78,8 +80,9 @@ class CandidateColumns:
         index = np.arange(self.count, self.count + k)
         self.count += k
         for c, parts in own.items():
-            before = sum(len(x) for x in self.numbers.setdefault(c, []))
-            self.numbers[c].append(index)
+            before = self.filled.get(c, 0)
+            self.filled[c] = before + k
+            self.numbers.setdefault(c, []).append(index)
             for i, x in enumerate(parts):
                 rows = self.rows.get((i, c), np.empty((0, self.lengths[i]), np.float32))
                 if before + k > len(rows):

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..deciding import WANDER_TIMES
-from .likelihood import Cost, lowest, side_by_side
+from .likelihood import Cost, lowest
 from .noise import Noise, NoiseChannel
 
 Array = NDArray[np.float64]
@@ -38,7 +38,7 @@ def fast_scales(
     cost = Cost(
         [
             # Whatever is slow there is no matter of the fast scales.
-            (side_by_side(r[rows], c[rows]), replace(run.some(rows), wanders=1.0))
+            (np.column_stack([r[rows], c[rows]]), replace(run.some(rows), wanders=1.0))
             for r, c, run, rows in zip(residuals, columns, runs, stretch, strict=True)
         ]
     )

@@ -7,7 +7,8 @@ chapter 4), an oscillation that decays with e^(-x) of a vibration, and T the cov
 
 Every remembering process is an autoregression of first or second order on the band's even clock, so that with the
 hidden values x (all processes and e, sample by sample) K = D + H Q⁻¹ H' with a banded precision Q (Särkkä and Solin
-2019, chapter 12). By Woodbury's identity K⁻¹ and log det K then cost O(n), not O(n³).
+2019, chapter 12). By Woodbury's identity K⁻¹ and log det K then cost O(n), not O(n³). So do products x' K⁻¹ y and
+log det K by the innovations of a Kalman filter, which are quicker where they can be compiled (`innovations`).
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 from scipy.linalg import get_lapack_funcs
 
 from ..fitting.periodogram import pair_products
+from .innovations import HiddenNoise, compiles
 
 Array = NDArray[np.float64]
 
@@ -64,23 +66,37 @@ class Covariance:
         step: float,
         segments: Sequence[slice],
     ) -> None:
-        """Factorise."""
-        self._variance = np.asarray(variance, float)
+        """Nothing is worked out yet."""
+        self._variance = np.ascontiguousarray(variance, float)
         n = len(self._variance)
         there = [p for p in processes if np.any(np.asarray(p.level) > 0)]
         self._levels = [np.broadcast_to(np.asarray(p.level, float), (n,)) for p in there]
         has = derivative is not None and bool(np.any(derivative > 0))
-        self._width = width = (len(self._levels) + has) * bool(n)
+        self._width = (len(self._levels) + has) * bool(n)
         self._orders = [p.order for p in there]
         self._recursions = [_recursion(p, step) for p in there]
-        self._log_det = float(np.sum(np.log(self._variance)))
         self._derivative = self._lagged(np.asarray(derivative, float), segments) if has else None
-        if not width:
+        self._first, self._second = np.zeros((2, n), bool)
+        if not self._width:
             return
-        first, second = np.zeros((2, n), bool)
-        first[[s.start for s in segments if s.stop > s.start]] = True
-        second[[s.start + 1 for s in segments if s.stop > s.start + 1]] = True
-        self._first = first
+        self._first[[s.start for s in segments if s.stop > s.start]] = True
+        self._second[[s.start + 1 for s in segments if s.stop > s.start + 1]] = True
+
+    @staticmethod
+    def _lagged(b: Array, segments: Sequence[slice]) -> tuple[Array, Array, Array]:
+        """Weights of e_t, e_t-1 and e_t-2 in sample t; no sample reaches back across a gap."""
+        one, two = np.zeros_like(b), np.zeros_like(b)
+        for s in segments:
+            one[s.start + 1 : s.stop] = b[s.start + 1 : s.stop]
+            two[s.start + 2 : s.stop] = b[s.start + 2 : s.stop]
+        return b / ROOT6, -2 * one / ROOT6, two / ROOT6
+
+    @cached_property
+    def _band(self) -> tuple[Array, float]:
+        """Cholesky factor of the hidden values' precision Q + H' D⁻¹ H, and log det K."""
+        n, width, has = len(self._variance), self._width, self._derivative is not None
+        first, second = self._first, self._second
+        log_det = float(np.sum(np.log(self._variance)))
         band = np.zeros(((2 * width if has or 2 in self._orders else width) + 1, n * width))
         for s, ((a, b, fresh), order) in enumerate(zip(self._recursions, self._orders, strict=True)):
             one, two = np.full(n, a), np.full(n, b)  # from the sample before, and from the one before that
@@ -95,7 +111,7 @@ class Covariance:
                 band[0, s::width][:-2] += (two**2 * news)[2:]
                 band[width, s::width][:-2] += (one * two * news)[2:]
                 band[2 * width, s::width][:-2] -= (two * news)[2:]
-            self._log_det -= float(np.sum(np.log(news)))
+            log_det -= float(np.sum(np.log(news)))
         if has:
             band[0, width - 1 :: width] += 1.0
         rows = self._rows()
@@ -111,17 +127,7 @@ class Covariance:
         factor, failed = _FACTORISE(band, lower=1)
         if failed:
             raise np.linalg.LinAlgError(f"{failed}-th leading minor not positive definite")
-        self._log_det += 2 * float(np.sum(np.log(factor[0])))
-        self._factor = factor
-
-    @staticmethod
-    def _lagged(b: Array, segments: Sequence[slice]) -> tuple[Array, Array, Array]:
-        """Weights of e_t, e_t-1 and e_t-2 in sample t; no sample reaches back across a gap."""
-        one, two = np.zeros_like(b), np.zeros_like(b)
-        for s in segments:
-            one[s.start + 1 : s.stop] = b[s.start + 1 : s.stop]
-            two[s.start + 2 : s.stop] = b[s.start + 2 : s.stop]
-        return b / ROOT6, -2 * one / ROOT6, two / ROOT6
+        return factor, log_det + 2 * float(np.sum(np.log(factor[0])))
 
     def _rows(self) -> list[tuple[int, Array]]:
         """H: offsets from t * width of the hidden values in sample t, and their weights (n,)."""
@@ -139,7 +145,9 @@ class Covariance:
     @property
     def log_det(self) -> float:
         """Log determinant of K."""
-        return self._log_det
+        if not self._width:
+            return float(np.sum(np.log(self._variance)))
+        return 2 * float(np.sum(np.log(self._gains[1]))) if compiles() else self._band[1]
 
     def solve(self, x: Array) -> Array:
         """K⁻¹ x for columns x (n, k), or one (n,)."""
@@ -147,7 +155,7 @@ class Covariance:
         z = flat / self._variance[:, None]
         if self._width and flat.size:
             n, width = len(flat), self._width
-            hidden, _ = _DIVIDE(self._factor, self._on_hidden(z), lower=1, overwrite_b=1)
+            hidden, _ = _DIVIDE(self._band[0], self._on_hidden(z), lower=1, overwrite_b=1)
             back = np.zeros_like(flat)
             for offset, weight in self._rows():
                 skip = -(offset // width) if offset < 0 else 0
@@ -165,24 +173,22 @@ class Covariance:
         return hidden
 
     def gram(self, x: Array) -> Array:
-        """x' K⁻¹ x (k, k) of columns x (n, k), at half the cost of `solve`; quickest with each column's samples side by
-        side in memory."""
+        """x' K⁻¹ x (k, k) of columns x (n, k), at half the cost of `solve`."""
+        if compiles():
+            white = self.white(x)
+            return white.T @ white
         z = x / self._variance[:, None]
         found = x.T @ z
         if self._width and x.size:
-            half, _ = _DIVIDE_BY_ROOT(self._factor, self._on_hidden(z), uplo="L", overwrite_b=1)
+            half, _ = _DIVIDE_BY_ROOT(self._band[0], self._on_hidden(z), uplo="L", overwrite_b=1)
             found -= half.T @ half
         return found
 
     def pair_grams(self, x: Array, y: Array) -> Array:
         """Of every pair of columns (x_k, y_k), both (n, k): products with K⁻¹ between the two (k, 2, 2), as `gram` has
         them, without those between pairs."""
-        z = np.concatenate([x, y], axis=1) / self._variance[:, None]
-        found = pair_products((x, y), np.hsplit(z, 2))
-        if self._width and z.size:
-            half, _ = _DIVIDE_BY_ROOT(self._factor, self._on_hidden(z), uplo="L", overwrite_b=1)
-            found -= pair_products(np.hsplit(half, 2), np.hsplit(half, 2))
-        return found
+        white = np.hsplit(self.white(np.concatenate([x, y], axis=1)), 2)
+        return pair_products(white, white)
 
     def white(self, x: Array) -> Array:
         """Columns x (n, k) made white, so that white(x)' white(y) = x' K⁻¹ y: `solve` at half its cost for many.
@@ -194,32 +200,25 @@ class Covariance:
 
     def white_by_rows(self, parts: Iterable[Array]) -> Iterator[Array]:
         """`white` of columns that come some rows at a time (n_i, k): all of them at once may not fit in memory."""
-        deviation, row = np.sqrt(self._variance), 0
+        state, row = None, 0
         for x in parts:
             rows = slice(row, row + len(x))
             if not self._width:
-                yield x / deviation[rows, None]
+                yield x / np.sqrt(self._variance[rows, None])
             else:
-                if not row:
-                    now, then = np.zeros((2, self._steps.shape[1], x.shape[1]))
-                found = np.empty_like(x, dtype=float)
-                for step, sample, innovation in zip(self._steps[rows], x, found, strict=True):
-                    now[-1] = sample
-                    np.matmul(step, now, out=then)
-                    innovation[:] = then[-1]
-                    now, then = then, now
-                yield found
+                if state is None:
+                    state = np.zeros((self._hidden.weights.shape[1], x.shape[1]))
+                yield self._hidden.innovations(x, rows, state, *self._gains)
             row = rows.stop
 
     def log_density(self, x: Array) -> Array:
         """Log density of each sample of x (n,), given those before it [nats] (n,)."""
-        deviation = 1 / self._steps[:, -1, -1] if self._width else np.sqrt(self._variance)
+        deviation = self._gains[1] if self._width else np.sqrt(self._variance)
         return -0.5 * self.white(x[:, None])[:, 0] ** 2 - np.log(deviation) - 0.5 * np.log(2 * np.pi)
 
     @cached_property
-    def _steps(self) -> Array:
-        """Maps (n, m + 1, m + 1) from what is predicted of m hidden values, and a sample, to what is predicted
-        next, and the sample's innovation."""
+    def _hidden(self) -> HiddenNoise:
+        """Values of every process, those before of what has two lags, and e with the two before it."""
         n, s = len(self._variance), len(self._levels)
         smooth = [k for k, order in enumerate(self._orders) if order == 2]
         before = [np.zeros(n)] * len(smooth)
@@ -237,19 +236,11 @@ class Covariance:
         if d > s:  # e_t is new; the two before it move on
             forward[s + 1, s] = forward[s + 2, s + 1] = news[s, s] = 1.0
             start[s + 1 :, s + 1 :] = 0.0
-        steps, spread = np.zeros((n, d + 1, d + 1)), start
-        for t, (h, variance) in enumerate(zip(weights, self._variance, strict=True)):
-            if self._first[t]:
-                spread = start
-                if t:
-                    steps[t - 1, :d] = 0.0  # nothing is remembered
-            seen = spread @ h
-            total = float(h @ seen) + variance
-            gain = forward @ (seen / total)
-            steps[t, :d, :d], steps[t, :d, d] = forward - np.outer(gain, h), gain
-            steps[t, d, :d], steps[t, d, d] = -h / np.sqrt(total), 1 / np.sqrt(total)
-            spread = forward @ (spread - np.outer(seen, seen / total)) @ forward.T + news
-        return steps
+        return HiddenNoise(weights, self._variance, self._first, forward, start, news)
+
+    @cached_property
+    def _gains(self) -> tuple[Array, Array]:
+        return self._hidden.gains()
 
     def dense(self) -> Array:
         """K itself (n, n); for tests."""

@@ -5,7 +5,7 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import get_lapack_funcs
 from scipy.optimize import minimize
 
 from .noise import Noise, NoiseChannel
@@ -14,6 +14,9 @@ Array = NDArray[np.float64]
 Part = tuple[Array, NoiseChannel]
 """A residual and what could explain it (n, 1 + k), and the channel of a recording that they are of."""
 
+
+_FACTORISE, _DIVIDE = get_lapack_funcs(("potrf", "trtrs"), dtype=np.float64)
+"""LAPACK without scipy's checks, which take as long: a diagnosis calls them thousands of times."""
 
 SETTLED = 1e-3
 """A search for scales ends where its step gains less [nats]: what is compared with others differs by whole nats."""
@@ -31,11 +34,6 @@ def lowest(cost: Callable[[Array], float], start: Array, wide: Array, low: Array
     bounds = list(zip(low, high, strict=True))
     options = {"maxiter": 30, "eps": 1e-3, "ftol": SETTLED / max(abs(whole(start)), 1.0)}
     return minimize(whole, start, method="L-BFGS-B", bounds=bounds, options=options).x
-
-
-def side_by_side(residual: Array, columns: Array) -> Array:
-    """A residual and what could explain it (n, 1 + k), each column's samples side by side."""
-    return np.asfortranarray(np.column_stack([residual, columns]))
 
 
 class Cost:
@@ -56,10 +54,16 @@ class Cost:
     def __call__(self, noise: Noise, spread: float) -> float:
         """[nats], with ``spread`` the amplitudes' deviation; a noise that was asked last with another is remembered."""
         gram, total = self._products(noise)
-        factor = cho_factor(np.eye(len(gram) - 1) + spread**2 * gram[1:, 1:], lower=True)
-        score = spread * gram[1:, 0]
-        explained = float(score @ cho_solve(factor, score))
-        return total + 0.5 * (float(gram[0, 0]) - explained) + float(np.sum(np.log(np.diag(factor[0]))))
+        cost = total + 0.5 * float(gram[0, 0])
+        if len(gram) == 1:
+            return cost
+        precision = spread**2 * gram[1:, 1:]
+        np.einsum("ii->i", precision)[:] += 1.0
+        factor, failed = _FACTORISE(precision, lower=1)
+        if failed:
+            raise np.linalg.LinAlgError(f"{failed}-th leading minor not positive definite")
+        explained, _ = _DIVIDE(factor, spread * gram[1:, 0], lower=1)
+        return cost - 0.5 * float(explained @ explained) + float(np.sum(np.log(np.diag(factor))))
 
     def _worked_out(self, noise: Noise) -> tuple[Array, float]:
         """Products of residual and columns (1 + k, 1 + k), and half of the log determinant, over all recordings."""

@@ -25,7 +25,7 @@ from ..deciding import (
     VIBRATION_SLOWEST,
     VIBRATION_WIDTHS,
 )
-from .likelihood import Cost, lowest, side_by_side
+from .likelihood import Cost, lowest
 from .noise import Noise, NoiseChannel, Vibration, bell
 
 Array = NDArray[np.float64]
@@ -78,7 +78,7 @@ class _Look:
 
     def __init__(self, residuals: Sequence[Array], runs: Sequence[NoiseChannel], noise: Noise) -> None:
         self._residuals, self._runs, self._noise = residuals, runs, noise
-        parts = [(side_by_side(r, np.zeros((len(r), 0))), run) for r, run in zip(residuals, runs, strict=True)]
+        parts = [(r[:, None], run) for r, run in zip(residuals, runs, strict=True)]
         self._likelihood = Cost(parts)
         self._size = float(np.std(np.concatenate(list(residuals)))) + 1e-12
         self._band = VIBRATION_RESOLVED / max(run.step for run in runs) - VIBRATION_SLOWEST

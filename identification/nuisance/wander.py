@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..deciding import WANDER_PRIOR, WANDER_TIMES
-from .likelihood import Cost, Part, lowest, side_by_side
+from .likelihood import Cost, Part, lowest
 from .noise import Noise, NoiseChannel
 
 Array = NDArray[np.float64]
@@ -75,4 +75,4 @@ def averaged_over(residual: Array, columns: Array, run: NoiseChannel) -> Part:
     sticks, settles = tuple(x[rows].mean(axis=1) for x in run.sticks), run.settles[rows].mean(axis=1)
     wanders = run.wanders[rows].mean(axis=1) if isinstance(run.wanders, np.ndarray) else run.wanders
     other = NoiseChannel(run.step * length, tuple(segments), np.zeros(count), sticks, settles, run.level, wanders)
-    return side_by_side(residual[rows].mean(axis=1), columns[rows].mean(axis=1)), other
+    return np.column_stack([residual[rows].mean(axis=1), columns[rows].mean(axis=1)]), other

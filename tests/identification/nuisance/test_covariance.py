@@ -4,11 +4,21 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from snarelab.identification.nuisance import innovations
 from snarelab.identification.nuisance.covariance import Covariance, LaggedNoise
 
 STEP = 0.02
 PARTS = (slice(0, 37), slice(40, 41), slice(41, 90))
 """Runs without a gap; samples 37 to 39 stand in none, and remember nothing."""
+
+
+@pytest.fixture(autouse=True, params=["C", "NumPy"])
+def loops(request, monkeypatch):
+    """Every test with a compiler and without one."""
+    if request.param == "NumPy":
+        monkeypatch.setattr(innovations, "_compiled", lambda: None)
+    else:
+        assert innovations.compiles()
 
 
 def dense(variance, processes, derivative, segments):
