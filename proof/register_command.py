@@ -32,6 +32,7 @@ def main(words: Sequence[str]) -> int:
 
 def _do(given: argparse.Namespace) -> int:
     from . import register
+    from .bars_table import table
     from .seal import write_json
 
     if given.command == "register":
@@ -56,7 +57,8 @@ def _do(given: argparse.Namespace) -> int:
         tell(registered_rivals.printed(registered, registered_rivals.compared(registered, given.answers)))
         return 0
     files = register.run(registered, given.hours, tell, given.folder, given.answers, only=given.only)
-    tell(register.printed(files))
-    write_json(given.folder / "result.json", register.result(registered, files))
+    found = register.result(registered, files)
+    tell(f"{register.printed(files)}\n\n{table(found)}")
+    write_json(given.folder / "result.json", found)
     tell(f"numbers: {given.folder / 'result.json'}")
     return 0

@@ -5,6 +5,7 @@ import json
 import pytest
 
 from proof import register
+from proof.bars_table import table
 from proof.register import BARS, differences, now, printed, result, run
 from proof.register import register as registered
 from proof.register_command import main
@@ -95,6 +96,25 @@ def test_run_goes_through_generators_in_turns_and_ends_with_its_time(drawn, tmp_
     run(written(), 1.0, lambda _: None, tmp_path / "elsewhere", tmp_path / "answers", clock=lambda: 0.0)
     assert drawn[3:] == [("drives-500.jsonl", "0001"), ("drives-501.jsonl", "0001"), ("played-600.jsonl", "0001")]
     assert not (tmp_path / "elsewhere/drives/500/0000").exists()
+
+
+def test_figures_stand_beside_their_bars_and_those_that_miss_are_bold():
+    def figure(value, cases, met, interval=(0.0, 1.0)):
+        return {"value": value, "cases": cases, "met": met, "interval": interval}
+
+    found = {
+        "registered": {"bars": {"seen": [0.9, "at least"], "calibration": [0.05, "at most"]}},
+        "generators": {
+            "drives": {"seen": figure(0.875, 8, False), "calibration": figure(0.031, 20, True, None)},
+            "played": {"seen": figure(None, 0, None, None), "calibration": figure(0.06, 4, False, None)},
+        },
+    }
+    assert table(found).splitlines() == [
+        "| figure | bar | `drives` | `played` |",
+        "| --- | ---: | ---: | ---: |",
+        "| seen | ≥ 90 % | **88 % of 8** | – |",
+        "| calibration | ≤ 0.05 | 0.03 | **0.06** |",
+    ]
 
 
 def test_one_generator_can_run_alone(drawn, tmp_path):
