@@ -146,6 +146,12 @@ def evaluate_law(
     start : numpy.ndarray, shape (n_x,), optional
         How far from its steady state each state is at the first sample; their derivatives are not changed.
 
+    Notes
+    -----
+    Play without damping rattles on, and may do so chaotically: neighbouring motions part exponentially. Where the
+    rounding of a parameter would move the law by more than its own size, the derivatives by parameters are zero: the
+    samples say nothing of them.
+
     Raises
     ------
     InputError
@@ -163,7 +169,15 @@ def evaluate_law(
         p = np.tile(p, (len(next(iter(inputs.values()))), 1))
     values, *slopes = built.law(*signals, carried, p)
     by_parameter = np.zeros((*values.shape[:2], 0)) if bare else slopes.pop(0)
+    if effect.states and by_parameter.size and _chaotic(values, by_parameter, p):
+        by_parameter = np.zeros_like(by_parameter)
     return LawEvaluation(values[:, :, 0], by_parameter, slopes[0] if slopes else None)
+
+
+def _chaotic(values: np.ndarray, by_parameter: np.ndarray, p: np.ndarray) -> bool:
+    """Whether a parameter's rounding alone moves the law by more than its own size."""
+    moved = np.abs(by_parameter).max(axis=(0, 1)) * np.abs(p)
+    return bool(np.finfo(float).eps * moved.max() > np.abs(values).max())
 
 
 @cache

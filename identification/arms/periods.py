@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from ...models.model import PlacedEffect
+from ..evidence.projected import ROUNDING
 from ..evidence.weighed import NuisanceColumns
 from ..fitting.periodogram import Peaks
 from ..fitting.wave_lengths import wave_peaks
@@ -96,6 +97,8 @@ class Periods:
                 matrix[np.ix_(where, where)] += columns.T @ both[:, 1:]
                 seen[where] += columns.T @ both[:, 0]
                 divided.append((where, both))
+            # Sums of columns that differ by many orders of magnitude are positive definite but for their rounding.
+            matrix += ROUNDING * np.trace(matrix) * np.eye(len(index))
             mean = cho_solve(cho_factor(matrix), seen)
             self._divided[c] = [both[:, 0] - both[:, 1:] @ mean[where] for where, both in divided]
         return self._divided[c]

@@ -17,6 +17,9 @@ from .evidence import Evidence, ItemStack
 Array = NDArray[np.float64]
 Index = NDArray[np.int_]
 
+ROUNDING = 1e-14
+"""Share of a sum's trace that its rounding may take from its smallest eigenvalue."""
+
 
 @dataclass(frozen=True)
 class ProjectedStack(ItemStack):
@@ -70,7 +73,7 @@ class ProjectedEvidence:
         self._turned = turned
         self._order, self._alone = _arrow([index for index, _ in sums], n_always, m)
         # Sums of columns that differ by many orders of magnitude are positive definite but for their rounding.
-        rounding = 1e-14 * float(np.trace(matrix)) if n_always else 0.0
+        rounding = ROUNDING * float(np.trace(matrix)) if n_always else 0.0
         matrix = (0.5 * (matrix + matrix.T))[np.ix_(self._order, self._order)]
         self._low = cholesky(matrix + (1 + rounding) * np.eye(n_always), lower=True)
         self._seen = solve_triangular(self._low, seen[self._order], lower=True)

@@ -9,6 +9,7 @@ from explained import Explained, hypotheses, white
 from moved_numbers import FACTORS, about, move, odds_of, planted, searched, smallest
 
 from snarelab.identification.arms import hypotheses as hypothesising
+from snarelab.identification.arms.laws import coordinate
 from snarelab.identification.evidence.evidence import Evidence, ResidualChannel
 from snarelab.identification.evidence.members import Members
 from snarelab.identification.evidence.pool import CandidateColumns, Item
@@ -139,7 +140,7 @@ def shaped(monkeypatch, off: float, bent: float, curve: bool) -> float:
     monkeypatch.setattr(hypothesising, "_made", lambda _, v: {0: [laws[v.parameters[1]]]})
     columns = CandidateColumns([len(x)])
     over = Item(columns.add({0: [x[:, [2]]]}), np.ones(1), np.zeros(1, bool))
-    words = hypothesising.coordinate(placed.effect) or ""
+    words = coordinate(placed.effect) or ""
     assembly = SimpleNamespace(joint_of=lambda _: 0, at=lambda _: SimpleNamespace(once_more=lambda _: None))
     along: Any = SimpleNamespace(n_train=1, scale=np.ones(1), assembly=assembly, tuned={}, peaks={})
     items = hypothesising._items(along, placed, {(0, words): over} if curve else {}, columns)

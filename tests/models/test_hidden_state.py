@@ -310,3 +310,18 @@ def test_a_law_without_derivatives_has_the_same_values(name):
 def test_signals_of_different_lengths_are_said():
     with pytest.raises(InputError, match=r"joint_elasticity_step|joint_elasticity_law"):
         evaluate_law(SPRING, {"load": np.ones(9), "inertia": np.ones(8)}, np.array([100.0, 1.0]), 0.01)
+
+
+@pytest.mark.parametrize(("damping", "chaotic"), [(0.0, True), (100.0, False)])
+def test_a_play_that_rattles_chaotically_has_no_slopes(damping, chaotic):
+    """Undamped, two stiffnesses that differ in the last digit end in two different motions; damped, in the same."""
+    t = 1e-3 * np.arange(20_000)
+    load = 3 * np.sin(2 * np.pi * 0.3 * t) + 1.5 * np.sin(2 * np.pi * 1.1 * t)
+    signals = {"load": load, "inertia": np.full(len(t), 0.5)}
+    one, other = (
+        evaluate_law(get_effect("backlash"), signals, np.array([stiffness, damping, 3e-4]), 1e-3)
+        for stiffness in (52_000.0, np.nextafter(52_000.0, np.inf))
+    )
+    apart = np.abs(one.values - other.values).max() / np.abs(one.values).max()
+    assert bool(apart > 0.1) is chaotic
+    assert bool(np.any(one.by_parameter)) is not chaotic

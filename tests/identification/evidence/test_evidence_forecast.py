@@ -33,9 +33,9 @@ def dense(made, own: set[int], weight) -> tuple[float, float]:
     (k0, a0), (k1, a1) = blocks
     cross = a0[:, shared] @ a1[:, shared].T
     whole = np.block([[k0 + a0 @ a0.T, cross], [cross.T, k1 + a1 @ a1.T]])
-    joint: Any = multivariate_normal(np.zeros(len(whole)), whole)
-    first: Any = multivariate_normal(np.zeros(len(k0)), k0 + a0 @ a0.T)
-    return float(joint.logpdf(np.concatenate(residuals))), float(first.logpdf(residuals[0]))
+    density: Any = multivariate_normal.logpdf
+    joint = density(np.concatenate(residuals), np.zeros(len(whole)), whole)
+    return float(joint), float(density(residuals[0], np.zeros(len(k0)), k0 + a0 @ a0.T))
 
 
 @pytest.mark.parametrize("seed", range(3))
