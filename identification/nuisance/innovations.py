@@ -97,16 +97,16 @@ SHOWN WIDEST void snarelab_innovations(whole n, whole d, whole k, const double *
 
 @dataclass(frozen=True)
 class HiddenNoise:
-    """A channel's noise as a hidden state of d values, which starts anew where ``first`` says so.
+    """A channel's noise as a hidden state of m values, which starts anew where ``first`` says so.
 
     Parameters
     ----------
-    weights : array (n, d)
+    weights : array (n, m)
         h_t.
     variance : array (n,)
         Of what is independent from sample to sample; positive.
     first : array of bool (n,)
-    forward, start, news : arrays (d, d)
+    forward, start, news : arrays (m, m)
         F, P at a start, and Q.
     """
 
@@ -118,7 +118,7 @@ class HiddenNoise:
     news: Array
 
     def gains(self) -> tuple[Array, Array]:
-        """s_t / √v_t (n, d) and √v_t (n,)."""
+        """s_t / √v_t (n, m) and √v_t (n,)."""
         n, d = self.weights.shape
         gains, roots = np.empty((n, d)), np.empty(n)
         if compiled := _compiled():
@@ -146,7 +146,7 @@ class HiddenNoise:
         return gains, roots
 
     def innovations(self, x: Array, rows: slice, state: Array, gains: Array, roots: Array) -> Array:
-        """e of columns (n_rows, k) of some samples, and the ``state`` (d, k) before them, which becomes the one after.
+        """e of columns (n_rows, k) of some samples, and the ``state`` (m, k) before them, which becomes the one after.
 
         ``gains`` and ``roots`` are of all samples.
         """
