@@ -76,26 +76,27 @@ def emps() -> Path:
     return real_recordings("emps", "DATA_EMPS.mat")
 
 
-def _of_this_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+@pytest.fixture(scope="session")
+def of_this_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder that all workers of a run share."""
     base = tmp_path_factory.getbasetemp()
     return base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
 
 
 @pytest.fixture(scope="module")
-def own_cache(tmp_path_factory):
+def own_cache(of_this_run):
     """A cache of compiled models that this run fills: what it compiles is compiled once."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(_of_this_run(tmp_path_factory) / "compiled"))
+        patch.setenv("XDG_CACHE_HOME", str(of_this_run / "compiled"))
         yield
 
 
 @pytest.fixture(scope="module")
-def each_diagnosis_once(tmp_path_factory):
+def each_diagnosis_once(of_this_run):
     """What `once.remembered` says, over all workers of a run."""
     from once import remembered  # found by the paths above
 
-    with remembered(_of_this_run(tmp_path_factory)):
+    with remembered(of_this_run):
         yield
 
 

@@ -58,6 +58,7 @@ def test_follows_as_simulate_does_hidden_states_and_sensors_included(tmp_path, v
     assert parted(path, version, t, q) < 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("each_diagnosis_once")
 def test_diagnose_export_and_simulate_reproduce_the_improved_fit(tmp_path):
     """The bundled arm: what its model leaves out is found, and its FMU has the residual that diagnose tells."""

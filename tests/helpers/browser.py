@@ -13,9 +13,10 @@ from matplotlib.image import imread
 from playwright.sync_api import Browser, Frame, Page, sync_playwright
 
 PROGRAM = shutil.which("chromium") or shutil.which("google-chrome") or shutil.which("chromium-browser")
-# WebGL is drawn by the processor: a machine for tests has no graphics card.
-FLAGS = """--no-sandbox --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader --disable-quic --no-first-run
---disable-background-networking --disable-component-update --disable-sync --hide-scrollbars"""
+# A machine for tests has no graphics card: WebGL is drawn by the processor, and a page itself without WebGL's detour.
+FLAGS = """--no-sandbox --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader --disable-gpu-compositing
+--disable-gpu-rasterization --disable-quic --no-first-run --disable-background-networking --disable-component-update
+--disable-sync --hide-scrollbars"""
 
 
 @contextmanager

@@ -1,7 +1,8 @@
-"""A diagnosis that several files of tests ask for is made once in a run, by whichever worker comes to it first."""
+"""What several tests or workers ask for is made once in a run, by whichever worker comes to it first."""
 
 import fcntl
 import pickle
+import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -14,6 +15,25 @@ import pytest
 
 import snarelab.identification.diagnose as diagnosing
 from snarelab.recordings.part import several
+
+
+def filled(folder: Path, fill: Callable[[Path], object]) -> Path:
+    """A folder that all workers of a run share, which the first has filled."""
+    with _alone(folder):
+        if not folder.is_dir():
+            part = folder.with_suffix(".part")
+            shutil.rmtree(part, ignore_errors=True)
+            part.mkdir()
+            fill(part)
+            part.rename(folder)
+    return folder
+
+
+@contextmanager
+def _alone(place: Path) -> Iterator[None]:
+    with open(f"{place}.lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
 
 
 @contextmanager
@@ -37,8 +57,7 @@ def _answer(
     bound.apply_defaults()
     told = [bound.arguments[k] for k in ("seed", "jobs", "anyway")]
     place = folder / sha256(repr((known, names, told)).encode()).hexdigest()
-    with open(f"{place}.lock", "w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+    with _alone(place):
         if not place.is_file():
             place.write_bytes(pickle.dumps(diagnose(model, recordings, holdout, **options)))
     answer = pickle.loads(place.read_bytes())

@@ -19,7 +19,7 @@ SPOILT = {
 }  # fmt: skip
 
 
-LONG = ("every third torque missing", "milliseconds as seconds")
+LONG = ("every third torque missing", "milliseconds as seconds", "a few spikes")
 
 
 @pytest.mark.parametrize(

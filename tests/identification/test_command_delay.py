@@ -43,7 +43,8 @@ def diagnosed(folder, seed, joints, **concealed):
     return diagnose(load_model(folder / "arm.toml"), [folder / "train.csv"], folder / "hold.csv").diagnosis
 
 
-@pytest.mark.parametrize(("seed", "delay"), [(5, 0.01), pytest.param(4, 0.02, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize(("seed", "delay"), [(5, 0.01), (4, 0.02)])
 def test_a_late_drive_of_an_arm_is_named_with_its_delay(tmp_path, seed, delay):
     """A late encoder would move the other joints' torque: it is no rival that cannot be told apart."""
     found = diagnosed(tmp_path, seed, 3, motor={"joint2": Queue(round(delay / 2.5e-4))})

@@ -49,6 +49,7 @@ def diagnosed(tmp_path_factory):
     return run
 
 
+@pytest.mark.slow
 def test_a_twisting_link_is_named_with_its_stiffness(diagnosed):
     """The spring changes torques by several times the disturbance on joints 1 to 3."""
     found = diagnosed(1, "link2")
@@ -56,6 +57,7 @@ def test_a_twisting_link_is_named_with_its_stiffness(diagnosed):
     assert found.effects[0].parameters["stiffness"].value == pytest.approx(STIFFNESS, rel=0.1)
 
 
+@pytest.mark.slow
 def test_torsion_before_a_joint_about_the_links_length_is_one_answer_with_its_elasticity(diagnosed):
     """Seed 5: joint 2 turns about the length of link 1, so its drive's spring and the link's are one in series."""
     found = diagnosed(5, "link1", True)
@@ -65,6 +67,6 @@ def test_torsion_before_a_joint_about_the_links_length_is_one_answer_with_its_el
     assert effect.parameters["stiffness"].value == pytest.approx(STIFFNESS, rel=0.2)
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_arms_with_stiff_links_stay_clean(diagnosed, seed):
-    assert diagnosed(seed).verdict == "adequate"
+def test_an_arm_with_stiff_links_stays_clean(diagnosed):
+    """How often a clean arm is told a name is counted by the proof."""
+    assert diagnosed(1).verdict == "adequate"

@@ -93,8 +93,8 @@ def test_noise_of_the_encoders_is_no_spring(tmp_path):
         ("rotor_inertia", "rotor_inertia", "joint2", "inertia", 2.0, 0.1, 12.0),
         ("joint_elasticity", "joint_elasticity", "joint2", "stiffness", 4000.0, 0.1, 12.0),
         # Coulomb friction is a step, which the delay's two states turn over gradually.
-        ("late torque", "sensor_delay", "tau.joint2", "delay", LATE, 0.15, 12.0),
-        ("late drive", "command_delay", "tau.joint2", "delay", LATE, 0.15, 12.0),
+        pytest.param(*("late torque", "sensor_delay", "tau.joint2", "delay", LATE, 0.15, 12.0), marks=pytest.mark.slow),
+        pytest.param(*("late drive", "command_delay", "tau.joint2", "delay", LATE, 0.15, 12.0), marks=pytest.mark.slow),
         ("late encoder", "sensor_delay", "q.joint2", "delay", LATE, 0.15, 12.0),
         pytest.param(*("inertia_error", "inertia_error", "link3", "mass", None, 0.15, 24.0), marks=pytest.mark.slow),
     ],

@@ -27,7 +27,7 @@ def waves(found, key="torque_ripple.joint2.period"):
     return 2 * np.pi / found.theta[[s.key for s in found.assembly.slots].index(key)]
 
 
-@pytest.mark.parametrize("order", [9.61, ORDER, 100.2])
+@pytest.mark.parametrize("order", [*(pytest.param(x, marks=pytest.mark.slow) for x in (9.61, 100.2)), ORDER])
 def test_a_ripple_is_named_with_its_period(tmp_path, order):
     found = decided(rippled(tmp_path, 1, {"joint2": Ripple(1.0, order, 0.4)}), tmp_path)
     assert names(found) == ["torque_ripple.joint2"]
@@ -35,6 +35,7 @@ def test_a_ripple_is_named_with_its_period(tmp_path, order):
     assert waves(found.best.last.fit) == pytest.approx(order, abs=2 * np.pi / travel(tmp_path))
 
 
+@pytest.mark.slow
 def test_two_ripples_at_one_joint_are_both_found(tmp_path):
     """A gear's teeth and a motor's poles."""
     both = Ripple(1.0, ORDER, 0.4), Ripple(0.6, 23.23, 1.1)
@@ -45,9 +46,9 @@ def test_two_ripples_at_one_joint_are_both_found(tmp_path):
     assert sorted(orders) == [pytest.approx(x, abs=element) for x in (23.23, ORDER)]
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_an_arm_without_ripple_has_none(tmp_path, seed):
-    found = decided(rippled(tmp_path, seed, {}), tmp_path)
+def test_an_arm_without_ripple_has_none(tmp_path):
+    """How often a clean arm is told a name is counted by the proof."""
+    found = decided(rippled(tmp_path, 1, {}), tmp_path)
     assert "torque_ripple" not in {n.placed.effect.name for n in found.best.names}
 
 

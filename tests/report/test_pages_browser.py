@@ -8,6 +8,7 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from browser import opened, playing
 from diagnoses import VERDICTS, unbroken
+from once import filled
 from playwright.sync_api import Browser, Page
 from proof_answers import several
 from study_pages import QUANTITIES, moving, picture
@@ -76,14 +77,22 @@ def crowded() -> Diagnosis:
 
 
 @pytest.fixture(scope="module")
-def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    folder = tmp_path_factory.mktemp("pages")
+def pages(of_this_run: Path) -> dict[str, Path]:
+    folder = filled(of_this_run / "pages", write_all)
+    others = {
+        "study": folder / "build" / "studies" / "demo" / "report.html",
+        "tolerance": folder / "captures" / "report.html",
+    }
+    return {kind: folder / f"{kind}.html" for kind in (*KINDS, "crowded")} | others
+
+
+def write_all(folder: Path) -> None:
     for name, make in (*VERDICTS.items(), ("crowded", crowded)):
         write_report(make(), folder / f"{name}.html", ORIGIN)
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         sections = [Section("Motion", ["What moves."], [picture()])]
-        study = write_page("demo", "Test", "It moves.", QUANTITIES, sections, moving().html(1.0)).resolve()
+        write_page("demo", "Test", "It moves.", QUANTITIES, sections, moving().html(1.0))
     variables = (
         ModelVariable("torque", "input", "N*m", 0.0, "torque of the motor"),
         ModelVariable("stiffness", "parameter", "N*m/rad", 5400.0, "of the spring", 0.0),
@@ -99,20 +108,18 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     scores = {name: score(answers, found) for name in ("snarelab", "joint_bic")}
     seal, content = Seal.make(answers, [1] * 12, [], 90500), {"seconds_a_diagnosis": 5.0}
     write_proof(folder / "proof.html", answers, scores, seal, content, found)
-    others = {"study": study, "tolerance": captures.folder / "report.html"}
-    return {kind: folder / f"{kind}.html" for kind in (*KINDS, "crowded")} | others
 
 
 @pytest.mark.parametrize(
-    ("scheme", "width"),
+    ("kind", "scheme", "width"),
     [
-        ("light", 1400),
-        ("dark", 390),
-        pytest.param("dark", 1400, marks=pytest.mark.slow),
-        pytest.param("light", 390, marks=pytest.mark.slow),
+        *((kind, "light", 1400) for kind in KINDS),
+        *(pytest.param(kind, "dark", 390, marks=pytest.mark.slow) for kind in KINDS),
+        # What these two show is what any page has.
+        *(pytest.param(kind, "dark", 1400, marks=pytest.mark.slow) for kind in ("missing_physics", "study")),
+        *(pytest.param(kind, "light", 390, marks=pytest.mark.slow) for kind in ("missing_physics", "study")),
     ],
 )
-@pytest.mark.parametrize("kind", KINDS)
 def test_axe_finds_nothing_serious(browser: Browser, pages: dict[str, Path], kind: str, scheme, width: int) -> None:
     with opened(browser, pages[kind], scheme, (width, 900)) as page:
         page.evaluate("document.querySelectorAll('details').forEach(x => x.open = true)")

@@ -76,6 +76,7 @@ def test_a_spring_is_named_with_its_stiffness_and_leaves_the_noise():
     assert found.left.curves == ()
 
 
+@pytest.mark.slow
 def test_play_is_named_with_its_gap_beside_its_spring():
     """A gap of 1 mrad on a spring that twists by 2 mrad."""
     found = decided(lambda t, q, number: -twist(t, lambda at: torque(at, number), 3000.0, 60.0, 1e-3))
