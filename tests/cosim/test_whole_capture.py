@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from made_studies import numbers_left
+from this_commit import some
 
 from snarelab.cosim.docked import (
     CABLE_STRENGTH,
@@ -117,8 +118,9 @@ def test_there_are_seven_states_to_give_up_in():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("state", ABORTED_FROM)
+@pytest.mark.parametrize("state", some(ABORTED_FROM, 3))
 def test_broken_off_in_a_state_it_ends_a_second_free_of_contact(state):
+    """A minute or two each: of three states, at other commits of the others."""
     d = docked_of(co_simulate_whole(setting("hover"), table=giving_up(state)))
     path = [name for name, _, _ in d.whole.phases]
     assert d.whole.fault == ""

@@ -1,10 +1,7 @@
 """Cases that nobody has seen: each run draws others, and the tool has an answer to each."""
 
-import hashlib
-import subprocess
-from pathlib import Path
-
 import pytest
+from this_commit import number
 
 from proof.benchmark.case_set import GENERATORS
 from proof.drives.cases import FAULTY
@@ -13,14 +10,6 @@ from proof.drives.score import score
 from proof.played.residuals import RECORDINGS
 from proof.played.robots import published
 
-ROOT = Path(__file__).parents[2]
-
-
-def seed() -> int:
-    """Another one for each commit; 1000 and more."""
-    asked = subprocess.run(["git", "rev-parse", "HEAD"], cwd=ROOT, capture_output=True, text=True)
-    return 1000 + int(hashlib.sha256(asked.stdout.encode()).hexdigest()[:6], 16)
-
 
 @pytest.mark.slow
 @pytest.mark.parametrize("generator", list(GENERATORS))
@@ -28,7 +17,7 @@ def test_unseen_cases_are_answered(generator, tmp_path):
     """A failure says which seed; what a case was told is in the captured output. How long it takes is no test of it."""
     if generator == "played" and not (RECORDINGS.exists() and published()):
         pytest.skip("recordings or example-robot-data are not there")
-    fresh = seed()
+    fresh = 1000 + number()
     folders = GENERATORS[generator](tmp_path / "cases", fresh, 2)
     lines = score(folders, tmp_path / "answers.jsonl", 1200.0)
     for line in lines:
