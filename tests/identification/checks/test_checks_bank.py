@@ -12,7 +12,6 @@ from snarelab.models.model_file import load_model
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("each_diagnosis_once")]
 DRAWN = 10
 MISSED = 0.1
-ARMS = 3
 
 
 def cases(tmp_path, seed, mistake):
@@ -75,9 +74,9 @@ def diagnosed(folder, made, text, runs, held):
     ids=lambda mistake: mistake.__name__,
 )
 def test_a_mend_gives_the_verdict_of_the_sound_recording(tmp_path, mistake):
-    """Where the mend is an estimate, or leaves samples or recordings out: on two of three arms at least. Two joints and
+    """Where the mend is an estimate, or leaves samples or recordings out: on two arms, of three at most. Two joints and
     no physics missing: a mend that is not quite right is told as some."""
-    missed, tried = [], 0
+    missed, good = [], 0
     for seed in range(23, 33):
         made = bank.machine(seed, n_joints=2, missing=False)
         runs, name, _ = mistake(made, seed)
@@ -97,11 +96,11 @@ def test_a_mend_gives_the_verdict_of_the_sound_recording(tmp_path, mistake):
         # A load that is turned is missing physics in either: the same is to be named.
         if (verdict, names if sound_names else set()) != (sound_verdict, sound_names):
             missed.append((seed, names, sound_names))
-        tried += 1
-        if tried == ARMS or len(missed) > 1:
+        else:
+            good += 1
+        if good == 2 or len(missed) == 2:
             break
-    assert tried == ARMS
-    assert len(missed) <= 1, missed
+    assert good == 2, missed
 
 
 @pytest.mark.parametrize("seed", range(100, 160))
