@@ -31,8 +31,8 @@ studies: $(filter-out study-tolerance,$(STUDIES:%=study-%)) ## every study but t
 test: .venv/installed ## set up, then the tests
 	$(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist worksteal
 
-test-slow: .venv/installed ## the tests of whole studies and captures, which `make test` leaves out: half an hour; CI runs them
-	$(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist loadfile -m slow
+test-slow: .venv/installed ## the tests of whole studies and captures, which `make test` leaves out: three quarters of an hour; PART=2: every second file
+	$(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist loadfile -m slow $(if $(PART),--part $(PART))
 
 check: .venv/installed ## formatting, lint, words and types
 	$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/python docs/check_words.py && $(BIN)/pyright --pythonpath $(BIN)/python

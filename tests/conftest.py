@@ -31,6 +31,24 @@ except OSError as problem:
     NO_COMPILER = str(problem)
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--part", type=int, default=1, metavar="N", help="one file in N, each commit others")
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Of the files whose tests are asked for, one in N: all of them over N commits or so, whole files each time."""
+    from this_commit import number  # found by the paths above
+
+    parts = config.getoption("--part")
+    files = sorted({item.path for item in items})
+    mine = set(files[number() % parts :: parts])
+    left_out = [item for item in items if item.path not in mine]
+    if left_out:
+        items[:] = [item for item in items if item.path in mine]
+        config.hook.pytest_deselected(items=left_out)
+
+
 def _skipped_without_compiler() -> Generator[None, Any, Any]:
     """Where this machine has no C compiler, a test that asks for one is skipped, and says so."""
     try:
