@@ -31,8 +31,8 @@ def main(words: Sequence[str]) -> int:
 
 
 def _do(given: argparse.Namespace) -> int:
-    from . import register
-    from .bars_table import table
+    from . import left_out, register
+    from .bars_table import LEFT_OUT, table
     from .seal import write_json
 
     if given.command == "register":
@@ -58,6 +58,8 @@ def _do(given: argparse.Namespace) -> int:
         return 0
     files = register.run(registered, given.hours, tell, given.folder, given.answers, only=given.only)
     found = register.result(registered, files)
+    for name, figure in left_out.of_files(files).items():
+        found["generators"][name][LEFT_OUT] = figure
     tell(f"{register.printed(files)}\n\n{table(found)}")
     write_json(given.folder / "result.json", found)
     tell(f"numbers: {given.folder / 'result.json'}")
