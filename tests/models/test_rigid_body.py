@@ -153,7 +153,7 @@ def test_regressor_columns_are_the_torque_of_point_masses_in_drake(tmp_path):
     n_joints, rng = 5, np.random.default_rng(3)
     body, drake = both(tmp_path, n_joints, seed=48)
     kinds = [joint.kind for joint in body.tree.joints]
-    # A turn moves what hangs from it along, but only beyond another joint does the regressor carry its twist outward.
+    # Only where a joint hangs from a revolute one does a twist that is carried outward gain the slide of an arm.
     assert ("revolute", "revolute") in {(kinds[j.parent], j.kind) for j in body.tree.joints if j.parent >= 0}
     q, qd, qdd = motion(4, n_joints)
     regressor = body.regressor(q, qd, qdd)

@@ -2,11 +2,14 @@
 
 import numpy as np
 import pytest
+from scipy.stats import t as student
 
+from snarelab.identification.deciding import GATE
 from snarelab.identification.evidence.gain import Remaining, scatter, standard_error
 from snarelab.identification.nuisance.covariance import Covariance
 
 N_BLOCKS, LENGTH = 16, 40
+N_DRAWS = 2000
 
 
 def gains(
@@ -42,6 +45,38 @@ def test_a_block_that_holds_most_does_not_double_the_error():
     d[0] = 0.45
     told, true = deviations(d, 1.0, 1.0)
     assert told == pytest.approx(true, rel=0.15)
+
+
+def passed(d: np.ndarray, share: float) -> float:
+    """Share of draws in which the gain is beyond the gate."""
+    rng = np.random.default_rng(4)
+    drawn = [gains(d, rng, share) for _ in range(N_DRAWS)]
+    return float(np.mean([g.sum() > GATE * standard_error(g, e) for g, e in drawn]))
+
+
+@pytest.mark.parametrize("n_blocks", [2, 3, 5, 8, 16])
+def test_how_often_nothing_gained_passes_the_gate(n_blocks):
+    """A law of which half is true gains nothing on average. Its gain in standard errors follows Student's t of one
+    degree fewer than blocks, not a normal distribution with 2.3 % beyond the gate.
+
+    Blocks               2       3       5       8      16
+    Student          14.8 %   9.2 %   5.8 %   4.3 %   3.2 %
+    blocks alike     15.5 %   9.5 %   6.5 %   4.0 %   4.0 %
+    one holds most   14.8 %   9.6 %   6.8 %   5.4 %   3.8 %
+    nothing is true   5.4 %   3.4 %   1.6 %   0.6 %   0.8 %
+
+    The last is a law that fits noise: it is expected to gain one unit of log density less than nothing.
+    """
+    alike = np.full((n_blocks, LENGTH), 0.3)
+    uneven = alike.copy()
+    uneven[0] *= np.sqrt(3 * (n_blocks - 1))  # three quarters of what is expected
+    fitted = alike * np.sqrt(2 / np.sum(alike**2))
+    level = float(student.sf(GATE, n_blocks - 1))
+    chance = np.sqrt(level * (1 - level) / N_DRAWS)
+    assert passed(alike, 0.5) == pytest.approx(level, abs=4 * chance)
+    # Where one block holds most, it says most of the dispersion too, and there are as good as fewer blocks.
+    assert level - 4 * chance < passed(uneven, 0.5) < 1.5 * level + 4 * chance
+    assert passed(fitted, 0.0) < 0.5 * level
 
 
 @pytest.mark.parametrize(("noise", "times"), [(1.0, 5.0), (3.0, 1.5)])
