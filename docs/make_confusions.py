@@ -3,8 +3,8 @@
 Measured along the bundled recording (a three-joint arm), with the columns that `diagnose` itself tries. For two effects
 at one joint, its link or its channel: the share of the first one's torque that the second makes as well as the first,
 once viscous and Coulomb friction have taken what they can (but for pairs of which one is such). Shapes stand in the
-middle of the first one's grid; the second takes the best of its own. Effects of suspension rigs, floating bases and
-snares have motions of their own, and are not measured.
+middle of the first one's grid; the second takes the best of its own. An effect that acts at a joint is not measured at
+an axis of two. Effects of suspension rigs, floating bases and snares have motions of their own, and are not measured.
 """
 
 import json
@@ -15,6 +15,7 @@ import numpy as np
 
 from snarelab.identification.identify import Identification, identify
 from snarelab.identification.search.candidates import candidate_columns, library, variants
+from snarelab.models.axes import neighbours
 from snarelab.models.model_file import load_model
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -32,11 +33,14 @@ def alike() -> dict[str, dict[str, float]]:
     assembly, (experiment,) = found.fit.assembly, found.train
     state = assembly.evaluate(experiment, found.fit.theta)
     n_joints = len(found.model.joints)
+    axes = {axis.name for axis in neighbours(found.model.tree)}
+    places = library(replace(found.model, effects=()))
+    at_joints = {p.effect.name for p in places if p.at not in axes}
     result: dict[str, dict[str, float]] = {}
     for joint in JOINTS:
         columns: dict[str, list[np.ndarray]] = {}
-        for placed in library(replace(found.model, effects=())):
-            if assembly.joint_of(placed) != joint:
+        for placed in places:
+            if assembly.joint_of(placed) != joint or (placed.at in axes and placed.effect.name in at_joints):
                 continue
             key = placed.effect.name
             for variant in variants(assembly, placed):

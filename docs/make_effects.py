@@ -53,6 +53,11 @@ Coulomb friction. Shares of 80 % and more are listed. `python docs/make_confusio
 recording. Other motions separate other pairs: a diagnosis uses its own recordings, and names the rivals that are not
 separable there. Effects of suspension rigs, floating bases, snares and dockings are not in the table.
 
+`link_torsion` and `link_bending` have no row. Booms are not measured, and of the bundled arm's beams `link2` alone is
+compared, with the joint before it. There no effect makes 80 % of either, nor either of any effect; but a beam looks
+like elasticity of the joint beyond it as well. Nor has an effect at an axis a row, but for `joint_spring`, which acts
+at no single joint: what an axis looks like depends on which joints it combines.
+
 | effect | looks like |
 | --- | --- |
 """

@@ -10,6 +10,7 @@ import tomllib
 import pytest
 from diagnoses import spelt
 from documentation import CHANGELOG, DOCS, PAGES, README, ROOT, blocks, read
+from made_studies import result_left
 
 import snarelab
 from snarelab.cli import main
@@ -204,6 +205,33 @@ def test_results_shown_on_two_pages_are_the_same():
     assert f"falls from {table[0][2]} to {table[-1][2]}" in said
     (theirs,) = re.findall(r"publishers' own model has ([\d.]+) %", said)
     assert f"| {theirs} % |" in study
+
+
+def test_the_servo_axis_on_its_page_is_what_the_study_left():
+    """Every line of both tables."""
+
+    def percent(share):
+        return f"{100 * share:.2f} %"
+
+    result = result_left("emps")
+    if result is None:
+        pytest.skip("no result of today's sources: make study-emps")
+    page = read(DOCS / "study-emps.md")
+    steps = [[s["label"], percent(s["train"]), percent(s["holdout"])] for s in result["steps"]]
+    assert rows(page, "| model | error, training |") == steps
+    here = {row[0]: row[1:3] for row in rows(page, "| | published | here |")}
+    of = {q["name"]: q for q in result["quantities"]}
+    for line, name in (
+        ("mass [kg]", "mass"),
+        ("viscous coefficient [N·s/m]", "coefficient"),
+        ("Coulomb level [N]", "level"),
+        ("offset [N]", "offset"),
+    ):
+        assert here[line] == [f"{of[name][x]:.4f}".replace("-", "−") for x in ("paper", "ours")]
+    for line, name in (("fitted", "train"), ("held out", "holdout")):
+        own = of[f"relative_error_{name}"]
+        assert here[f"relative force error, {line}"] == [percent(own[x]) for x in ("paper", "ours")]
+    assert of["relative_error_held_out"]["ours"] == result["steps"][-1]["holdout"]
 
 
 def test_the_readme_is_short():

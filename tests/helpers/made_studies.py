@@ -24,12 +24,16 @@ def made_study(name: str, study: ModuleType, recordings: Path, tmp_path: Path, p
     return tmp_path / FOLDER / name
 
 
+def result_left(name: str) -> dict[str, Any] | None:
+    """A study's result, of today's sources; None where it was not made."""
+    left = ROOT / FOLDER / name
+    return json.loads((left / "result.json").read_text()) if _newer_than_sources(left / "report.html") else None
+
+
 def numbers_left(name: str) -> dict[str, Any] | None:
     """A study's quantities by name, of today's sources; None where it was not made."""
-    left = ROOT / FOLDER / name
-    if not _newer_than_sources(left / "report.html"):
-        return None
-    return {q["name"]: q["ours"] for q in json.loads((left / "result.json").read_text())["quantities"]}
+    result = result_left(name)
+    return None if result is None else {q["name"]: q["ours"] for q in result["quantities"]}
 
 
 def _newer_than_sources(page: Path) -> bool:
