@@ -1,6 +1,7 @@
 """``python -m proof register``, ``verify`` and ``registered``, ``rivals``: a proof announced before it was run."""
 
 import argparse
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -31,9 +32,7 @@ def main(words: Sequence[str]) -> int:
 
 
 def _do(given: argparse.Namespace) -> int:
-    from . import left_out, register
-    from .bars_table import LEFT_OUT, table
-    from .seal import write_json
+    from . import register
 
     if given.command == "register":
         seeds = {name: own for name in GENERATORS if (own := getattr(given, name))}
@@ -50,17 +49,24 @@ def _do(given: argparse.Namespace) -> int:
             "\n".join(found) or f"the tree is the one registered on {registered['date']} at {registered['commit'][:12]}"
         )
         return 1 if found else 0
-    if given.command == "rivals":
-        from . import registered_rivals
+    from . import left_out, registered_rivals
+    from .bars_table import LEFT_OUT, table
+    from .registered_quantities import of_rivals, result
+    from .seal import write_json
 
+    if given.command == "rivals":
         registered_rivals.ask(registered, given.hours, tell, given.folder, given.answers, only=given.only)
         tell(registered_rivals.printed(registered, registered_rivals.compared(registered, given.answers)))
         return 0
+    begun = time.monotonic()
     files = register.run(registered, given.hours, tell, given.folder, given.answers, only=given.only)
     found = register.result(registered, files)
     for name, figure in left_out.of_files(files).items():
         found["generators"][name][LEFT_OUT] = figure
     tell(f"{register.printed(files)}\n\n{table(found)}")
     write_json(given.folder / "result.json", found)
-    tell(f"numbers: {given.folder / 'result.json'}")
+    rivals = of_rivals(registered_rivals.compared(registered, given.answers))
+    summary = given.folder.parent / "result.json"
+    write_json(summary, result(found, rivals, Path("build/power"), time.monotonic() - begun))
+    tell(f"numbers: {summary}, every figure: {given.folder / 'result.json'}")
     return 0
