@@ -68,8 +68,8 @@ first-hour: .venv/installed ## from the wheel to a verdict in bare containers of
 hostile: .venv/installed ## forty FMUs that crash, hang, fork and lie: each ends in one line
 	$(BIN)/python bench/hostile_fmus.py
 
-MUTANTS ?= 60
-mutants: .venv/installed ## halve and double what decides, change identification and cosim at random places, and count how often a test notices; branch coverage
+MUTANTS ?= 40
+mutants: .venv/installed ## halve and double what decides, change identification, cosim and models at random places, and count how often a test notices; branch coverage; numbers in build/mutants/result.json
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt '.[mutants]'
 	$(BIN)/python bench/moved_constants.py
 	$(BIN)/python bench/mutants.py --mutants $(MUTANTS)

@@ -1,11 +1,12 @@
 """Change the source at random places, one at a time, and count how often a test notices.
 
-``python bench/mutants.py [--mutants 60] [--seed 1] [--workers 2] [FOLDER ...]`` over identification and cosim, as they
-are in the last commit. The whole tests run once under coverage, which also gives the branch coverage and tells which
-tests reach which line. Then Cosmic Ray's operators change places drawn evenly from all that can be changed, and of the
-tests that reach the line the shortest run, up to ``--minutes`` together: those left out could only kill more. A mutant
-that no test reaches, or that all of them pass, survives; one that never ends is killed. What is done is kept under
-``build/mutants`` for the same commit's files, and not done again.
+``python bench/mutants.py [--mutants 40] [--seed 1] [--workers 2] [FOLDER ...]`` over identification, cosim and models,
+as they are in the last commit, so many changes of each. The whole tests run once under coverage, which also gives the
+branch coverage and tells which tests reach which line. Then Cosmic Ray's operators change places drawn evenly from all
+that can be changed in a folder, and of the tests that reach the line the shortest run, up to ``--minutes`` together:
+those left out could only kill more. A mutant that no test reaches, or that all of them pass, survives; one that never
+ends is killed. What is done is kept under ``build/mutants`` for the same commit's files, and not done again;
+``result.json`` there has the shares.
 
 Operators that a checker of types or an import would catch by itself (``<<`` for ``+``, ``is`` for ``==``) are left out.
 """
@@ -19,15 +20,19 @@ import subprocess
 import sys
 import xml.etree.ElementTree as ET
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from queue import SimpleQueue
 
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+
+from bench.results import leave
+
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / "build" / "mutants"
-FOLDERS = ("identification", "cosim")
+FOLDERS = ("identification", "cosim", "models")
 _ARITHMETIC = ("Add", "Sub", "Mul", "Div", "Pow")
 _ORDER = ("Eq", "NotEq", "Lt", "LtE", "Gt", "GtE")
 OPERATORS = (
@@ -183,11 +188,17 @@ def shortest(names: set[str], seconds: dict[str, float], limit: float) -> list[s
     return chosen
 
 
+def killed(ended: Mapping[Mutant, str], folders: Sequence[str]) -> dict[str, float]:
+    """``killed.FOLDER``: the share of a folder's mutants that a test noticed; folders without a mutant are left out."""
+    own = {f: [end == "killed" for m, end in ended.items() if m.path.startswith(f"{f}/")] for f in folders}
+    return {f"killed.{f}": sum(hits) / len(hits) for f, hits in own.items() if hits}
+
+
 def main() -> int:
     """Measure, draw, try, count."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("folders", nargs="*", default=FOLDERS, metavar="FOLDER")
-    parser.add_argument("--mutants", type=int, default=60)
+    parser.add_argument("--mutants", type=int, default=40, help="of each folder")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--minutes", type=float, default=1.0)
@@ -208,7 +219,7 @@ def main() -> int:
     log = FOLDER / "mutants.jsonl"
     lines = [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
     done = {json.dumps(x["mutant"]): x["end"] for x in lines if x["version"] == version}
-    mutants = draw(given.mutants, given.seed, given.folders)
+    mutants = [m for folder in given.folders for m in draw(given.mutants, given.seed, [folder])]
 
     def run(mutant: Mutant) -> str:
         tree = trees.get()
@@ -218,16 +229,22 @@ def main() -> int:
         finally:
             trees.put(tree)
 
-    ends: Counter[str] = Counter(done[key] for m in mutants if (key := json.dumps(asdict(m))) in done)
+    ended = {m: done[key] for m in mutants if (key := json.dumps(asdict(m))) in done}
     with ThreadPoolExecutor(given.workers) as pool, log.open("a") as file:
         jobs = {pool.submit(run, m): m for m in mutants if json.dumps(asdict(m)) not in done}
         for job in as_completed(jobs):
-            mutant, end = jobs[job], job.result()
-            ends[end] += 1
+            mutant = jobs[job]
+            ended[mutant] = end = job.result()
             file.write(json.dumps({"version": version, "mutant": asdict(mutant), "end": end}) + "\n")
             file.flush()
-            print(f"{ends.total()}/{len(mutants)} {end}: {mutant.path}:{mutant.line} {mutant.operator}", flush=True)
-    print(f"{ends['killed']} of {ends.total()} killed, {100.0 * ends['killed'] / ends.total():.0f} %; {dict(ends)}")
+            print(f"{len(ended)}/{len(mutants)} {end}: {mutant.path}:{mutant.line} {mutant.operator}", flush=True)
+    found = killed(ended, given.folders)
+    for folder in given.folders:
+        ends = Counter(end for m, end in ended.items() if m.path.startswith(f"{folder}/"))
+        print(
+            f"{folder}: {ends['killed']} of {ends.total()} killed, {100.0 * found[f'killed.{folder}']:.0f} %; {dict(ends)}"
+        )
+    leave(FOLDER / "result.json", found | {"branch_coverage": share[0] / 100.0})
     return 0
 
 

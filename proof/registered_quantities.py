@@ -1,7 +1,7 @@
 """Figures of a registered run as scripts read them: ``build/proof/result.json``, in the form of a study's numbers.
 
-Each stands as ``generator.figure``, and once more by its plain name, where it is the worst of the generators'. Of a rival
-it is ``rival.generator.figure`` and ``rival.figure``. The generator `played` is called ``replay`` there.
+Each stands as ``generator.figure``, and once more by its plain name, where it is the worst of the generators'. With a
+rival's name before it, it is the rival's. The generator `played` is called ``replay`` there.
 """
 
 import json
