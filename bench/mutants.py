@@ -241,9 +241,8 @@ def main() -> int:
     found = killed(ended, given.folders)
     for folder in given.folders:
         ends = Counter(end for m, end in ended.items() if m.path.startswith(f"{folder}/"))
-        print(
-            f"{folder}: {ends['killed']} of {ends.total()} killed, {100.0 * found[f'killed.{folder}']:.0f} %; {dict(ends)}"
-        )
+        text = f"{100.0 * found[f'killed.{folder}']:.0f} %; {dict(ends)}"
+        print(f"{folder}: {ends['killed']} of {ends.total()} killed, {text}")
     leave(FOLDER / "result.json", found | {"branch_coverage": share[0] / 100.0})
     return 0
 
