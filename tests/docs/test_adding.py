@@ -1,4 +1,7 @@
-"""The guides "Add an effect", "... a nuisance", "... a participant": one new file each, as the page has it, no edit."""
+"""The guides "Add an effect", "... a nuisance", "... a participant": one new file each, as the page has it, no edit.
+
+"Add a kind of recording" is one new folder.
+"""
 
 import json
 import os
@@ -38,9 +41,9 @@ def copied(tmp_path):
     )
     shutil.copytree(PACKAGE, tmp_path / "copy" / "snarelab", ignore=left_out)
 
-    def run(*commands):
-        """What several commands print, one after the other in one process: engines load once."""
-        code = f"from snarelab.cli import main\nfor words in {commands!r}: assert main(words) == 0, words"
+    def run(*commands, code=None):
+        """What several commands print, one after the other in one process: engines load once; or what ``code`` does."""
+        code = code or f"from snarelab.cli import main\nfor words in {commands!r}: assert main(words) == 0, words"
         environment = os.environ | {"PYTHONPATH": str(tmp_path / "copy")}
         ran = subprocess.run(
             [sys.executable, "-c", code], cwd=tmp_path, env=environment, capture_output=True, text=True
@@ -134,6 +137,47 @@ def test_a_nuisance_is_one_file(copied, tmp_path):
     verdict, levels = told()
     assert verdict == "missing_physics"
     assert levels == {"coulomb_friction": pytest.approx(0.06, abs=0.01)}
+
+
+WHEEL = """<robot name="wheel"><link name="base"/>
+<link name="rotor"><inertial><origin xyz="0 0 0"/><mass value="5"/>
+<inertia ixx="0.03" ixy="0" ixz="0" iyy="0.03" iyz="0" izz="0.06"/></inertial></link>
+<joint name="wheel" type="continuous"><parent link="base"/><child link="rotor"/><axis xyz="0 0 1"/></joint></robot>"""
+
+
+def run_down(path, start, seed):
+    """Speed of a wheel of 0.06 kg·m² under Coulomb and viscous friction, by formula: it falls towards a speed below
+    zero, which it would have if Coulomb friction did not end with its motion."""
+    level, coefficient, t = 0.004, 1.1e-4, np.arange(0.0, 150.0, 1.5)
+    speed = (start + level / coefficient) * np.exp(-coefficient * t / 0.06) - level / coefficient
+    speed += 0.1 * np.random.default_rng(seed).normal(size=t.size)
+    pd.DataFrame({"time": t, "qd.wheel": speed}).to_csv(path, index=False)
+
+
+def test_a_kind_of_recording_is_one_folder(copied, tmp_path):
+    package, run = copied
+    source, kind, script = blocks("adding-a-kind-of-recording.md", "python")
+    folder = package / "identification" / "run_down"
+    folder.mkdir()
+    for name, text in (("__init__.py", ""), ("source.py", source), ("kind.py", kind)):
+        (folder / name).write_text(text, encoding="utf-8")
+    (tmp_path / "wheel.urdf").write_text(WHEEL)
+    (tmp_path / "wheel.toml").write_text(
+        'urdf = "wheel.urdf"\neffects = ["viscous_friction"]\n'
+        '[parameters]\n"viscous_friction.wheel.coefficient" = 1.2e-4\n'
+    )
+    for seed, (name, start) in enumerate((("fast", 300.0), ("slow", 150.0), ("again", 220.0))):
+        run_down(tmp_path / f"{name}.csv", start, seed)
+    said = run(code=f"{script}\nimport json\njson.dump(found.to_json(), open('found.json', 'w'))\n")
+    assert "The model leaves out Coulomb friction at wheel." in said
+    found = json.loads((tmp_path / "found.json").read_text())
+    assert found["verdict"] == "missing_physics"
+    (effect,) = found["effects"]
+    assert (effect["name"], effect["at"]) == ("coulomb_friction", "wheel")
+    level = effect["parameters"]["level"]
+    assert level["unit"] == "N*m"
+    assert level["value"] == pytest.approx(0.004, abs=4 * level["std"])
+    assert level["std"] < 0.02 * 0.004
 
 
 def fmu_torque(path, motion):
