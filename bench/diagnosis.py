@@ -36,7 +36,7 @@ from bench.motion import fourier_motion, point_to_point_motion
 from bench.mujoco_plant import Plant, simulate, write_csv
 from bench.parts import Disturbance, Harness
 from snarelab.cli import main as snarelab
-from snarelab.identification.arms import kind, weigh
+from snarelab.identification.arms import hypotheses, kind, weigh
 from snarelab.identification.evidence.tolerant import searched
 
 N_JOINTS, SECONDS, RATE, TOP = 6, 60.0, 200.0, 12
@@ -116,7 +116,7 @@ def general_test(words: tuple[Any, ...], named: dict[str, Any]) -> dict[str, Clo
         weighed = weigh.weigh(*words, **named)
         searched(weighed, range(weighed.n_train), (), range(len(weighed.noises)))
 
-    parts = {"columns of curves": Clock(weigh.curves), "noise": Clock(weigh._noise), "in all": Clock(test)}
+    parts = {"columns of curves": Clock(hypotheses.curves), "noise": Clock(weigh._noise), "in all": Clock(test)}
     own = {"curves": parts["columns of curves"], "_noise": parts["noise"]}
     with instead(weigh, names=lambda *_: {}, library=lambda _: [], **own):
         parts["in all"]()
@@ -131,7 +131,7 @@ def main() -> int:
         make(folder)
     profile = cProfile.Profile()
     profile.runcall(diagnose, folder)  # first, for it compiles the model
-    whole, first = Clock(diagnose), Clock(kind.weigh)
+    whole, first = Clock(diagnose), Clock(weigh.weigh)
     with instead(kind, weigh=first):
         whole(folder)
     assert first.first is not None

@@ -40,7 +40,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     """Of the files whose tests are asked for, one in N: all of them over N commits or so, whole files each time."""
     from this_commit import number  # found by the paths above
 
-    parts = config.getoption("--part")
+    parts: int = config.option.part
     files = sorted({item.path for item in items})
     mine = set(files[number() % parts :: parts])
     left_out = [item for item in items if item.path not in mine]
