@@ -41,6 +41,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     from this_commit import number  # found by the paths above
 
     parts: int = config.option.part
+    if parts < 1:
+        raise pytest.UsageError(f"--part {parts}: give 1 for all files, or more")
     files = sorted({item.path for item in items})
     mine = set(files[number() % parts :: parts])
     left_out = [item for item in items if item.path not in mine]

@@ -2,16 +2,14 @@
 
 import numpy as np
 import pytest
+from short_recordings import diagnosed
 
 from bench.arm import random_arm
 from bench.lugre import LuGre
 from bench.machine_laws import tanh_motor
 from bench.machine_parts import Iron
-from bench.motion import fourier_motion, point_to_point_motion
-from bench.mujoco_plant import Plant, simulate, write_csv
+from bench.mujoco_plant import Plant
 from bench.parts import Disturbance
-from snarelab.identification.diagnose import diagnose
-from snarelab.models.model_file import load_model
 
 
 @pytest.mark.slow
@@ -29,13 +27,6 @@ def test_a_motor_that_saturates_is_not_wrongly_named(tmp_path):
         # Its largest load is four tenths of this torque, and takes a fourteenth more current than a straight line.
         motor={"joint1": Iron(lambda asked: float(tanh_motor(asked, 64.0)))},
     )
-    (tmp_path / "arm.urdf").write_text(arm.urdf())
-    (tmp_path / "arm.toml").write_text(
-        'urdf = "arm.urdf"\neffects = ["viscous_friction", "coulomb_friction", "presliding_hysteresis"]\n'
-    )
-    train, hold = fourier_motion(arm, rng, 8.0), point_to_point_motion(arm, rng, 6.0, slowest=0.3)
-    write_csv(tmp_path / "train.csv", simulate(plant, train, 8.0, 200.0, rng))
-    write_csv(tmp_path / "hold.csv", simulate(plant, hold, 6.0, 200.0, rng))
-    found = diagnose(load_model(tmp_path / "arm.toml"), [tmp_path / "train.csv"], tmp_path / "hold.csv").diagnosis
+    found = diagnosed(tmp_path, plant, arm, rng)
     names = [(e.name, e.at) for e in found.effects]
     assert found.verdict == "unknown_effect" or names == [("motor_saturation", "tau.joint1")], found.sentence

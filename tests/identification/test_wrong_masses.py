@@ -3,14 +3,12 @@
 from dataclasses import replace
 
 import numpy as np
+from short_recordings import diagnosed
 
 from bench.arm import Arm, random_arm
 from bench.lugre import LuGre
-from bench.motion import fourier_motion, point_to_point_motion
-from bench.mujoco_plant import Plant, simulate, write_csv
+from bench.mujoco_plant import Plant
 from bench.parts import Disturbance
-from snarelab.identification.diagnose import diagnose
-from snarelab.models.model_file import load_model
 
 LEVELS = {"joint1": 5.0, "joint2": 2.0}
 
@@ -28,13 +26,6 @@ def test_masses_that_are_off_by_a_few_per_cent_are_no_other_physics(tmp_path):
         tau_noise=dict.fromkeys(LEVELS, 0.1),
         disturbance=dict.fromkeys(LEVELS, Disturbance(0.1, 0.3, 15.0)),
     )
-    (tmp_path / "arm.urdf").write_text(stated.urdf())
-    (tmp_path / "arm.toml").write_text(
-        'urdf = "arm.urdf"\neffects = ["viscous_friction", "coulomb_friction", "presliding_hysteresis"]\n'
-    )
-    train, hold = fourier_motion(arm, rng, 8.0), point_to_point_motion(arm, rng, 6.0, slowest=0.3)
-    write_csv(tmp_path / "train.csv", simulate(plant, train, 8.0, 200.0, rng))
-    write_csv(tmp_path / "hold.csv", simulate(plant, hold, 6.0, 200.0, rng))
-    found = diagnose(load_model(tmp_path / "arm.toml"), [tmp_path / "train.csv"], tmp_path / "hold.csv").diagnosis
+    found = diagnosed(tmp_path, plant, stated, rng)
     assert found.verdict != "unknown_effect", found.sentence
     assert {e.name for e in found.effects} <= {"payload_mass", "inertia_error"}, found.sentence
